@@ -18,8 +18,8 @@ from .exceptions import InputError as InputError
 from .exceptions import IntegrationError as IntegrationError
 from .exchange.from_mujoco import from_mujoco as from_mujoco
 from .exchange.mjcf import to_mjcf as to_mjcf
-from .identification.identifying import identify as identify
-from .identification.proposing import propose as propose
+from .identification.identify import identify as identify
+from .identification.propose import propose as propose
 from .laws.law import Law as Law
 from .mechanism.finger import Finger as Finger
 from .mechanism.finger import Hand as Hand

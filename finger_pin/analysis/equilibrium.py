@@ -134,7 +134,7 @@ def _refuse_restless(finger: Finger) -> None:
     description, tables = finger.description, finger.mechanism.rows
     driven = any(table.pulls and table.group != "tension_sources" for table in tables)
     own = any(table.states for table in finger.constructor_args[1])
-    if description.hand is not None or driven or finger.layout.objects or own:
+    if description.hand is not None or driven or finger.layout.names_of("object_pose") or own:
         raise InputError("finger", "must be one finger with ideal sources of tension, without free objects")
     for name, each in (description.tree.actuators if description.tree is not None else {}).items():
         if each.integrates or each.integral:

@@ -76,10 +76,8 @@ def linearise(
     else:
         scenario = load_scenario(finger_or_scenario)
         finger = _built(scenario)
-    if finger.layout.objects:
-        raise InputError(
-            "scenario.environment.objects", "a free object has no linear coordinates", finger.layout.objects
-        )
+    if objects := (finger.scene.free if finger.scene else {}):
+        raise InputError("scenario.environment.objects", "a free object has no linear coordinates", tuple(objects))
     if dt is not None and not 0.0 < dt < np.inf:
         raise InputError("dt", "must be above 0", dt)
     if parameters and scenario is None:

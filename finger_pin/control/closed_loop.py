@@ -224,7 +224,7 @@ class ClosedLoop:
         """Return fingertips, base frame, and energies in the world at times (m,) and states."""
         base, around, objects = self.base(time), self.finger.scene, None
         found = self.dynamics.motion(state.position, state.velocity, base)
-        if around is not None and state.object_pose is not None and state.object_velocity is not None:
+        if around is not None:
             objects = around.energies(state.object_pose, state.object_velocity, base)
         if self.palm is not None:
             higher = found.potential_energy + self.palm.lifted(time, self.finger.rigid_body.mass)

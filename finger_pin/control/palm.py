@@ -43,7 +43,7 @@ class PalmPath:
         if hand is None or hand.palm.path is None:
             return None
         settings = [hand.palm.on_path(name) for name in PATH]
-        carries = finger is not None and bool(finger.layout.world)
+        carries = finger is not None and bool(finger.layout.names_of("world_position"))
         return cls(Signal.from_settings(settings, tolerance).later(start), np.array(hand.gravity), carries)
 
     def place(self, time: Array | float) -> tuple[Array, Array]:
@@ -61,7 +61,6 @@ class PalmPath:
         """Return a packed state with the world's placement at the start, seen from the palm."""
         if self.carries:
             state = finger.layout.unpack(x)
-            assert state.world_position is not None and state.world_velocity is not None
             state.world_position[:], state.world_velocity[:] = (self._world(order, 0.0) for order in range(2))
         return x
 
@@ -125,7 +124,6 @@ class PrescribedObjects:
     def place(self, finger: Finger, x: Array) -> Array:
         """Return a packed state with the objects at the beginnings of their paths."""
         state = finger.layout.unpack(x)
-        assert state.object_pose is not None and state.object_velocity is not None
         value, rate = (each.reshape(-1, 6)[:, :3] for each in self.signal.at(0.0))
         state.object_pose.reshape(-1, POSE)[self.places, :3] += value
         state.object_velocity.reshape(-1, VELOCITY)[self.places, :3] = rate

@@ -25,7 +25,7 @@ _SMALL = 0.15
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class ProfileBound:
     """One end of an interval.
 
     Attributes:
@@ -47,7 +47,7 @@ def covariance(problem: Problem, found: Fit) -> Array:
     return np.asarray(np.linalg.pinv(scaled, rcond=1e-14, hermitian=True) * np.outer(width, width))
 
 
-def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss: str = "linear") -> Side:
+def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss: str = "linear") -> ProfileBound:
     """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841.
 
     Args:
@@ -76,7 +76,7 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss:
         slopes, rise = there.slopes or slopes, there.objective - found.objective
         path.append((at, rise))
         if rise < -_BELOW:
-            return Side(end, np.array(path), there)
+            return ProfileBound(end, np.array(path), there)
         if rise >= LEVEL:
             outer = (reach, math.sqrt(rise))
         else:
@@ -90,7 +90,7 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss:
             break
         further = 0.0 if math.isfinite(outer[0]) else max(1.2 * inner[0], 1e-6 * room)
         reach = min(room, max(crossing, further))
-    return Side(end, np.array(path))
+    return ProfileBound(end, np.array(path))
 
 
 def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:

@@ -16,7 +16,7 @@ from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.identification.problem import At, Own, own_number
+from finger_pin.identification.problem import At, NuisanceParameter, own_number
 from finger_pin.identification.recordings import Recording
 from finger_pin.mechanism.coerce import fitted
 from finger_pin.mechanism.finger import Finger
@@ -72,7 +72,7 @@ class RecordedMotion:
         self.recording, self.rows = recording, rows
         self._entry = f"identify.recordings.{recording.name}"
         self._times = recording.time[rows] - recording.time[rows[0]]
-        self.own: tuple[Own, ...] = ()
+        self.own: tuple[NuisanceParameter, ...] = ()
         table = copy.deepcopy(scenario.model_dump(mode="python", exclude_unset=True, exclude_none=True))
         self._put_inputs(table, scenario)
         first = float(recording.time[rows[0]])
@@ -254,7 +254,8 @@ class RecordedMotion:
         if kind == "found":
             prefix = f"recordings.{self.recording.name}.start.{window}"
             self.own = tuple(
-                Own(f"{prefix}.{joint}", angle - _NEAR, angle + _NEAR, angle) for joint, angle in positions.items()
+                NuisanceParameter(f"{prefix}.{joint}", angle - _NEAR, angle + _NEAR, angle)
+                for joint, angle in positions.items()
             )
 
 

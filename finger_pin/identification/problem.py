@@ -25,7 +25,7 @@ OF_OUTPUTS = ("offset", "scale", "delay")
 
 
 @dataclass(frozen=True)
-class Own:
+class NuisanceParameter:
     """A number of a recording's own that is found beside the parameters, such as the start of a joint."""
 
     key: str
@@ -46,7 +46,7 @@ class RecordingModel(Protocol):
         """The scenario with the recording's inputs."""
 
     @property
-    def own(self) -> tuple[Own, ...]:
+    def own(self) -> tuple[NuisanceParameter, ...]:
         """The numbers to be found for it alone."""
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:

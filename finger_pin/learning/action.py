@@ -33,7 +33,7 @@ class Action(LoopController):
         low: Least action, shape (k,).
         high: Largest action, shape (k,).
         given: The last action, shape (k,).
-        held: Present inputs, shape (u,), N; zero before the first action, and for motors in position drive.
+        held: BatchedSnapshot inputs, shape (u,), N; zero before the first action, and for motors in position drive.
         channels: Inputs that are voltages of motors in position drive.
         names: Of the numbers of an action.
     """
@@ -77,14 +77,14 @@ class Action(LoopController):
                 self.low, self.high = (each * scale for each in _reach(finger))
             rows = math.ceil(duration / loop_period(finger)) + 1
             self._drives = build_drives(finger, np.zeros((rows, len(radius))))
-        self.begin(0.0)
+        self.reset(0.0)
 
     @property
     def compiled(self) -> Drives | None:
         """The loops of motors in position drive, with the goals so far; None without."""
         return self._drives
 
-    def begin(self, delay: float) -> None:
+    def reset(self, delay: float) -> None:
         """Begin an episode, whose actions arrive after a delay, s."""
         self._delay, self.given = delay, self.low.copy()
         self.held = np.zeros(self._finger.mechanism.channels)

@@ -22,9 +22,9 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.learning.action import Action
-from finger_pin.learning.instant import instant, known_variables
 from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
+from finger_pin.learning.snapshot import known_variables, snapshot
 from finger_pin.learning.task import Task
 from finger_pin.mechanism.coerce import FingerLike, fitted, is_other_hand, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
@@ -65,7 +65,7 @@ class World:
     ) -> None:
         """Build the scenario, unless another world's loop serves; use `of` or `twin`."""
         self.task, self._family, self._randomisation, self._given = task, family, randomisation, finger
-        self.drawn: dict[str, Any] = {}
+        self.sampled: dict[str, Any] = {}
         self.context: dict[str, Array] = {}
         self.sensors: dict[str, Sensor] = {}
         self._nominal: tuple[Finger, PassiveCoupling] | None = None
@@ -119,7 +119,7 @@ class World:
             if self._nominal is not None:
                 finger = fitted(self._nominal[0], self._family.scenario, scenario)
                 if finger.layout.names != self._nominal[0].layout.names:
-                    raise InputError("randomise", "must keep what the state consists of", self.drawn)
+                    raise InputError("randomise", "must keep what the state consists of", self.sampled)
             origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled(self._bindings)
         self._scenario, self.origin = scenario, origin
         finger, family = self.origin.finger, self._family.scenario
@@ -159,16 +159,16 @@ class World:
         """Whether the episode is truncated: its time is over, or the motion cannot go on."""
         return bool(self.reason) or self._step >= self.task.steps
 
-    def begin(self, random: np.random.Generator) -> None:
+    def reset(self, random: np.random.Generator) -> None:
         """Begin an episode.
 
         Raises:
             InputError: If what is drawn is not allowed.
         """
         self._random, self.reason, self._step, self.now = random, "", 0, 0.0
-        self.drawn = self._randomisation.draw(random)
+        self.sampled = self._randomisation.sample_context(random)
         if self._randomisation.keys:
-            self._build(self._family.with_values([self.drawn[key] for key in self._randomisation.keys]))
+            self._build(self._family.with_values([self.sampled[key] for key in self._randomisation.keys]))
         self._begun = self._start()
         if self.rebuilt:
             self.stepper = self._stepper_at(self._begun, self._bindings)
@@ -176,11 +176,11 @@ class World:
             self.stepper.restart(self._begun, time=0.0)
         task = self.task
         self.context = self._context()
-        self.drawn |= self.context
+        self.sampled |= self.context
         self.sensors = {
-            name: self._randomisation.sensor(name, sensor, self.drawn) for name, sensor in task.sensors.items()
+            name: self._randomisation.sensor(name, sensor, self.sampled) for name, sensor in task.sensors.items()
         }
-        self.action.begin(self._randomisation.delay(self.drawn, task.delay))
+        self.action.reset(self._randomisation.delay(self.sampled, task.delay))
 
     def _context(self) -> dict[str, Array]:
         """Return the task's draws for an episode, by name."""
@@ -230,7 +230,7 @@ class World:
         self._step += 1
         return self._next_end()
 
-    def reach(self, end: float, status: int) -> float:
+    def finish_piece(self, end: float, status: int) -> float:
         """Note the status with which a stepper ended a piece; return the end of the next, s, or `RESTING`."""
         self.now = end
         if status:
@@ -263,7 +263,7 @@ class World:
     def picture(self) -> NDArray[np.uint8]:
         """Return a picture of the present posture, from a point with all postures in view, of bytes."""
         method = self._scenario.simulation.method
-        motions = instant(self.loop, self.stepper.time, self.stepper.x)
+        motions = snapshot(self.loop, self.stepper.time, self.stepper.x)
         found = record(self._scenario, motions, method, list(known_variables(self.origin)))
         return draw_picture(found, self._stage)
 

@@ -189,7 +189,6 @@ class Finger:
         """
         x = np.zeros(self.layout.size)
         state, middle = self.layout.unpack(x), self.tendons.rest_position
-        assert state.motor_position is not None and state.motor_velocity is not None
         state.position[:] = position
         state.velocity[:] = 0.0 if velocity is None else velocity
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
@@ -199,7 +198,6 @@ class Finger:
             moved = (state.velocity @ self.coupling_at(state.position).T)[: self.routing.actuated]
             state.motor_velocity[:] = angle(state.velocity, None, moved) - angle(state.velocity, None, 0.0 * moved)
         if self.scene is not None:
-            assert state.object_pose is not None and state.object_velocity is not None
             state.object_pose[:], state.object_velocity[:] = self.scene.start()
         return x
 

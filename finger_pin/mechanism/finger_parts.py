@@ -15,7 +15,7 @@ from finger_pin.mechanism.canals import Canals
 from finger_pin.mechanism.joints import JointFriction, JointSprings, StrokeLimiter
 from finger_pin.mechanism.rows import Rows, further_states
 from finger_pin.mechanism.scene import Scene
-from finger_pin.mechanism.state import Layout
+from finger_pin.mechanism.state import BLOCKS, Layout
 from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths
@@ -137,31 +137,47 @@ def state_layout(
     tendons: Tendons,
     motors: Actuators,
     rows: Sequence[Rows] = (),
-    around: Scene | None = None,
+    scene: Scene | None = None,
     of_tree: Sequence[Rows] = (),
     canals: Sequence[Rows] = (),
 ) -> Layout:
     """Return the layout of tendons, motors, extra rows, drives among them, and a scene."""
     routing = tendons.routing
     drives, further = (further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
+
+    def each(names: Sequence[str], parts: str) -> list[str]:
+        return [f"{name}.{part}" for name in names for part in parts.split()]
+
+    free, world, touching = ((), (), ()) if scene is None else (tuple(scene.free), scene.world, scene.contacts.names)
+    labels = {
+        "position": routing.joints,
+        "object_pose": each(free, "x y z qx qy qz qw"),
+        "world_position": world,
+        "passive_position": routing.passive_names,
+        "motor_position": motors.names,
+        "velocity": routing.joints,
+        "object_velocity": each(free, "vx vy vz wx wy wz"),
+        "world_velocity": world,
+        "passive_velocity": routing.passive_names,
+        "motor_velocity": motors.names,
+        "contact_bend": each(touching, "1 2"),
+        "actuator_state": [name for table in of_tree if table.states for name in table.names],
+        "elastic_stiction": (*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
+        "drives": [name for name, _ in drives],
+        "tendon_stiction": routing.tendons,
+        "canal_stiction": [name for table in canals if table.states for name in table.names],
+        "joint_stiction": routing.joints,
+        "gearbox_stiction": motors.names,
+        "further": [name for name, _ in further],
+    }
+    # A lumped mass that rings has the velocity that goes with 1 % of its position.
     ringing = np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)
-    return _same(
-        Layout(
-            joints=routing.joints,
-            tendons=routing.tendons,
-            passive=routing.passive,
-            further=further,
-            ringing=tuple(ringing.tolist()),
-            motors=motors.names,
-            objects=() if around is None else tuple(around.free),
-            world=() if around is None else around.world,
-            contacts=() if around is None else around.contacts.names,
-            held=(*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
-            drives=drives,
-            actuators=tuple(name for table in of_tree if table.states for name in table.names),
-            canals=tuple(name for table in canals if table.states for name in table.names),
-        )
-    )
+    scaled = {
+        "passive_velocity": np.maximum(BLOCKS["passive_velocity"].scale, 1e-5 * ringing).tolist(),
+        "drives": [scale for _, scale in drives],
+        "further": [scale for _, scale in further],
+    }
+    return _same(Layout.of(labels, scaled))
 
 
 # Of the same names and sizes much follows, once for all fingers.

@@ -61,7 +61,6 @@ def contact_value(name: str, finger: Finger, of: SampledTrajectory) -> Array:
     if name.startswith("object_"):
         return _of_object(name, of.state)
     if name == "contact_bend":
-        assert of.state.contact_bend is not None
         return _split(of.state.contact_bend, 2)
     around, evaluation = finger.scene, of.finger.mechanism
     assert around is not None
@@ -81,7 +80,6 @@ def contact_value(name: str, finger: Finger, of: SampledTrajectory) -> Array:
 
 def _of_object(name: str, state: State) -> Array:
     """Return place, turn, or rates of the free objects."""
-    assert state.object_pose is not None and state.object_velocity is not None
     pose, velocity = _split(state.object_pose, POSE), _split(state.object_velocity, VELOCITY)
     if name == "object_position":
         return pose[..., :3]

@@ -12,6 +12,7 @@ import pinocchio as pin
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.rows import LOST, Rows
+from finger_pin.mechanism.state import BLOCKS
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.energy import flows, stores
 from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME, Quantity
@@ -28,8 +29,8 @@ RESIDUAL = "energy_residual"
 def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return all variables that a result of a loop can have, by name."""
     table = {
-        "joint_position": Quantity(_JOINT, lambda of: of.state.position, "rad", "joint angle"),
-        "joint_velocity": Quantity(_JOINT, lambda of: of.state.velocity, "rad/s", "joint velocity"),
+        "joint_position": _of_state("position"),
+        "joint_velocity": _of_state("velocity"),
         "joint_acceleration": Quantity(_JOINT, lambda of: of.finger.acceleration, "rad/s2", "joint acceleration", "18"),
         "joint_reference": Quantity(_JOINT, lambda of: of.reference.position, "rad", "desired joint angle", "20"),
         "tracking_error": Quantity(
@@ -49,7 +50,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         ),
         "tendon_velocity": Quantity(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
         "tendon_friction": Quantity(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
-        "tendon_stiction": Quantity(_TENDON, lambda of: of.state.tendon_stiction, "N", "tendon stiction force", "9a"),
+        "tendon_stiction": _of_state("tendon_stiction"),
         "tendon_normal_force": Quantity(
             _TENDON, lambda of: of.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
         ),
@@ -62,7 +63,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         "joint_torque_command": Quantity(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
         "joint_torque": Quantity(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
         "joint_friction": Quantity(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
-        "joint_stiction": Quantity(_JOINT, lambda of: of.state.joint_stiction, "N m", "joint stiction torque", "9a"),
+        "joint_stiction": _of_state("joint_stiction"),
         "joint_reaction": Quantity(_JOINT, lambda of: of.finger.joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": Quantity(_JOINT, lambda of: of.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
         "fingertip_force": Quantity(tip, _fingertip_force, "N", "force on the fingertip", "6"),
@@ -77,6 +78,17 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         if frame := _frame(name, each):
             table[name] = each._replace(frame=frame)
     return table
+
+
+def _of_state(block: str, single: bool = False) -> Quantity:
+    """Return the variable of a block of the state, of a single number without a dimension of its own."""
+    of = BLOCKS[block]
+
+    def value(motion: SampledTrajectory) -> Array:
+        found: Array = getattr(motion.state, block)
+        return found[:, 0] if single else found
+
+    return Quantity(_TIME if single else ("time", of.dimension), value, of.unit, of.long_name, of.equation)
 
 
 def _frame(name: str, variable: Quantity) -> str:
@@ -135,23 +147,18 @@ def _of_motors(loop: ClosedLoop) -> dict[str, Quantity]:
     if not loop.finger.actuators.names:
         return {}
 
-    def moved(of: SampledTrajectory, name: str) -> Array:
-        return np.asarray(getattr(of.state, name))
-
     def driven(of: SampledTrajectory, name: str) -> Array:
         return np.asarray(getattr(of.finger.motors, name))
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
-    table = {
-        name: Quantity(_MOTOR, partial(moved if inner == name else driven, name=inner), units, long_name, equation)
+    table = {name: _of_state(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction")}
+    table |= {
+        name: Quantity(_MOTOR, partial(driven, name=inner), units, long_name, equation)
         for name, inner, units, long_name, equation in (
-            ("motor_position", "motor_position", "rad", "angle of the spool", ""),
-            ("motor_velocity", "motor_velocity", "rad/s", "velocity of the spool", ""),
             ("motor_current", "current", "A", "current", ""),
             ("motor_voltage", "voltage", "V", "voltage", ""),
             ("motor_torque", "torque", "N m", "torque of the motor, at the spool", ""),
             ("gearbox_friction", "friction", "N m", "friction torque of the gearbox", "9c"),
-            ("gearbox_stiction", "gearbox_stiction", "N m", "its stiction torque", "9a"),
             ("gearbox_load", "load", "N m", "torque that the gears carry", ""),
         )
     }
@@ -174,12 +181,7 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
 
     return {
         "passive_tension_proximal": Quantity(dims, proximal, "N", "tension of the proximal half", "12"),
-        "passive_position": Quantity(
-            dims, lambda of: shaped(of.state.passive_position), "m", "position of the lumped mass", "13"
-        ),
-        "passive_velocity": Quantity(
-            dims, lambda of: shaped(of.state.passive_velocity), "m/s", "velocity of the lumped mass", "13"
-        ),
+        **{name: _of_state(name, single) for name in ("passive_position", "passive_velocity")},
     }
 
 

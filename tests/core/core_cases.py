@@ -246,7 +246,10 @@ class Case:
 
     def states(self, rng, count):
         """Random states beyond the ranges and between slack and tight, slow and fast."""
-        finger, tendons = self.loop.finger, len(self.layout.tendons)
+        finger, vector = self.loop.finger, self.layout.unpack(np.zeros(self.layout.size))
+        tendons, passive, motors = (
+            len(each) for each in (vector.tendon_stiction, vector.passive_position, vector.motor_position)
+        )
         lower, upper = finger.stroke_limiter.lower, finger.stroke_limiter.upper
 
         def spread(size, low, high):
@@ -255,14 +258,14 @@ class Case:
         q = rng.uniform(lower - 0.15 * (upper - lower), upper + 0.15 * (upper - lower), (count, len(lower)))
         state = State(
             position=q,
-            passive_position=finger.tendons.rest_position(q) + spread(self.layout.passive, -5.0, -3.0),
+            passive_position=finger.tendons.rest_position(q) + spread(passive, -5.0, -3.0),
             velocity=spread(len(lower), -2.0, 1.0),
-            passive_velocity=spread(self.layout.passive, -4.0, -1.0),
+            passive_velocity=spread(passive, -4.0, -1.0),
             tendon_stiction=spread(tendons, -2.0, 0.8),
             joint_stiction=spread(len(lower), -5.0, -2.0),
-            motor_position=finger.actuators.angle(q) + spread(len(self.layout.motors), -3.0, -1.0),
-            motor_velocity=spread(len(self.layout.motors), -2.0, 1.0),
-            gearbox_stiction=spread(len(self.layout.motors), -4.0, -2.0),
+            motor_position=finger.actuators.angle(q) + spread(motors, -3.0, -1.0),
+            motor_velocity=spread(motors, -2.0, 1.0),
+            gearbox_stiction=spread(motors, -4.0, -2.0),
         )
         return self.layout.pack(state)
 

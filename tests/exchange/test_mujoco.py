@@ -78,7 +78,7 @@ def test_mujoco_finds_the_accelerations_of_our_equation_18_at_any_state(name, ov
     assert (model.nq, model.nu) == (len(finger.routing.joints) + finger.routing.passive, finger.routing.actuated)
     seen = set()
     for position, velocity, passive, rate, command in random_states(finger, 200, slack=1e-3):
-        state = State(position, passive, velocity, rate, np.zeros(len(finger.routing.tendons)), np.zeros(len(position)))
+        state = State(position=position, passive_position=passive, velocity=velocity, passive_velocity=rate)
         ours = finger.evaluate(finger.layout.pack(state), command)
         data = forward(model, np.append(position, passive), np.append(velocity, rate), command)
         expected = np.append(ours.acceleration, ours.tendons.passive_acceleration)

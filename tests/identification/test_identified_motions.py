@@ -9,7 +9,7 @@ import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.recordings.bench import RecordingSettings
-from finger_pin.identification.identifying import build_problem
+from finger_pin.identification.identify import build_problem
 from finger_pin.identification.limits import Limits
 from finger_pin.identification.motions import windows
 from finger_pin.identification.problem import minus_twice_likelihood

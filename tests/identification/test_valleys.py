@@ -3,11 +3,11 @@
 import numpy as np
 
 import finger_pin as fp
+from finger_pin.identification.checkpoint import Checkpoint
 from finger_pin.identification.estimate import fit
-from finger_pin.identification.ledger import Ledger
+from finger_pin.identification.pipeline import FitPipeline
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal
-from finger_pin.identification.searching import Work
 
 COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"
 TIME, TRUTH = np.arange(4.5, 8.0, 0.0025), np.array([0.12, 0.5])
@@ -47,7 +47,7 @@ def test_a_search_that_ends_a_cycle_off_goes_on_to_the_right_one():
     start = problem.to_search(TRUTH + np.array([2.0 * np.pi / 6.25 / 2000.0, 0.0]))
     trapped = fit(problem, start)
     assert problem.values(trapped.z)[0] > TRUTH[0] + 3e-4
-    work = Work(problem, Ledger(None, "", False), "linear", None)
+    work = FitPipeline(problem, Checkpoint(None, "", False), "linear", None)
     work.search([start])
     assert abs(problem.values(work.best.z)[0] - TRUTH[0]) < 1e-4
     assert np.sum(work.best.residuals[0] ** 2) < np.sum(trapped.residuals[0] ** 2)

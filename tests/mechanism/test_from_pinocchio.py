@@ -105,7 +105,7 @@ def whole(posture, rows):
 
 def test_the_finger_has_the_chosen_joints_and_leaves_the_hand_alone(finger, hand):
     assert finger.rigid_body.joints == tuple(JOINTS.values())
-    assert finger.layout.joints == tuple(JOINTS)
+    assert finger.layout.names_of("position") == tuple(JOINTS)
     assert hand.nv == 16 and finger.rigid_body.model.nv == 4
     assert finger.routing.force_closure().holds
 

@@ -15,9 +15,9 @@ from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_text
-from finger_pin.identification.comparing import LawComparison
+from finger_pin.identification.comparison import LawComparison
 from finger_pin.identification.estimate import Fit, fit
-from finger_pin.identification.intervals import Side
+from finger_pin.identification.intervals import ProfileBound
 from finger_pin.identification.problem import Problem, Stopped
 from finger_pin.identification.recordings import Recording
 from finger_pin.typing import Array
@@ -36,7 +36,7 @@ def digest(scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recor
     return found.hexdigest()
 
 
-class Ledger:
+class Checkpoint:
     """Finished pieces of work by name; in memory alone without a folder."""
 
     def __init__(self, folder: Path | None, asked: str, restart: bool) -> None:
@@ -96,11 +96,11 @@ class Ledger:
         """Return the last place of a search that was stopped, shape (p,), or its start."""
         return np.array(self._done.get(f"{name} so far", start), dtype=float)
 
-    def side(self, name: str, work: Callable[[], Side]) -> Side:
+    def side(self, name: str, work: Callable[[], ProfileBound]) -> ProfileBound:
         """Return an end of an interval."""
         if name in self._done:
             end, path = self._done[name]
-            return Side(math.nan if end is None else float(end), np.array(path))
+            return ProfileBound(math.nan if end is None else float(end), np.array(path))
         found = work()
         if found.better is None:
             self._done[name] = (found.end, found.path.tolist())

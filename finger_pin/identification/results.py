@@ -16,9 +16,9 @@ from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.parametrised_scenario import ParametrisedScenario, split
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
-from finger_pin.identification.comparing import LawComparison
+from finger_pin.identification.comparison import LawComparison
 from finger_pin.identification.estimate import Fit
-from finger_pin.identification.intervals import LEVEL, Side, free_directions
+from finger_pin.identification.intervals import LEVEL, ProfileBound, free_directions
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.identification.recordings import RecordedSignal
 from finger_pin.simulation.netcdf import save
@@ -26,11 +26,11 @@ from finger_pin.studies.keys import describe
 from finger_pin.typing import Array
 
 
-def outcome(
+def results(
     problem: Problem,
     fits: Sequence[Fit],
     best: Fit,
-    sides: Mapping[tuple[int, int], Side],
+    sides: Mapping[tuple[int, int], ProfileBound],
     spread: Array | None,
     comparison: LawComparison | None,
     unfinished: str = "",
@@ -70,7 +70,11 @@ def outcome(
 
 
 def _estimates(
-    problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Side], spread: Array | None, undetermined: list[int]
+    problem: Problem,
+    best: Fit,
+    sides: Mapping[tuple[int, int], ProfileBound],
+    spread: Array | None,
+    undetermined: list[int],
 ) -> dict[str, Any]:
     """Return the variables along the parameters, some of which the recordings do not determine."""
     count, keys = problem.asked, problem.keys[: problem.asked]
@@ -110,7 +114,7 @@ def _estimates(
     }
 
 
-def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Side]) -> tuple[Array, Array]:
+def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], ProfileBound]) -> tuple[Array, Array]:
     """Return values and rises along every profile, ascending, filled up with NaN."""
     rows: list[Array] = []
     for k in range(problem.asked):
@@ -173,7 +177,7 @@ def _replicates(signal: RecordedSignal) -> float:
     return float(np.sqrt(spread / (len(groups) - len(means))))
 
 
-def write_outcome(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> None:
+def write_results(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> None:
     """Write identification.nc and identified.toml.
 
     Raises:

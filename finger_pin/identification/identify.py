@@ -15,15 +15,15 @@ from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.comparing import other_laws
+from finger_pin.identification.checkpoint import Checkpoint, digest
+from finger_pin.identification.comparison import other_laws
 from finger_pin.identification.estimate import LOSSES, fit
-from finger_pin.identification.ledger import Ledger, digest
 from finger_pin.identification.motions import RecordedMotion, windows
-from finger_pin.identification.outcome import outcome, write_outcome
+from finger_pin.identification.pipeline import FitPipeline, Progress, starting_points
 from finger_pin.identification.problem import Problem, RecordingModel, Stopped
-from finger_pin.identification.readings import SteadyReadings
 from finger_pin.identification.recordings import RecordedSignal, Recording, read_recording, unit_of
-from finger_pin.identification.searching import Progress, Work, starting_points
+from finger_pin.identification.results import results, write_results
+from finger_pin.identification.steady_data import SteadyReadings
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.studies.fingerprint import finger_digest
@@ -98,12 +98,12 @@ def identify(
     other_laws(problem, settings)  # Before any work: an entry that is wrong in them is refused now.
     problem.stop = _latched(stop or (lambda: False))
     asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
-    with Ledger(None if output is None else Path(output), asked, restart) as ledger:
-        work = Work(problem, ledger, loss, progress)
+    with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
+        work = FitPipeline(problem, ledger, loss, progress)
         result = _work(problem, settings, starting_points(problem, starts, seed), starts, work)
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
         if output is not None:
-            write_outcome(result, Path(output), bench, problem)
+            write_results(result, Path(output), bench, problem)
     return result
 
 
@@ -149,11 +149,13 @@ def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.int
     )
 
 
-def _work(problem: Problem, settings: IdentifySettings, places: Sequence[Array], starts: int, work: Work) -> xr.Dataset:
+def _work(
+    problem: Problem, settings: IdentifySettings, places: Sequence[Array], starts: int, work: FitPipeline
+) -> xr.Dataset:
     unfinished = ""
     try:
-        work.search(work.screened(places, starts))
-        work.follow(work.best)
+        work.search(work.screen_starts(places, starts))
+        work.profile_all(work.best)
         work.compare(settings)
     except Stopped:
         unfinished = "interrupted: the best so far, and the intervals that are finished"
@@ -161,7 +163,7 @@ def _work(problem: Problem, settings: IdentifySettings, places: Sequence[Array],
         if not work.fits:
             reached = problem.best[1] if len(problem.best[1]) else problem.start
             work.fits.append(fit(problem, reached, held=dict(enumerate(reached))))
-    return outcome(problem, work.fits, work.best, work.sides, work.spread, work.comparison, unfinished)
+    return results(problem, work.fits, work.best, work.sides, work.spread, work.comparison, unfinished)
 
 
 def _latched(stop: Callable[[], bool]) -> Callable[[], bool]:

@@ -28,7 +28,7 @@ _NOTHING, _EVER = Statistics(0, 0, 0, 0, 0.0), np.array([np.inf])
 _OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
 
 
-def instant(loop: ClosedLoop, time: float, x: Array) -> SampledTrajectory:
+def snapshot(loop: ClosedLoop, time: float, x: Array) -> SampledTrajectory:
     """Return the signals of a state, shape (size,), at a time, s."""
     return SampledTrajectory(loop, Trajectory(_EVER, lambda _: x[None], _NOTHING), np.array([time]))
 
@@ -37,10 +37,10 @@ def instant(loop: ClosedLoop, time: float, x: Array) -> SampledTrajectory:
 _STAYING = {"loop", "times", "packed", "state", "_accelerated"}
 
 
-class Present(SampledTrajectory):
+class BatchedSnapshot(SampledTrajectory):
     """Worlds at the states that they have reached, and all that follows from these."""
 
-    def __init__(self, loop: SideBySide) -> None:
+    def __init__(self, loop: BatchedLoop) -> None:
         """Make room for the present times, shape (w,), s, and packed states, shape (w, size)."""
         self.loop, self._accelerated, count = loop, loop.accelerated, len(loop.loops)
         self.times, self.packed = np.zeros(count), np.zeros((count, loop.finger.layout.size))
@@ -66,7 +66,7 @@ def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 @dataclass(frozen=True, eq=False)
-class SideBySide(ClosedLoop):
+class BatchedLoop(ClosedLoop):
     """Loops of worlds as one, each world at a time of its own.
 
     Attributes:
@@ -80,7 +80,7 @@ class SideBySide(ClosedLoop):
     accelerated: bool = False
 
     @classmethod
-    def of(cls, loops: list[ClosedLoop], actions: list[Action], names: Sequence[str], *, apart: bool) -> SideBySide:
+    def of(cls, loops: list[ClosedLoop], actions: list[Action], names: Sequence[str], *, apart: bool) -> BatchedLoop:
         """Put worlds side by side.
 
         Args:

@@ -9,7 +9,7 @@ import numpy as np
 from finger_pin.analysis.steady import steady_state
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.problem import At, Own, own_number
+from finger_pin.identification.problem import At, NuisanceParameter, own_number
 from finger_pin.identification.recordings import Recording
 from finger_pin.typing import Array
 
@@ -36,7 +36,7 @@ class SteadyReadings:
                 one are negative.
         """
         self.recording, self.scenario, finger = recording, scenario, scenario.finger
-        self.own: tuple[Own, ...] = ()
+        self.own: tuple[NuisanceParameter, ...] = ()
         self._entry = f"identify.recordings.{recording.name}"
         rows = len(recording.speed)
         joints, tendons = list(finger.joints), list(finger.actuated_names)

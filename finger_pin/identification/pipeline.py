@@ -8,17 +8,24 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
+import scipy
 
 from finger_pin.core.threads import in_threads
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.exceptions import InputError
-from finger_pin.identification.comparing import LawComparison, compare_laws
+from finger_pin.identification.checkpoint import Checkpoint
+from finger_pin.identification.comparison import LawComparison, compare_laws
 from finger_pin.identification.estimate import Fit, best_of, fit
-from finger_pin.identification.intervals import Side, covariance, profile
-from finger_pin.identification.ledger import Ledger
+from finger_pin.identification.intervals import ProfileBound, covariance, profile
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
-from finger_pin.identification.valleys import beside, lowest
 from finger_pin.typing import Array
+
+# Directions that samples tell so much more surely than means over cycles do, and how many of them are looked along.
+_SURER, _MOST = 4.0, 2
+# How far, in deviations by the means and at the most in those by the samples, and how closely.
+_FAR, _FARTHEST, _APART = 3.0, 30.0, 3.0
+# What keeps directions that nothing tells from being divided by.
+_LITTLE, _LEAST = 1e-4, 1e-12
 
 #: Called with what is being done, how much of it is finished, and how much there is.
 Progress = Callable[[str, int, int], None]
@@ -32,16 +39,16 @@ _HOPELESS = 100.0
 _VALLEYS, _DEEPER = 2, 1.0
 
 
-class Work:
+class FitPipeline:
     """The work of an identification, piece by piece; pieces that are finished when it is stopped count."""
 
-    def __init__(self, problem: Problem, ledger: Ledger, loss: str, progress: Progress | None) -> None:
+    def __init__(self, problem: Problem, ledger: Checkpoint, loss: str, progress: Progress | None) -> None:
         """Begin; nothing is done yet."""
         self.problem, self.ledger, self.loss = problem, ledger, loss
         self.tell = progress or (lambda words, done, total: None)
         self.fits: list[Fit] = []
         self.middle: Fit | None = None
-        self.sides: dict[tuple[int, int], Side] = {}
+        self.sides: dict[tuple[int, int], ProfileBound] = {}
         self.spread: Array | None = None
         self.comparison: LawComparison | None = None
 
@@ -50,23 +57,23 @@ class Work:
         """The start of the profiles; before them, the place of the best fit."""
         return self.middle or best_of(self.problem, self.fits)
 
-    def screened(self, places: Sequence[Array], count: int) -> list[Array]:
+    def screen_starts(self, places: Sequence[Array], count: int) -> list[Array]:
         """Return the first place, and those of the others with the best fit.
 
         Where the motion hunts there are no slopes to follow: such places come last.
         """
 
-        def met(problem: Problem, z: Array) -> float:
+        def misfit(problem: Problem, z: Array) -> float:
             return _met(problem, problem.residuals(z))
 
         problem, others = self.problem.rough() if self._moves else self.problem, len(places) - 1
-        found = self._side_by_side("trying starts", lambda item: met(item[1], places[1 + item[0]]), others, problem)
+        found = self._side_by_side("trying starts", lambda item: misfit(item[1], places[1 + item[0]]), others, problem)
         order = np.argsort(found, kind="stable").tolist()
         tiny = _TINY * np.subtract(*self.problem.box)
 
         def hunts(item: tuple[int, Problem]) -> bool:
             k = order[item[0]]
-            return not abs(met(item[1], places[1 + k] + tiny) - found[k]) < _JUMP
+            return not abs(misfit(item[1], places[1 + k] + tiny) - found[k]) < _JUMP
 
         near = order[: 2 * (count - 1)] if self._moves else []
         hunting = dict(zip(near, self._side_by_side("trying starts", hunts, len(near), problem), strict=True))
@@ -119,10 +126,10 @@ class Work:
             lines = beside(self.problem, best.z)
             places = [place for line in lines for place in line]
 
-            def met(item: tuple[int, Problem], places: Sequence[Array] = places) -> float:
+            def misfit(item: tuple[int, Problem], places: Sequence[Array] = places) -> float:
                 return _met(item[1], item[1].residuals(places[item[0]]))
 
-            found = lowest(lines, self._side_by_side(words, met, len(places)), _VALLEYS + 1)
+            found = lowest(lines, self._side_by_side(words, misfit, len(places)), _VALLEYS + 1)
             near = [z for z in found if not np.array_equal(z, best.z)][:_VALLEYS]
 
             def one(item: tuple[int, Problem], near: Sequence[Array] = near, turn: int = turn) -> Fit:
@@ -138,7 +145,7 @@ class Work:
         """Whether a recording is of a motion."""
         return any(signal.ordered for signal in self.problem.signals)
 
-    def follow(self, place: Fit, turn: int = 0) -> None:
+    def profile_all(self, place: Fit, turn: int = 0) -> None:
         """Follow all profiles from near a place; from a lower minimum, if one turns up on the way, all over again."""
         fine, number = self.problem.fine(), self.fits.index(self.best)
         best = self.fits[number] = self.middle = fit(fine, place.z, loss=self.loss, slopes=place.slopes)
@@ -159,7 +166,7 @@ class Work:
         better = [each for each in found if each is not None]
         if better:
             self.sides.clear()
-            self.follow(min(better, key=lambda each: each.objective), turn + 1)
+            self.profile_all(min(better, key=lambda each: each.objective), turn + 1)
 
     def _side_by_side(
         self, words: str, task: Callable[[tuple[int, Problem]], _Found], count: int, problem: Problem | None = None
@@ -215,3 +222,45 @@ def _check_felt(problem: Problem, fits: Sequence[Fit], places: Sequence[Array]) 
             return
     key = problem.keys[int(np.flatnonzero(~felt)[0])]
     raise InputError(f"identify.parameters.{key}", "no output of any recording feels it; leave it out")
+
+
+def beside(problem: Problem, z: Array) -> list[Array]:
+    """Return lines of places through a minimum, shape (k, p) each, in directions that are known by cycles alone.
+
+    What cycles tell has a minimum for each of them; what means over cycles tell leaves so many of these open.
+    """
+    residuals, slopes = problem.residuals(z), problem.slopes(z)
+    low, high = problem.box
+    size = np.outer(high - low, high - low)
+    by_samples, by_means = (
+        size * sum(j.T @ j / max(float(np.mean(e * e)), 1e-300) for e, j in zip(*each, strict=True))
+        for each in ((residuals, slopes), (problem.averaged(residuals), problem.averaged(slopes)))
+    )
+    least = _LITTLE * by_samples + _LEAST * np.trace(by_samples) * np.eye(len(z))
+    values, vectors = scipy.linalg.eigh(by_samples, by_means + least)
+    lines = []
+    for value, vector in zip(values[-_MOST:], vectors.T[-_MOST:], strict=True):
+        if value < _SURER**2:
+            continue
+        one = (high - low) * vector / np.sqrt(vector @ by_samples @ vector)
+        count = int(min(_FAR * np.sqrt(value), _FARTHEST) / _APART)
+        places = z + _APART * np.arange(-count, count + 1)[:, None] * one
+        lines.append(places[np.all((places >= low) & (places <= high), axis=1)])
+    return lines
+
+
+def lowest(lines: Sequence[Array], met: Sequence[float], count: int) -> list[Array]:
+    """Return the places of lines, lowest first, from which it rises to either side: at their ends, to one.
+
+    Args:
+        lines: Places, shape (k, p) each.
+        met: How badly the recordings are met at all of them in turn.
+        count: Of how many at the most.
+    """
+    found, first = [], 0
+    for line in lines:
+        values = np.array([np.inf, *met[first : first + len(line)], np.inf])
+        first += len(line)
+        dips = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] < values[2:]))
+        found += [(values[1 + k], line[k]) for k in dips]
+    return [place for _, place in sorted(found, key=lambda each: each[0])[:count]]
