@@ -18,7 +18,7 @@ from finger_pin.core.evaluation.path_derivatives import linearise_paths
 from finger_pin.core.evaluation.paths import look
 from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
 from finger_pin.core.inputs import InputTable, held_control
-from finger_pin.core.jit import bound, call, copied, refill
+from finger_pin.core.jit import call, copied, pack, refill
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.tables import Tables
 from finger_pin.core.threads import in_threads, threads
@@ -87,7 +87,7 @@ class BoundModel:
 
     Attributes:
         model: Its arrays, which live as long as this.
-        address: Of what `bound_at` reads.
+        address: Of what `unpack` reads.
     """
 
     def __init__(self, tables: Tables, control: InputTable, work: Work, moved: bool = False) -> None:
@@ -100,7 +100,7 @@ class BoundModel:
         units += [unit.address if through_space else 0 for unit in _THROUGH_SPACE]
         units += [unit.address if moved else 0 for unit in _MOVED]
         self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
-        self._block = bound(self.model, MODEL)
+        self._block = pack(self.model, MODEL)
         # Of tables what changes in place is copied wherever it is handed over.
         self._filled: Tables | None = None
         self.address = self._block.address

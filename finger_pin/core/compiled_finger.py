@@ -11,7 +11,7 @@ from finger_pin.core.bound_models import FEW, Models, Room, fill, path_motions, 
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
-from finger_pin.core.jit import Block, alike, bound, fits
+from finger_pin.core.jit import Block, alike, fits, pack
 from finger_pin.core.tables import build_tables
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation
@@ -192,7 +192,7 @@ class CompiledMechanism:
         motions = Motions(
             self.models.model().address, np.zeros(shape), np.zeros(shape), *filled, path_motions(base, count, 0)
         )
-        block, tips = bound(motions, MOTIONS), motions.tips
+        block, tips = pack(motions, MOTIONS), motions.tips
         # Of one tip there is no axis.
         return motions, tips if tips.shape[1] != 1 else tips[:, 0], block
 

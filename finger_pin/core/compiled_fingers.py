@@ -12,7 +12,7 @@ import numpy as np
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.evaluation.signals import STATES, evaluate_many
 from finger_pin.core.inputs import InputTable
-from finger_pin.core.jit import Block, bound
+from finger_pin.core.jit import Block, pack
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
@@ -85,7 +85,7 @@ class CompiledFingers:
         model = self._fingers[index].mechanism.models.model(loaded)
         bases = self._bases if moved else self._bases[:0]
         given = (self._states, self._commands, self._forces, bases, self._attitudes)
-        return bound(self._room.states(slice(index, index + 1), model.address, *given), STATES)
+        return pack(self._room.states(slice(index, index + 1), model.address, *given), STATES)
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

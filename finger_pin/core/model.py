@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from finger_pin.core.buffers import Linear, Work
 from finger_pin.core.inputs import InputTable
-from finger_pin.core.jit import Kind, Vector
+from finger_pin.core.jit import StructType, Vector
 from finger_pin.core.tables import Tables
 
 
@@ -54,4 +54,4 @@ class Model(NamedTuple):
     base_power: int
 
 
-MODEL = Kind(Model)
+MODEL = StructType(Model)

@@ -12,7 +12,7 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.timing import clocked
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
-from finger_pin.core.jit import Unit, bound_at, call_at
+from finger_pin.core.jit import CompiledFunction, call_at, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.solve_ivp import integrate
@@ -119,9 +119,9 @@ def has_sundials() -> bool:
     return importlib.util.find_spec("sksundae") is not None
 
 
-@Unit
+@CompiledFunction
 def _evaluate(address: int, time: float) -> int:
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     return call_at(model.evaluate, address, time)
 
 

@@ -12,7 +12,7 @@ from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.inputs import held_control
-from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call, call_at
+from finger_pin.core.jit import CompiledFunction, Matrix, StructType, Vector, call, call_at, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -164,13 +164,13 @@ class Condensed(NamedTuple):
     columns: Matrix
 
 
-CONDENSED = Kind(Condensed)
+CONDENSED = StructType(Condensed)
 
 
-@Unit
+@CompiledFunction
 def _condensed(address, _number):
-    condensed = bound_at(address, CONDENSED)
-    model, x, r = bound_at(condensed.model, MODEL), condensed.x, condensed.r
+    condensed = unpack(address, CONDENSED)
+    model, x, r = unpack(condensed.model, MODEL), condensed.x, condensed.r
     for c in range(x.size):
         model.state[c] = x[c]
     call_at(model.evaluate, condensed.model, condensed.time)

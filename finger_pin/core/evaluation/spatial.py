@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.jit import compiled
+from finger_pin.core.jit import njit_inline
 
 _QUARTERS = 0.6366197723675814
 # pi / 2 in parts of 33 bits, whose products with small integers are exact.
@@ -21,7 +21,7 @@ _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359
 _LARGE = 1e5
 
 
-@compiled
+@njit_inline
 def motion_cross(a: Any, b: Any, out: Any) -> None:
     """Fill out = a x b for motion vectors."""
     x = a[1] * b[2] - a[2] * b[1]
@@ -33,7 +33,7 @@ def motion_cross(a: Any, b: Any, out: Any) -> None:
     out[0], out[1], out[2], out[3], out[4], out[5] = x, y, z, u, v, w
 
 
-@compiled
+@njit_inline
 def add_force_cross(a: Any, f: Any, out: Any) -> None:
     """Add a x* f to out, a motion vector acting on a force vector."""
     x = out[0] + a[1] * f[2] - a[2] * f[1] + a[4] * f[5] - a[5] * f[4]
@@ -45,7 +45,7 @@ def add_force_cross(a: Any, f: Any, out: Any) -> None:
     out[0], out[1], out[2], out[3], out[4], out[5] = x, y, z, u, v, w
 
 
-@compiled
+@njit_inline
 def apply_inertia(inertia: Any, a: Any, out: Any) -> None:
     """Fill out = I a; an inertia is (mass, first moment h, second moment about O: xx xy xz yy yz zz)."""
     m, hx, hy, hz = inertia[0], inertia[1], inertia[2], inertia[3]
@@ -58,13 +58,13 @@ def apply_inertia(inertia: Any, a: Any, out: Any) -> None:
     out[0], out[1], out[2], out[3], out[4], out[5] = x, y, z, u, v, w
 
 
-@compiled
+@njit_inline
 def dot(a: Any, b: Any) -> Any:
     """Return the scalar product of a motion and a force vector."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 
 
-@compiled
+@njit_inline
 def sine_cosine(angle: float) -> Any:
     """Return sine and cosine of an angle, rad."""
     if not abs(angle) < _LARGE:

@@ -16,7 +16,18 @@ from typing import Any, NamedTuple
 
 from finger_pin.core.collision.broad_phase import rouse
 from finger_pin.core.evaluation.attitude_charts import place_bodies, turn_small
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled, compiled_within, copy
+from finger_pin.core.jit import (
+    CompiledFunction,
+    Indices,
+    Layers,
+    Matrix,
+    StructType,
+    Vector,
+    copy,
+    njit_always_inline,
+    njit_inline,
+    unpack,
+)
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import cross, hold_all, last_before, look, rate_at, state_at, turned_after
 from finger_pin.core.stepping.interpolation import Between, begin_of
@@ -119,29 +130,29 @@ class Collocation(NamedTuple):
     solution: Matrix
 
 
-COLLOCATION = Kind(Collocation)
+COLLOCATION = StructType(Collocation)
 
 
-@compiled_within
+@njit_always_inline
 def _place(col: Any, step: int) -> None:
     """Place free bodies of all models by their attitudes at the begin of a step."""
     b = col.motion
     attitude = b.attitude if step == 0 else b.attitudes[step - 1]
-    place_bodies(bound_at(col.model, MODEL).tables, attitude)
+    place_bodies(unpack(col.model, MODEL).tables, attitude)
     for k in range(col.changed.size):
         if col.changed[k] != 0:
-            place_bodies(bound_at(col.changed[k], MODEL).tables, attitude)
+            place_bodies(unpack(col.changed[k], MODEL).tables, attitude)
 
 
-@compiled
+@njit_inline
 def _awake(address: int) -> None:
     """Wake all contacts of a model, and release all rows from the sides of an earlier integration."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     release(model.tables, model.work.rows)
     rouse(model.tables, model.work)
 
 
-@compiled_within
+@njit_always_inline
 def _jump(col: Any, model: Any, step: int, corner: int) -> None:
     """Add to S the effect of a later jump of the inputs: (f before - f after) dt/dp."""
     moves = False
@@ -160,7 +171,7 @@ def _jump(col: Any, model: Any, step: int, corner: int) -> None:
             col.derivative[k * col.scale.size + c] += (col.part[c] - model.rate[c]) * col.shifts[corner, k]
 
 
-@compiled_within
+@njit_always_inline
 def _turn(col: Any, step: int) -> None:
     """Let the angles of free bodies begin anew in S too, after a step."""
     b = col.motion
@@ -176,7 +187,7 @@ def _turn(col: Any, step: int) -> None:
                 own[i + r], own[b.width + i + r] = angles[r], rates[r]
 
 
-@compiled_within
+@njit_always_inline
 def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: bool) -> Any:
     """Solve for S at the nodes between two times, of which the first is in a step.
 
@@ -206,7 +217,7 @@ def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: 
     return 0.0
 
 
-@compiled_within
+@njit_always_inline
 def _keep(col: Any, taken: int, begin: float, end: float) -> None:
     """Take an interval that is solved."""
     nodes = col.nodes.size
@@ -224,7 +235,7 @@ def _keep(col: Any, taken: int, begin: float, end: float) -> None:
     col.ends[taken] = end
 
 
-@compiled_within
+@njit_always_inline
 def _latest(col: Any, step: int) -> Any:
     """Return the latest end of the interval that begins in a step: a knot of the inputs, or a restart of the angles."""
     b, close = col.motion, col.motion.charts.size > 0 or col.memory[SPLIT] >= _SPLITS
@@ -233,7 +244,7 @@ def _latest(col: Any, step: int) -> Any:
     return b.ends[step]
 
 
-@compiled_within
+@njit_always_inline
 def _solved(col: Any, model: Any, step: int, begin: float) -> Any:
     """Solve over an interval from a time in a step, as long as S is smooth enough.
 
@@ -265,11 +276,11 @@ def _solved(col: Any, model: Any, step: int, begin: float) -> Any:
         length, bends = max(memory[LENGTH], shortest), 0
 
 
-@Unit
+@CompiledFunction
 def collocate(address: int, _time: float) -> int:
     """Fill intervals of the `Collocation` at an address; return their number, or `SINGULAR`."""
-    col = bound_at(address, COLLOCATION)
-    model, b, memory = bound_at(col.model, MODEL), col.motion, col.memory
+    col = unpack(address, COLLOCATION)
+    model, b, memory = unpack(col.model, MODEL), col.motion, col.memory
     taken, last = 0, b.ends.size - 1
     _awake(col.model)
     for k in range(col.changed.size):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import SIDE
-from finger_pin.core.jit import bound_at, call_at, compiled, compiled_within
+from finger_pin.core.jit import call_at, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.interpolation import begin_step, within
 
@@ -15,7 +15,7 @@ from finger_pin.core.stepping.interpolation import begin_step, within
 _NEAR, _MOST = 1e-6, 40
 
 
-@compiled
+@njit_inline
 def state_at(b: Any, step: int, time: float, out: Any) -> None:
     """Fill the state at a time of a step, or of a later one."""
     while step < b.ends.size - 1 and time > b.ends[step]:
@@ -24,16 +24,16 @@ def state_at(b: Any, step: int, time: float, out: Any) -> None:
     within(b, step, time, out)
 
 
-@compiled
+@njit_inline
 def rate_at(address: int, time: float, state: Any) -> None:
     """Evaluate a model at a state."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     for c in range(state.size):
         model.state[c] = state[c]
     call_at(model.evaluate, address, time)
 
 
-@compiled
+@njit_inline
 def look(col: Any, model: Any, step: int, time: float, out: Any) -> None:
     """Fill the functions that change sign at the motion's kinks, at a time of a step or of a later one."""
     state_at(col.motion, step, time, col.state)
@@ -56,7 +56,7 @@ def look(col: Any, model: Any, step: int, time: float, out: Any) -> None:
             col.sides[w] = np.sign(out[w])
 
 
-@compiled
+@njit_inline
 def turned_after(col: Any, before: Any, after: Any) -> Any:
     """Return after which share, at the least, a row has changed its side between two looks; 1 if none has."""
     share = 1.0
@@ -66,16 +66,16 @@ def turned_after(col: Any, before: Any, after: Any) -> Any:
     return share
 
 
-@compiled
+@njit_inline
 def _hold(col: Any, address: int) -> None:
     """Hold the rows of a model on their sides, as far as their laws allow."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     for w in range(col.rows.size):
         if col.held[w]:
             model.work.rows[SIDE, col.rows[w]] = col.sides[w]
 
 
-@compiled
+@njit_inline
 def hold_all(col: Any) -> None:
     """Hold the rows of all models on their sides, as far as their laws allow."""
     _hold(col, col.model)
@@ -84,7 +84,7 @@ def hold_all(col: Any) -> None:
             _hold(col, col.changed[k])
 
 
-@compiled_within
+@njit_always_inline
 def last_before(col: Any, model: Any, step: int, begin: float, end: float) -> Any:
     """Return a time just before the first change of sign between two times; ``after`` is just behind it."""
     first, low, high = begin, begin, end
@@ -109,7 +109,7 @@ def last_before(col: Any, model: Any, step: int, begin: float, end: float) -> An
     return low
 
 
-@compiled_within
+@njit_always_inline
 def cross(col: Any) -> None:
     """Go over to the other side of every bend that is behind, by ``after``."""
     for w in range(col.sides.size):

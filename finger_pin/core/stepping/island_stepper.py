@@ -15,7 +15,7 @@ from finger_pin.core.collision.broad_phase import wake_all
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.evaluation.rigid_body import PRISMATIC
 from finger_pin.core.inputs import InputTable
-from finger_pin.core.jit import Block, Unit, bound, copied
+from finger_pin.core.jit import Block, CompiledFunction, copied, pack
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.adaptive import advance
 from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven
@@ -127,7 +127,7 @@ class Part:
             survey=survey_step.address if tables.touching else 0,
             judge=judge_step.address if judged else 0,
         )
-        self._block = bound(self._bound, core.INTEGRATION)
+        self._block = pack(self._bound, core.INTEGRATION)
         self.joints, self.objects = self._bound.joints, self._bound.objects
         place_all(tables, attitude)
         self.tables, self.control, self.tableau, self.judged = tables, control, tableau, judged
@@ -163,7 +163,7 @@ class Part:
         block, unit = self.ready(record, rows)
         return unit(block, end), int(self._taken[0])
 
-    def ready(self, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, Unit]:
+    def ready(self, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, CompiledFunction]:
         """Return the address of the `Stretch` to be advanced, and the unit that does it; into a record if given."""
         own = self._nothing if record is None else record
         self._taken[:] = rows.indices(len(own.times))[:2]
@@ -176,16 +176,16 @@ class Part:
         if before is record and drives is self.drives and knots is self.knots:
             return
         room = (record.times, record.states, record.attitudes, record.dense)
-        stretch = bound(core.Stretch(self._block.address, *room, self._taken), core.STRETCH)
+        stretch = pack(core.Stretch(self._block.address, *room, self._taken), core.STRETCH)
         self._placed, self._blocks, self._advance = (record, self.drives, self.knots), [stretch], advance
         if self.drives is not None:
             driven = Driven(self.drives, stretch.address, self._advance.address)
-            self._blocks.append(bound(driven, DRIVEN))
+            self._blocks.append(pack(driven, DRIVEN))
             self._advance = advance_driven
         if len(self.knots):
             passed, given = np.zeros(1, dtype=np.int64), self._blocks[-1].address
             knotted = Knotted(self.knots, passed, stretch.address, self._advance.address, given)
-            self._blocks.append(bound(knotted, KNOTTED))
+            self._blocks.append(pack(knotted, KNOTTED))
             self._advance = advance_knotted
 
     def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
@@ -210,18 +210,18 @@ class Part:
 
     def with_loads(self, loaded: bool) -> Part:
         """Return the same part that minds forces at the tips, or not."""
-        bound = self._bound
+        pack = self._bound
         return Part(
             self.island,
             self.laws,
             self.tables._replace(loaded=loaded),
             self.control,
-            bound.x,
-            bound.attitude,
-            bound.tableau,
-            bound.rtol,
-            bound.atol,
-            bound.memory,
+            pack.x,
+            pack.attitude,
+            pack.tableau,
+            pack.rtol,
+            pack.atol,
+            pack.memory,
             self.judged,
         )
 
@@ -232,18 +232,18 @@ class Part:
 
     def repeating(self, ends: Array) -> Part:
         """Return the same part on imposed steps with these ends, s, whatever their errors are."""
-        bound = self._bound
+        pack = self._bound
         twin = Part(
             self.island,
             self.laws,
             self.tables,
             self.control,
-            bound.x,
-            bound.attitude,
-            bound.tableau,
+            pack.x,
+            pack.attitude,
+            pack.tableau,
             _ANY,
-            np.full_like(bound.atol, _ANY),
-            bound.memory,
+            np.full_like(pack.atol, _ANY),
+            pack.memory,
             self.judged,
         )
         twin.memory[core.STEP], twin.knots, twin.drives = _ANY, np.array(ends, dtype=float), self.drives
@@ -251,18 +251,18 @@ class Part:
 
     def copy(self, judged: bool | None = None, tolerances: float = 1.0) -> Part:
         """Return an independent part at a share of its tolerances; its error is estimated, if not told, as here."""
-        bound = self._bound
+        pack = self._bound
         return Part(
             self.island,
             self.laws,
             copied(self.tables),
             copied(self.control),
-            bound.x.copy(),
-            bound.attitude.copy(),
-            bound.tableau,
-            bound.rtol * tolerances,
-            bound.atol * tolerances,
-            bound.memory.copy(),
+            pack.x.copy(),
+            pack.attitude.copy(),
+            pack.tableau,
+            pack.rtol * tolerances,
+            pack.atol * tolerances,
+            pack.memory.copy(),
             self.judged if judged is None else judged,
         )
 

@@ -15,7 +15,7 @@ from numpy.polynomial import Legendre
 
 from finger_pin.core.evaluation.blocks import extent
 from finger_pin.core.evaluation.rigid_body import solve_mass
-from finger_pin.core.jit import bound_at, call_at, compiled, compiled_loosely, compiled_within, copy
+from finger_pin.core.jit import call_at, copy, njit_always_inline, njit_inline, njit_reassociate, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import rate_at
 
@@ -49,14 +49,14 @@ _UNFELT = 1e-4
 _CLOSE, _MOST = 0.02, 12
 
 
-@compiled_within
+@njit_always_inline
 def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     """Fill E and the resolvent at a node that is evaluated; false if it is singular."""
     size, wide = col.state.size, col.scale.size
     for k in range(col.changes.size):
         if col.changed[k] != 0 and not col.within[k]:
             rate_at(col.changed[k], time, col.state)
-            other = bound_at(col.changed[k], MODEL)
+            other = unpack(col.changed[k], MODEL)
             for c in range(size):
                 col.given[a, k * wide + c] = (other.rate[c] - model.rate[c]) / col.changes[k]
     call_at(model.linearise, col.model, time)
@@ -71,7 +71,7 @@ def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     return True
 
 
-@compiled_within
+@njit_always_inline
 def _differ(col: Any, model: Any, k: int, time: float, given: Any) -> None:
     """Fill E of a number that changes laws alone, after the evaluation without: bodies and inputs are as they were."""
     tables, work, change, first = model.tables, model.work, col.changes[k], k * col.scale.size
@@ -88,7 +88,7 @@ def _differ(col: Any, model: Any, k: int, time: float, given: Any) -> None:
         given[first + c] = (model.rate[c] - col.part[c]) / change
 
 
-@compiled_within
+@njit_always_inline
 def _transpose(col: Any, linear: Any, resolvent: Any) -> None:
     """Fill the resolvent of a condensed system, transposed."""
     blocks, solution, order, whole = linear.blocks, linear.solution, col.order, linear.mass.shape[0]
@@ -115,14 +115,14 @@ def _transpose(col: Any, linear: Any, resolvent: Any) -> None:
                 resolvent[order[c], order[i]] = solution[order[i], c]
 
 
-@compiled
+@njit_inline
 def add(weight: float, source: Any, out: Any) -> None:
     """Add a multiple of numbers, whose count is one of `LANES`, to others."""
     for i in range(out.size // LANES * LANES):
         out[i] += weight * source[i]
 
 
-@compiled
+@njit_inline
 def _product(source: Any, matrix: Any, out: Any) -> None:
     """Fill rows of numbers, one after the other, with other such rows times a matrix, all as wide as `LANES` lets."""
     wide, rows = matrix.shape[0] // LANES * LANES, out.size // matrix.shape[0]
@@ -149,7 +149,7 @@ def _product(source: Any, matrix: Any, out: Any) -> None:
                 one[c] += s0 * m0[c] + s1 * m1[c] + s2 * m2[c] + s3 * m3[c]
 
 
-@compiled_within
+@njit_always_inline
 def sweep(col: Any, h: float) -> None:
     """Improve S and its rates at all nodes in turn; S at the last one is ``found``."""
     nodes, known, rates, source = col.nodes.size, col.known, col.rates, col.source
@@ -170,7 +170,7 @@ def sweep(col: Any, h: float) -> None:
             rate[i] = g * (found[i] - row[i])
 
 
-@compiled
+@njit_inline
 def _weigh(col: Any, now: Any) -> None:
     """Fill the weights of states: one over the largest of each so far and now."""
     wide = col.scale.size
@@ -183,7 +183,7 @@ def _weigh(col: Any, now: Any) -> None:
             col.weight[at + c] = 1.0 / max(col.largest[at + c], abs(now[at + c]), least)
 
 
-@compiled_loosely
+@njit_reassociate
 def _distance(col: Any, one: Any, other: Any) -> Any:
     """Return the distance of S from another one, for the worst number: rms over states, each of its largest so far."""
     wide, most = col.scale.size // LANES * LANES, 0.0
@@ -196,7 +196,7 @@ def _distance(col: Any, one: Any, other: Any) -> Any:
     return np.sqrt(most / col.state.size)
 
 
-@compiled_within
+@njit_always_inline
 def relax(col: Any, h: float) -> None:
     """Solve for S at the nodes, from its rate at the begin and that rate's own."""
     for a in range(col.nodes.size):
@@ -213,7 +213,7 @@ def relax(col: Any, h: float) -> None:
             break
 
 
-@compiled_within
+@njit_always_inline
 def curvature(col: Any) -> Any:
     """Return the distance of S at the begin from the polynomial through the nodes alone."""
     col.found[:] = 0.0

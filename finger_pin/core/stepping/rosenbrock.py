@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.core.collision.broad_phase import depart
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Vector, call_at, compiled_within
+from finger_pin.core.jit import Indices, Layers, Matrix, StructType, Vector, call_at, njit_always_inline
 from finger_pin.core.stepping.kink_sides import hold, release, strayed
 from finger_pin.core.stepping.tableaus import Tableau
 
@@ -98,10 +98,10 @@ class Stretch(NamedTuple):
     taken: Indices
 
 
-INTEGRATION, STRETCH = Kind(Integration), Kind(Stretch)
+INTEGRATION, STRETCH = StructType(Integration), StructType(Stretch)
 
 
-@compiled_within
+@njit_always_inline
 def try_step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> int:
     """Try one step: fill the increments k and, in model.state, the state at its end.
 

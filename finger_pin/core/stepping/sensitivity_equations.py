@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from finger_pin.core.evaluation.law_code import SPEED
-from finger_pin.core.jit import Block, alike, bound, call
+from finger_pin.core.jit import Block, alike, call, pack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.collocation import (
     COLLOCATION,
@@ -284,5 +284,5 @@ def _changed(own: Part, other: Part) -> tuple[int, Block | None]:
         return other.model.address, None
     if np.array_equal(own.tables.parameters, other.tables.parameters):
         return 0, None
-    block = bound(own.model.model._replace(tables=laws), MODEL)
+    block = pack(own.model.model._replace(tables=laws), MODEL)
     return block.address, block
