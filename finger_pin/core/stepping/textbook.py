@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from finger_pin.core.stepping.cvode import Cvode, check_installed
+from finger_pin.core.stepping.repetition import Steps
 from finger_pin.description.routing import Array
 
 # So many steps in a row must advance by so much time each on average, s, and so many are kept in memory at most.
@@ -56,7 +57,7 @@ class Trajectory:
         interrupted: Whether it was asked to stop.
         estimated_error: Of the joints' angles, root mean square over joints and time, rad; NaN where not estimated.
         islands: Motions of what moves apart, where the core computes all inputs itself; none otherwise.
-        ends: Ends of the steps of each that moves apart, s; none where all move together.
+        steps: Steps of each that moves apart, of a method of the core; none of others.
     """
 
     breakpoints: Array
@@ -66,7 +67,7 @@ class Trajectory:
     interrupted: bool = False
     estimated_error: float = np.nan
     islands: tuple[Apart, ...] = ()
-    ends: tuple[Array, ...] = ()
+    steps: tuple[Steps, ...] = ()
 
 
 def integrate(
