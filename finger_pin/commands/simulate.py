@@ -87,9 +87,10 @@ def simulate(
 
 def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
     """Return a scenario that moves the hand of a MuJoCo model; print the elements that are not carried over."""
-    from finger_pin.description.exercise import exercise
+    from finger_pin.description.demo_motion import demo_motion
     from finger_pin.description.loading import read_scenario
-    from finger_pin.mechanism.exchange.from_mujoco import LeftOutWarning, from_mujoco
+    from finger_pin.exceptions import LeftOutWarning
+    from finger_pin.exchange.from_mujoco import from_mujoco
 
     with warnings.catch_warnings():
         if not quiet:
@@ -99,7 +100,7 @@ def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
     assert description.tree is not None
     if not quiet and description.tree.left_out:
         print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))
-    return read_scenario(exercise(description), changed)
+    return read_scenario(demo_motion(description), changed)
 
 
 def default_name(scenario: Scenario, settings: list[str], duration: str | None, method: str | None) -> str:

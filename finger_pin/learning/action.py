@@ -10,16 +10,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.position_drive import build_drives, loop_period
-from finger_pin.control.proportional import ControlSignals
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import ReferenceSignals
+from finger_pin.typing import Array
 
 # Tension that an action may ask for by default, and by which it may stretch a tendon on a spool, N.
 _STRONGEST = 20.0

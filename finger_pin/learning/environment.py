@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.learning.task import Task
 from finger_pin.learning.worlds import Worlds, read_actions, read_render_mode
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.coerce import FingerLike
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,35 +9,35 @@ from typing import Any, cast
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.interface import ControlSignals
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.compiled_fingers import CompiledFingers
-from finger_pin.core.stepping.textbook import Statistics, Trajectory
-from finger_pin.description.routing import Array
+from finger_pin.core.stepping.trajectory import Statistics, Trajectory
 from finger_pin.learning.action import Action
-from finger_pin.mechanism.kinematics import Motion
+from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.quantity import Quantity
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.variables import RESIDUAL, variables
+from finger_pin.typing import Array
 
 _NOTHING, _EVER = Statistics(0, 0, 0, 0, 0.0), np.array([np.inf])
 # Of a reference and a controller, which do not act.
 _OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
 
 
-def instant(loop: ClosedLoop, time: float, x: Array) -> SampledMotion:
+def instant(loop: ClosedLoop, time: float, x: Array) -> SampledTrajectory:
     """Return the signals of a state, shape (size,), at a time, s."""
-    return SampledMotion(loop, Trajectory(_EVER, lambda _: x[None], _NOTHING), np.array([time]))
+    return SampledTrajectory(loop, Trajectory(_EVER, lambda _: x[None], _NOTHING), np.array([time]))
 
 
 # What a step changes in place, and views of it.
 _STAYING = {"loop", "times", "packed", "state", "_accelerated"}
 
 
-class Present(SampledMotion):
+class Present(SampledTrajectory):
     """Worlds at the states that they have reached, and all that follows from these."""
 
     def __init__(self, loop: SideBySide) -> None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from finger_pin.description.loading import ScenarioLike
 from finger_pin.exceptions import InputError
 from finger_pin.learning.task import Task
 from finger_pin.learning.worlds import Worlds, read_actions, read_render_mode
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.coerce import FingerLike
 
 
 class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):

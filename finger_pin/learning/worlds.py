@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from finger_pin.core.stepping.batch import RESTING, Together
 from finger_pin.description.loading import ScenarioLike
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import all_finite
 from finger_pin.exceptions import InputError
 from finger_pin.learning.instant import Present, SideBySide, known_variables
 from finger_pin.learning.sensors import measurements
 from finger_pin.learning.task import Task
 from finger_pin.learning.world import World
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.coerce import FingerLike
+from finger_pin.typing import Array
 
 _Places = NDArray[np.int64]
 

@@ -13,24 +13,12 @@ tendons that these pull, and of branches behind pulleys, that of the other tendo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finger_pin.description.caching import Remembered
-from finger_pin.mechanism.rows import Rows, further_states
-
-if TYPE_CHECKING:
-    from finger_pin.mechanism.actuators import Actuators
-    from finger_pin.mechanism.surroundings import Surroundings
-    from finger_pin.mechanism.tendons import Tendons
-
-Array = NDArray[np.float64]
-_KNOWN: Remembered[Layout] = Remembered()
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,40 +112,6 @@ class Layout:
     drives: tuple[tuple[str, float], ...] = ()
     actuators: tuple[str, ...] = ()
     canals: tuple[str, ...] = ()
-
-    @classmethod
-    def of(
-        cls,
-        tendons: Tendons,
-        motors: Actuators,
-        rows: Sequence[Rows] = (),
-        around: Surroundings | None = None,
-        of_tree: Sequence[Rows] = (),
-        canals: Sequence[Rows] = (),
-    ) -> Layout:
-        """Return the layout of tendons, motors, further rows, drives among them, and a finger's surroundings."""
-        routing = tendons.routing
-        drives, further = (
-            further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False)
-        )
-        ringing = np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)
-        found = cls(
-            joints=routing.joints,
-            tendons=routing.tendons,
-            passive=routing.passive,
-            further=further,
-            ringing=tuple(ringing.tolist()),
-            motors=motors.names,
-            objects=() if around is None else tuple(around.free),
-            world=() if around is None else around.world,
-            contacts=() if around is None else around.contacts.names,
-            held=(*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
-            drives=drives,
-            actuators=tuple(name for table in of_tree if table.states for name in table.names),
-            canals=tuple(name for table in canals if table.states for name in table.names),
-        )
-        # Of the same names and sizes much follows, once for all fingers.
-        return _KNOWN.of((found,), lambda: found)
 
     @cached_property
     def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.mechanism.exchange.mujoco_friction import (
+from finger_pin.exchange.mujoco_friction import (
     BRANCH,
     DRAG,
     FLOOR,

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.mechanism.exchange.mujoco_friction import (
+from finger_pin.exchange.mujoco_friction import (
     BRANCH,
     DRAG,
     FORCE,

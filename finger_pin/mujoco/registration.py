@@ -12,8 +12,8 @@ import mujoco
 from numba import cfunc, types
 
 from finger_pin.exceptions import InputError
+from finger_pin.exchange import mujoco_friction as table
 from finger_pin.laws import bristle, capstan
-from finger_pin.mechanism.exchange import mujoco_friction as table
 from finger_pin.mujoco import constraint_rows, elements, kernel, loads, memory, vector_functions, vectorised_law
 from finger_pin.mujoco.layout import layout
 
@@ -44,39 +44,39 @@ def _fingerprint() -> str:
     return hashlib.sha256(b"".join(texts)).hexdigest()
 
 
-def _compiled(at: Any, of: Any, contact: Any, kinds: Any, made_of: str) -> dict[str, Any]:
+def _compiled(at: Any, of: Any, contact: Any, kinds: Any, constructor_args: str) -> dict[str, Any]:
     """Return the callbacks. Offsets are constants of theirs, and numba keeps compiled code by them."""
     word, whole, nothing = types.intp, types.int32, types.void
     options: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 
     @cfunc(whole(word, whole), **options)
     def nstate(m: Any, instance: Any) -> Any:
-        _ = made_of
+        _ = constructor_args
         return kernel.signals(m, instance, at)
 
     @cfunc(whole(word, word, whole), **options)
     def init(m: Any, d: Any, instance: Any) -> Any:
-        _ = made_of
+        _ = constructor_args
         return kernel.init(m, d, instance, at, of, kinds)
 
     @cfunc(nothing(word, word, word, whole), **options)
     def copy(to: Any, m: Any, d: Any, instance: Any) -> None:
-        _ = made_of
+        _ = constructor_args
         kernel.copy(to, d, instance, of)
 
     @cfunc(nothing(word, word, word, whole), **options)
     def reset(m: Any, state: Any, data: Any, instance: Any) -> None:
-        _ = made_of
+        _ = constructor_args
         kernel.reset(m, state, instance, at)
 
     @cfunc(nothing(word, word, whole, whole), **options)
     def compute(m: Any, d: Any, instance: Any, capability: Any) -> None:
-        _ = made_of
+        _ = constructor_args
         kernel.compute(m, d, instance, at, of, kinds)
 
     @cfunc(nothing(word, word, whole), **options)
     def advance(m: Any, d: Any, instance: Any) -> None:
-        _ = made_of
+        _ = constructor_args
         kernel.advance(m, d, instance, at, of, contact, kinds)
 
     return {each.__name__: each for each in (nstate, init, copy, reset, compute, advance)}

@@ -8,9 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from finger_pin.laws.bristle import friction_coefficient, friction_level
-from finger_pin.laws.capstan import capstan_coefficient
-from finger_pin.mechanism.exchange.mujoco_friction import (
+from finger_pin.exchange.mujoco_friction import (
     COULOMB,
     DRAG,
     EXPONENT,
@@ -24,6 +22,8 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     STRIBECK,
     VISCOUS,
 )
+from finger_pin.laws.bristle import friction_coefficient, friction_level
+from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mujoco.memory import compiled
 from finger_pin.mujoco.vector_functions import angle, compiled_law, exponential
 

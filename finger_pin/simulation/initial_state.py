@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.canals import BRANCHES, CANALS
@@ -16,6 +15,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import State
 from finger_pin.mechanism.tree import STATEFUL
 from finger_pin.simulation.contact_variables import last_touching
+from finger_pin.typing import Array
 
 _PARTS = {
     "position": "joint_position",

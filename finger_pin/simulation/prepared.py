@@ -11,27 +11,27 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import Bindings
+from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.stepper import TABLEAUS
-from finger_pin.core.stepping.textbook import Stop, Trajectory
+from finger_pin.core.stepping.trajectory import Stop, Trajectory
 from finger_pin.core.threads import in_threads
-from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.routing import Array
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, own_finger
 from finger_pin.simulation.accuracy import with_tighter
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import attributes_of, record, recorded, refuse_unknown
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.running import run
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates, variables
+from finger_pin.typing import Array
 
 #: What a run records unless it is told otherwise.
 RECORDED = ("joint_position", "tendon_tension")
@@ -63,8 +63,8 @@ def prepare(
         InputError: If there is no such key or variable.
     """
     described = load_scenario(scenario)
-    own = own_finger(finger, described)
-    return Prepared(Family(described_by(described, own), tuple(parameters)), tuple(record), own)
+    own = resolve_finger(finger, described)
+    return Prepared(ParametrisedScenario(with_finger(described, own), tuple(parameters)), tuple(record), own)
 
 
 class Prepared:
@@ -78,7 +78,7 @@ class Prepared:
 
     def __init__(
         self,
-        family: Family,
+        family: ParametrisedScenario,
         record: tuple[str, ...],
         finger: Finger | None = None,
         bindings: list[Bindings] | None = None,
@@ -114,7 +114,7 @@ class Prepared:
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        return self.family.scenario if values is None else self.family.at(values)
+        return self.family.scenario if values is None else self.family.with_values(values)
 
     def run(
         self,
@@ -185,7 +185,7 @@ class Prepared:
         return Setup.of(scenario, self._loop(scenario, initial), bindings=bindings)
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
-        motions = SampledMotion(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
+        motions = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
         names = coordinates(setup.scenario, setup.loop, motions.times)
         attributes = attributes_of(setup.scenario, trajectory, setup.method)
         return RunArrays(recorded(motions, self.record), names, attributes)
@@ -197,7 +197,7 @@ class Prepared:
         setup = self._setup(scenario, initial, self._free_bindings())
         trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:
-            motions = SampledMotion(setup.loop, trajectory, scenario.sample_times(), self.record)
+            motions = SampledTrajectory(setup.loop, trajectory, scenario.sample_times(), self.record)
             reached, partial = float(trajectory.breakpoints[-1]), record(scenario, motions, setup.method, self.record)
             if trajectory.failure:
                 raise IntegrationError(reached, *setup.failure(trajectory), partial)

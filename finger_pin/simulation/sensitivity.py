@@ -13,12 +13,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from finger_pin.core.stepping.textbook import Trajectory
+from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.setup import Setup
+from finger_pin.typing import Array
 
 #: Change of a number, of its size: far above rounding, far below where anything bends.
 CHANGE = 1e-7

@@ -7,17 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import Bindings, compiled_control, sampled_control
-from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled_control
+from finger_pin.control.interface import LoopController
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
-from finger_pin.core.control import Control
+from finger_pin.core.compiled_fingers import Bindings
+from finger_pin.core.inputs import InputTable
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.interpolant_collision import meetings
 from finger_pin.core.stepping.repetition import Steps
+from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.stepping.textbook import Stop, Trajectory, Watch, integrate
+from finger_pin.core.stepping.trajectory import Stop, Trajectory, Watch
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError
@@ -55,7 +56,7 @@ class Setup:
     answers: LoopController
     sampled: SampledController | None
     bindings: Bindings | None = None
-    control: Control | None = None
+    control: InputTable | None = None
 
     @classmethod
     def of(
@@ -85,10 +86,10 @@ class Setup:
             # Before the controller is sampled: then it must not be asked for a start.
             loop = replace(loop, start=loop.initial_state())
             check_motors(loop.finger, loop.initial_state())
-        if loop.finger.surroundings is not None:
-            loop.finger.surroundings.check(loop.finger.layout.unpack(loop.initial_state()))
+        if loop.finger.scene is not None:
+            loop.finger.scene.check(loop.finger.layout.unpack(loop.initial_state()))
         sampling = sampling_settings(scenario, control_period)
-        if sampling is None and (loop.controller.measures or loop.controller.sensors):
+        if sampling is None and (loop.controller.needs_sensors or loop.controller.sensors):
             raise InputError("control_period", "is missing: a controller that reads sensors is sampled")
         positioned = bool(np.any(loop.finger.actuators.holds))
         if positioned and method not in TABLEAUS:

@@ -10,14 +10,13 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.energies import LOST
-from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.rows import LOST, Rows
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.energy import flows, stores
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME, Quantity
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.typing import Array
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR, _TIME = ("time", "motor"), ("time",)
@@ -95,17 +94,17 @@ def _more(loop: ClosedLoop) -> dict[str, Quantity]:
     return table | _of_further(loop.finger.further) | _of_account(loop)
 
 
-def _contact(name: str, of: SampledMotion) -> Array:
+def _contact(name: str, of: SampledTrajectory) -> Array:
     return contact_value(name, of.loop.finger, of)
 
 
-def _fingertip_force(of: SampledMotion) -> Array:
+def _fingertip_force(of: SampledTrajectory) -> Array:
     force = of.loop.force(of.times)
     return np.broadcast_to(force, (len(of.times), *of.loop.fingertip_force.shape))
 
 
-def _shortfall(of: SampledMotion) -> Array:
-    missing = of.control.shortfall
+def _shortfall(of: SampledTrajectory) -> Array:
+    missing = of.control.torque_deficit
     return np.zeros_like(of.state.position) if missing is None else missing
 
 
@@ -114,7 +113,7 @@ def _of_palm(loop: ClosedLoop) -> dict[str, Quantity]:
         return {}
     path = loop.palm
 
-    def turned(of: SampledMotion) -> Array:
+    def turned(of: SampledTrajectory) -> Array:
         return np.array([pin.Quaternion(each).coeffs() for each in path.place(of.times)[1]])
 
     text = "rotation of the palm to the world, x, y, z, w"
@@ -136,10 +135,10 @@ def _of_motors(loop: ClosedLoop) -> dict[str, Quantity]:
     if not loop.finger.actuators.names:
         return {}
 
-    def moved(of: SampledMotion, name: str) -> Array:
+    def moved(of: SampledTrajectory, name: str) -> Array:
         return np.asarray(getattr(of.state, name))
 
-    def driven(of: SampledMotion, name: str) -> Array:
+    def driven(of: SampledTrajectory, name: str) -> Array:
         return np.asarray(getattr(of.finger.motors, name))
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
@@ -170,7 +169,7 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
     def shaped(values: Array) -> Array:
         return values[:, 0] if single else values
 
-    def proximal(of: SampledMotion) -> Array:
+    def proximal(of: SampledTrajectory) -> Array:
         return shaped(of.finger.tendons.strands[..., actuated::2])
 
     return {
@@ -187,7 +186,7 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
 def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return the readings of a sampled controller's sensors, each held until the next sample."""
 
-    def held(of: SampledMotion, name: str) -> Array:
+    def held(of: SampledTrajectory, name: str) -> Array:
         return of.loop.controller.measured(name, of.times)
 
     return {
@@ -204,21 +203,21 @@ def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
 def _of_further(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
     """Return the signals of rows of a user's own, by table."""
 
-    def seen(of: SampledMotion, group: str, name: str) -> Array:
+    def seen(of: SampledTrajectory, group: str, name: str) -> Array:
         found = of.finger.mechanism.rows[group]
         return np.asarray(getattr(found.row, name))
 
-    def exerted(of: SampledMotion, group: str) -> Array:
+    def exerted(of: SampledTrajectory, group: str) -> Array:
         return of.finger.mechanism.rows[group].force
 
-    def shown(of: SampledMotion, group: str, index: int) -> Array:
+    def shown(of: SampledTrajectory, group: str, index: int) -> Array:
         return of.finger.mechanism.rows[group].signals[index]
 
     found: dict[str, Quantity] = {}
     for table in tables:
         group = table.group
         units = {"length": table.unit, "speed": f"{table.unit}/s", "force": "N m" if table.unit == "rad" else "N"}
-        values: dict[str, Callable[[SampledMotion], Array]] = {"force": partial(exerted, group=group)}
+        values: dict[str, Callable[[SampledTrajectory], Array]] = {"force": partial(exerted, group=group)}
         values |= {name: partial(seen, group=group, name=name) for name in ("length", "speed")}
         values |= {name: partial(shown, group=group, index=i) for i, name in enumerate(table.law.signals)}
         if np.any(table.channels >= 0):
@@ -232,13 +231,13 @@ def _of_further(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
 
 
 def _of_account(loop: ClosedLoop) -> dict[str, Quantity]:
-    def stored(of: SampledMotion, name: str) -> Array:
+    def stored(of: SampledTrajectory, name: str) -> Array:
         return of.stored[name]
 
-    def power(of: SampledMotion, name: str) -> Array:
+    def power(of: SampledTrajectory, name: str) -> Array:
         return of.powers[name]
 
-    def work(of: SampledMotion, name: str) -> Array:
+    def work(of: SampledTrajectory, name: str) -> Array:
         return of.account.works[name]
 
     table = {}

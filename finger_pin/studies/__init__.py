@@ -8,9 +8,10 @@ their own.
 """
 
 from finger_pin.studies.designs import Grid, LatinHypercube, Listing, Range
-from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric, Run
+from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric
 from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
 from finger_pin.studies.problem import Variable, radii
+from finger_pin.studies.response import Run
 from finger_pin.studies.runs import ExecutorError
 from finger_pin.studies.sweeping import sweep
 

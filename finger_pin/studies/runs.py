@@ -22,7 +22,8 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.studies.executing import Crew, Lost
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, finger_digest, source_digest, versions
 from finger_pin.studies.keys import Point, Starting
-from finger_pin.studies.metrics import Metric, Run
+from finger_pin.studies.metrics import Metric
+from finger_pin.studies.response import Run
 
 DONE, FAILED = "done", "failed"
 Stop = Callable[[], bool]

@@ -7,12 +7,11 @@ import numpy as np
 import pinocchio as pin
 
 import finger_pin as fp
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import compiled_control
+from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
-from finger_pin.core.control import held_control
 from finger_pin.core.evaluation.condensation import solve
+from finger_pin.core.inputs import held_control
 from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call, call_at
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock

@@ -9,7 +9,7 @@ from core_cases import BODIES, LOOPS, relative
 
 import finger_pin as fp
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.control import held_control
+from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import Rows

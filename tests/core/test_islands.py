@@ -10,8 +10,8 @@ from test_any_mechanism import assert_same
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_finger import CompiledMechanism
-from finger_pin.core.control import held_control, planned_control
 from finger_pin.core.evaluation.time_functions import SignalTable
+from finger_pin.core.inputs import held_control, planned_control
 from finger_pin.core.jit import bound
 from finger_pin.core.stepping import rosenbrock
 from finger_pin.core.stepping.integrator import integrate_compiled

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import finger_pin as fp
-from finger_pin.description.embedded import embedded
+from finger_pin.description.scene_metadata import embedded
 
 STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
 LOST = (

@@ -4,10 +4,11 @@ import example_robot_data
 import numpy as np
 import pinocchio as pin
 import pytest
+from paper.plot_workspace import plot_workspace
 
 import finger_pin as fp
 from finger_pin.analysis import force_polytope, self_locking_map
-from finger_pin.description.hand import HandSettings
+from finger_pin.description.finger import HandSettings
 from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views import LiveView, plots, view_forces
 from finger_pin.views.viewer import write_animation
@@ -61,7 +62,7 @@ def whole(robot, hand):
 
 def test_every_figure_of_a_finger_takes_it(foreign):
     figures = [
-        plots.plot_workspace(foreign),
+        plot_workspace(foreign),
         plots.plot_force_polytope(foreign, POSITION, 20.0),
         plots.plot_radius_sensitivity(foreign, POSITION, (0.0, 0.0, 0.5)),
         plots.plot_critical_friction(foreign),

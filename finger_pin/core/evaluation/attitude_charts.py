@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.rigid_body import ROTATION
 from finger_pin.core.jit import compiled, compiled_within
-from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
+from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
-
-_KNOWN: Remembered[Charts] = Remembered()
+from finger_pin.typing import Array
 
 
 def place(frame: Any, q: Any, body: Any) -> None:
@@ -153,13 +151,9 @@ class Charts:
     size: int
 
     @classmethod
+    @memoised(lambda cls, mechanism: (mechanism.body.form, mechanism.coordinates, mechanism.state_count))
     def of(cls, mechanism: Mechanism) -> Charts:
         """Read a mechanism."""
-        parts = mechanism.body.form, mechanism.coordinates, mechanism.state_count
-        return _KNOWN.of(parts, lambda: cls._of(mechanism))
-
-    @classmethod
-    def _of(cls, mechanism: Mechanism) -> Charts:
         model, width = mechanism.body.model, mechanism.coordinates
         spheres = [joint for joint in model.joints[1:] if joint.nq != joint.nv]
         packed, core = np.ones(mechanism.size, dtype=bool), np.ones(2 * width + mechanism.state_count, dtype=bool)

@@ -1,4 +1,4 @@
-"""Inputs from outside, compiled: values of a `Control`, and their slopes."""
+"""Inputs from outside, compiled: values of a `InputTable`, and their slopes."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.control import HELD, SCHEDULED
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.time_functions import signal_derivative, signal_derivatives, signal_values
+from finger_pin.core.inputs import HELD, SCHEDULED
 from finger_pin.core.jit import compiled, compiled_within
-from finger_pin.laws import controller as controller_laws
+from finger_pin.laws import inputs as controller_laws
 
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)

@@ -6,12 +6,11 @@ from typing import Any
 
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.rigid_body import AXIS, AXIS_CURVE, FORCE, MOTION, inverse_dynamics
-from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
+from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.evaluation.time_functions import signal_derivative
-from finger_pin.core.evaluation.trigonometry import sine_cosine
 from finger_pin.core.jit import Unit, bound_at, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.laws import palm as palm_laws
+from finger_pin.laws import inputs as palm_laws
 
 _base_motion = inlined(palm_laws.base_motion)
 

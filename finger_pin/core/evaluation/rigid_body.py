@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
-from finger_pin.core.evaluation.trigonometry import sine_cosine
+from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.jit import compiled, compiled_within
 
 # Columns of the table of bodies.

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.evaluation.trigonometry import sine_cosine
+from finger_pin.core.evaluation.spatial import sine_cosine
 from finger_pin.core.jit import Layers, Matrix, Vector, compiled
-from finger_pin.laws.quintic import quintic
+from finger_pin.laws.inputs import quintic
 
 _quintic = inlined(quintic)
 

@@ -9,7 +9,7 @@ from numba import types
 from numba.extending import models, register_model
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 #: Bytes of a machine word.
 WORD = 8

@@ -8,8 +8,8 @@ import numpy as np
 
 from finger_pin.core.collision.broad_phase import list_awake, settle
 from finger_pin.core.collision.continuous import NOTHING, UNSEEN
-from finger_pin.core.control import HELD
 from finger_pin.core.evaluation.attitude_charts import rechart
+from finger_pin.core.inputs import HELD
 from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_within, copy, copy_matrix
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at

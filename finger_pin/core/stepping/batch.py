@@ -11,7 +11,7 @@ import numpy as np
 from finger_pin.core.jit import Indices, Kind, Unit, Vector, add_at, bound, bound_at, call_at, compiled, look_at, put_at
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.threads import pool, usable_cores
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 #: In the place of an end: this one is left alone.
 RESTING = -1.0

@@ -15,9 +15,9 @@ from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part, failure
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
-from finger_pin.core.stepping.textbook import Statistics, Stop, Trajectory, Watch
+from finger_pin.core.stepping.trajectory import Statistics, Stop, Trajectory, Watch
 from finger_pin.core.threads import in_threads
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
 _MOST_BYTES = 2e9

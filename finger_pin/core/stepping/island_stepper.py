@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
 from finger_pin.core.collision.broad_phase import wake_all
-from finger_pin.core.control import Control
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.evaluation.rigid_body import PRISMATIC
+from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import Block, Unit, bound, copied
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.adaptive import advance
@@ -26,8 +26,8 @@ from finger_pin.core.stepping.repetition import REPETITION, Repetition, Steps, r
 from finger_pin.core.stepping.step_cuts import cut_step, survey_step
 from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.core.tables import Tables
-from finger_pin.description.routing import Array
 from finger_pin.laws.law import ContactLaw, Law
+from finger_pin.typing import Array
 
 FIRST_STEP = 1e-6
 
@@ -97,7 +97,7 @@ class Part:
         island: Island,
         laws: Sequence[Law | ContactLaw],
         tables: Tables,
-        control: Control,
+        control: InputTable,
         x: Array,
         attitude: Array,
         tableau: Tableau,
@@ -211,7 +211,7 @@ class Part:
             if self.drives is not None:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
 
-    def renew(self, tables: Tables, control: Control, x: Array, attitude: Array, atol: Array) -> None:
+    def renew(self, tables: Tables, control: InputTable, x: Array, attitude: Array, atol: Array) -> None:
         """Begin anew at time zero with other numbers, which fit, as a new part of them would."""
         self.model.renew(tables, control)
         self.atol[:], self.memory[:], self._bound.drift[:] = atol, 0.0, 0.0

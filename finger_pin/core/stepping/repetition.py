@@ -12,7 +12,7 @@ from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.adaptive import arrive, try_counted
 from finger_pin.core.stepping.interpolation import cut, interpolant
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 
 class Steps(NamedTuple):

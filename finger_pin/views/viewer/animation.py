@@ -12,13 +12,13 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.description.embedded import described
-from finger_pin.description.routing import Array
+from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_text
+from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.typing import Array
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
 from finger_pin.views.viewer.scene_objects import SceneObjects
@@ -145,7 +145,7 @@ class Playback:
         Raises:
             InputError: If the result lacks something that is shown.
         """
-        scene = Scene(finger or described(result.attrs).finger)
+        scene = Scene(finger or read_scene(result.attrs).finger)
         time = _variable(result, "time")
         if len(time) == 0:
             raise InputError("result.time", "must have at least one sample")

@@ -13,10 +13,10 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.description.routing import Array
+from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, description_of
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual, joint_axes
+from finger_pin.typing import Array
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.solids import ROOT, encode, is_mesh, link_names, root_command, solid_commands
 

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike
 
 from finger_pin.analysis import ForcePolytope
 from finger_pin.control.closed_loop import LoopSignals
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.simulation.notebook import in_notebook
+from finger_pin.typing import Array
 from finger_pin.views.viewer.animation import animation_page, posture_page
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Scene

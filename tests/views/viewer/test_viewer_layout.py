@@ -8,10 +8,10 @@ from motion import joint_position
 from pages import opened, seek
 
 import finger_pin as fp
-from finger_pin.description.embedded import embedded
-from finger_pin.description.exercise import exercise
+from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
-from finger_pin.mechanism.exchange.from_mujoco import from_mujoco
+from finger_pin.description.scene_metadata import embedded
+from finger_pin.exchange.from_mujoco import from_mujoco
 from finger_pin.views.viewer import write_animation
 
 
@@ -80,7 +80,7 @@ JOINT_ALONE = """<mujoco><worldbody><body><joint name="knuckle" axis="0 1 0" ran
 
 def test_a_hand_that_no_tendon_pulls_shows_its_joints_and_no_scale_of_tensions(browser, tmp_path):
     (tmp_path / "alone.xml").write_text(JOINT_ALONE)
-    scenario = read_scenario(exercise(from_mujoco(tmp_path / "alone.xml", "alone")), {})
+    scenario = read_scenario(demo_motion(from_mujoco(tmp_path / "alone.xml", "alone")), {})
     still = {
         "joint_position": (("time", "joint"), np.zeros((2, 1))),
         "tendon_tension": (("time", "tendon"), np.zeros((2, 0))),
