@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.tableaus import rodas5p
 from finger_pin.description.finger import FingerDescription
@@ -143,12 +144,11 @@ def _over(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
         stepper = Stepper(mechanism, control, start, rodas5p(), _TIGHT, atol)
         stepper.hold(inputs)
         if ends is not None:
-            stepper.repeat(ends)
+            stepper.repeat([Steps.whole(each) for each in ends])
         found = integrate_compiled(stepper, dt, other.layout.names)
         if found.failure:
             raise InputError("state", f"cannot be integrated over dt: {found.failure}")
-        taken = list(found.ends) or [found.breakpoints]
-        return stepper.x, taken
+        return stepper.x, [each.ends for each in found.steps]
 
     # At rest nothing moves, and one step would do: those of a motion nearby follow what a change sets off.
     ends = stepped(finger, x + _NEARBY * finger.layout.scales(), u, None)[1]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
@@ -23,7 +24,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import recorded
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
-from finger_pin.simulation.sensitivity import changed, nearby, on_steps_of
+from finger_pin.simulation.sensitivity import changed, nearby
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates
 from finger_pin.typing import Array
@@ -38,8 +39,9 @@ _INPUTS = {
 _NEAR = 0.3
 # Samples at a window's start that its position and velocity are read from.
 _FIRST = 9
-# Relative error of slopes: a search needs no more, and at its end residuals and slopes are nearly orthogonal.
-_ALLOWED = 1e-2
+# Slopes are those of runs at so much larger tolerances, with errors of about 1e-2: a search needs no more, and at its
+# end residuals and slopes are nearly orthogonal.
+_SLOPES = 10.0
 # Between which tolerances are, unless a scenario asks for others.
 _FINEST, _ROUGHEST = 1e-10, 1e-4
 # Where slopes are wilder than so many ranges of the signal, a larger change and steps of their own serve.
@@ -82,18 +84,19 @@ class RecordedMotion:
         self._put_start(table, scenario, window)
         self.scenario = read_scenario(table)
         self._finger = finger
-        self._last: tuple[Any, list[Array], tuple[Setup, Trajectory] | None] | None = None
         self._factor = 1.0
+        # As many as there were runs at once.
+        self._bindings: list[Bindings] = []
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
-        computed, motion = self._made(scenario, own)
-        self._last = ((scenario, dict(own)), computed, motion)
+        computed, motion = self._made(scenario, own, self._factor)
+        self._free(motion)
         return computed
 
     def tune(self, factor: float) -> None:
         """Integrate from now on with so much larger tolerances than the scenario asks for."""
-        self._factor, self._last = factor, None
+        self._factor = factor
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of the outputs by the values, shape (m, p) each.
@@ -104,8 +107,9 @@ class RecordedMotion:
             sizes: Sizes of changes of the values, shape (p,).
         """
         here = at(values)
-        last = self._last
-        computed, motion = last[1:] if last is not None and last[0] == here else self._made(*here)
+        factor = max(self._factor, _SLOPES)
+        computed, motion = self._made(*here, factor)
+        self._free(motion)
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
         there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
@@ -113,18 +117,18 @@ class RecordedMotion:
             k for k, (scenario, own) in enumerate(there) if self._with_start(scenario, own) != motion[0].scenario
         ]
         others = {k: self._setup(*there[k]) for k in feeling}
-        near = dict(zip(feeling, nearby(*motion, list(others.values()), changes[feeling], _ALLOWED), strict=True))
+        # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
+        same = self._setup(*here)
+        base, *near_by = nearby(motion[1], [same, *others.values()])
+        near = dict(zip(feeling, near_by, strict=True))
+        computed = self._outputs(same, base, here[1])
         ranges = [float(np.ptp(each)) for each in computed]
-        base = computed
-        if not motion[1].islands:
-            setup = self._setup(*here)
-            base = self._outputs(setup, on_steps_of(motion[1], setup), here[1])
 
         def column(k: int) -> list[Array]:
             if there[k] == here:
                 return [np.zeros(len(each)) for each in computed]
-            found = self._outputs(others.get(k, motion[0]), near.get(k, motion[1]), there[k][1])
-            slopes = [(f - c) / changes[k] for f, c in zip(found, base if k in near else computed, strict=True)]
+            found = self._outputs(others.get(k, same), near.get(k, base), there[k][1])
+            slopes = [(f - c) / changes[k] for f, c in zip(found, computed, strict=True)]
             wild = any(
                 not np.max(np.abs(each)) * float(sizes[k]) <= _WILD * size
                 for each, size in zip(slopes, ranges, strict=True)
@@ -135,11 +139,13 @@ class RecordedMotion:
                 moved[k] += np.sign(changes[k]) * _COARSE * float(sizes[k])
                 # At the edge of what goes together there is no such change.
                 with suppress(InputError):
-                    found = self._made(*at(moved))[0]
+                    found, other = self._made(*at(moved), factor)
+                    self._free(other)
                     slopes = [(f - c) / (moved[k] - values[k]) for f, c in zip(found, computed, strict=True)]
             return [np.nan_to_num(each, nan=0.0) for each in slopes]
 
         columns = in_threads(column, range(len(values)))
+        self._free(*((each, None) for each in (same, *others.values())))
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
     def _with_start(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
@@ -153,17 +159,24 @@ class RecordedMotion:
 
     def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
         moved = self._with_start(scenario, own)
-        if self._finger is None:
-            return Setup.of(moved)
-        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=fitted(self._finger, self.scenario, moved)))
+        try:
+            bindings = self._bindings.pop()
+        except IndexError:
+            bindings = Bindings()
+        finger = None if self._finger is None else fitted(self._finger, self.scenario, moved)
+        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger), bindings=bindings)
+
+    def _free(self, *motions: tuple[Setup, Trajectory | None] | None) -> None:
+        """Let later runs have what motions were bound to; nothing more can be asked of these."""
+        self._bindings += [each[0].bindings for each in motions if each and each[0].bindings]
 
     def _made(
-        self, scenario: Scenario, own: Mapping[str, float]
+        self, scenario: Scenario, own: Mapping[str, float], factor: float
     ) -> tuple[list[Array], tuple[Setup, Trajectory] | None]:
-        """Return the outputs, not numbers if the motion fails, and the motion."""
+        """Return the outputs, not numbers if the motion fails, and the motion, at so much larger tolerances."""
         try:
             setup = self._setup(scenario, own)
-            trajectory = setup.integrate(scenario=_tuned(setup.scenario, self._factor))
+            trajectory = setup.integrate(scenario=_tuned(setup.scenario, factor))
             failed = bool(trajectory.failure)
         except IntegrationError:
             failed = True

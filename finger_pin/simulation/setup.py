@@ -15,6 +15,7 @@ from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.interpolant_collision import meetings
+from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.stepping.trajectory import Stop, Trajectory, Watch
@@ -23,7 +24,6 @@ from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, Simulat
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.accuracy import CHUNK
 from finger_pin.simulation.initial_state import check_motors
-from finger_pin.typing import Array
 
 #: What to try where an integrator cannot go on.
 ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
@@ -34,9 +34,6 @@ _ADVICE_RUNAWAY = "a smaller controller.gain, heavier links, or a start within t
 _CONTINUOUS = "Radau"
 #: Steps between two looks at a compiled simulation that is observed.
 CHUNK_OBSERVED = 4
-
-#: Ends of the steps of every island, s.
-Steps = Sequence[Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +123,7 @@ class Setup:
         *,
         scenario: Scenario | None = None,
         chunk: int = CHUNK,
-        steps: Steps | None = None,
+        steps: Sequence[Steps] | None = None,
     ) -> Trajectory:
         """Integrate, at the tolerances of another scenario if given.
 
@@ -135,8 +132,8 @@ class Setup:
             stop: Asked now and then.
             scenario: Like this one, with tolerances of its own.
             chunk: Steps between two calls.
-            steps: To be taken whatever their errors: what comes out is then as smooth a function of start and
-                parameters as the equations are.
+            steps: Of every island, to be taken whatever their errors: what comes out is then as smooth a function of
+                start and parameters as the equations are.
         """
         settings = (scenario or self.scenario).simulation
         if self.method in TABLEAUS:
@@ -156,7 +153,12 @@ class Setup:
         )
 
     def _compiled(
-        self, settings: SimulationSettings, watch: Watch | None, stop: Stop | None, chunk: int, steps: Steps | None
+        self,
+        settings: SimulationSettings,
+        watch: Watch | None,
+        stop: Stop | None,
+        chunk: int,
+        steps: Sequence[Steps] | None,
     ) -> Trajectory:
         """Integrate by a method of the compiled core."""
         loop = self.loop
@@ -165,18 +167,13 @@ class Setup:
             stepper.drive(loop.drives.compiled)
         knots = loop.knots(settings.rtol)
         if steps is not None:
-            # Numbers that join what moved apart, or part it, leave the steps of all to each.
-            own = steps if len(steps) == len(stepper.parts) else [np.concatenate(steps)] * len(stepper.parts)
-            stepper.repeat([np.union1d(ends, knots) for ends in own])
-            if self.bindings:
-                # It goes on repeating: no other run can have it.
-                self.bindings.stepper = None
+            stepper.repeat(steps)
         return integrate_compiled(
             stepper,
             settings.duration,
             loop.finger.layout.names,
             held=self.sampled,
-            knots=None if steps is not None else knots,
+            knots=knots,
             watch=watch,
             chunk=chunk,
             together=chunk == CHUNK_OBSERVED,

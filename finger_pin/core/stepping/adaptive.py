@@ -61,7 +61,7 @@ def _blame(integration: Any) -> None:
 
 
 @njit_inline
-def _tried(integration: Any, model: Any, h: float) -> int:
+def try_counted(integration: Any, model: Any, h: float) -> int:
     """Try a step, and count its evaluations; return its outcome, as `try_step` does."""
     memory, tables = integration.memory, model.tables
     fresh, count = memory[at.FRESH] > 0.0, integration.tableau.nodes.size
@@ -126,7 +126,7 @@ def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) 
 
 
 @njit_always_inline
-def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
+def arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
     """Go to the end of a step, and keep it, if there is a record."""
     x, attitude, tables, taken = integration.x, integration.attitude, model.tables, stretch.taken[0]
     first = 2 * model.linear.mass.shape[0]
@@ -139,6 +139,8 @@ def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
         stretch.times[taken] = time
         copy_matrix(integration.dense, stretch.dense[taken])
         copy(x, stretch.states[taken])
+        copy(integration.kinks, stretch.branches[taken])
+        stretch.shares[taken] = integration.memory[at.PART]
     rechart(tables, x, attitude, integration.drift)
     if taken < stretch.times.size:
         for f in range(attitude.shape[0]):
@@ -179,7 +181,7 @@ def advance(address: int, end: float) -> int:
         clipped = final and end - time < h
         if final:
             h = end - time
-        outcome = _tried(integration, model, h)
+        outcome = try_counted(integration, model, h)
         if outcome == at.SENSELESS:
             return at.NOT_FINITE
         error = np.inf
@@ -206,6 +208,6 @@ def advance(address: int, end: float) -> int:
         else:
             if integration.joints.size + integration.objects.size > 0:
                 call_at(integration.judge, stretch.integration, h)
-            _arrive(stretch, integration, model, end if final and part == 1.0 else time + part * h)
+            arrive(stretch, integration, model, end if final and part == 1.0 else time + part * h)
             _pace(integration, h, error, final, clipped)
     return at.DONE

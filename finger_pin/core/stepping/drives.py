@@ -58,12 +58,14 @@ class Driven(NamedTuple):
     Attributes:
         drives: The loops.
         stretch: Address of the bound `Stretch`.
-        advance: Address of `adaptive.advance`.
+        advance: Address of what is called to advance, and is given ``given``.
+        given: Address of a block.
     """
 
     drives: Drives
     stretch: int
     advance: int
+    given: int
 
 
 DRIVEN = StructType(Driven)
@@ -111,6 +113,6 @@ def advance_driven(address: int, end: float) -> int:
             return DONE
         if stretch.taken[0] == stretch.taken[1] and times.size > 0:
             return FULL
-        status: int = call_at(driven.advance, driven.stretch, min(end, drives.taken[0] * drives.period))
+        status: int = call_at(driven.advance, driven.given, min(end, drives.taken[0] * drives.period))
         if status != DONE:
             return status

@@ -32,14 +32,15 @@ def release(tables: Any, rows: Any) -> None:
 
 
 @njit_always_inline
-def hold(tables: Any, rows: Any, kinks: Any) -> None:
-    """Hold all rows on the present side of their kink."""
+def hold(tables: Any, rows: Any, kinks: Any, given: bool) -> None:
+    """Hold all rows on the present side of their kink, or on that which the signs of ``kinks`` tell."""
     for g in range(tables.groups.shape[0]):
         column = tables.groups[g, KINK]
         if column >= 0:
             for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                kinks[k] = rows[column, k]
-                rows[SIDE, k] = np.sign(rows[column, k])
+                if not given:
+                    kinks[k] = rows[column, k]
+                rows[SIDE, k] = np.sign(kinks[k])
 
 
 @njit_inline

@@ -17,6 +17,7 @@ from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
 from finger_pin.core.stepping.islands import Island, find_islands, groups_of, select, select_control, wiring
+from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables
 from finger_pin.core.threads import in_threads
@@ -159,6 +160,11 @@ class Stepper:
         return any(part.drives is not None for part in self.parts)
 
     @property
+    def repeats(self) -> bool:
+        """Whether it takes given steps."""
+        return any(part.steps is not None for part in self.parts)
+
+    @property
     def held(self) -> bool:
         """Whether inputs are held."""
         return any(part.control.kind == HELD for part in self.parts)
@@ -223,10 +229,13 @@ class Stepper:
         for part in self.parts:
             part.knots = np.array(knots, dtype=float)
 
-    def repeat(self, ends: Sequence[Array]) -> None:
-        """Take steps with given ends from now on, s, for each island, whatever their errors."""
-        for index, (part, own) in enumerate(zip(self.parts, ends, strict=True)):
-            self.parts[index] = part.repeating(own[own > part.time])
+    def repeat(self, steps: Sequence[Steps]) -> None:
+        """Take given steps from now on in each island, whatever their errors."""
+        if len(steps) != len(self.parts):
+            # Parameters that join what moved apart, or part it, leave the steps of all to each.
+            steps = [Steps.whole(np.unique(np.concatenate([each.ends for each in steps])))] * len(self.parts)
+        for part, own in zip(self.parts, steps, strict=True):
+            part.repeat(own)
 
     def hold(self, inputs: Array) -> None:
         """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from finger_pin.core.stepping.repetition import Steps
 from finger_pin.typing import Array
 
 Watch = Callable[[float, Array], None]
@@ -50,7 +51,7 @@ class Trajectory:
         interrupted: Whether it was asked to stop.
         estimated_error: Of the joints' angles, root mean square over joints and time, rad; NaN where not estimated.
         islands: Motions of what moves apart, where the core computes all inputs itself; none otherwise.
-        ends: Ends of the steps of each that moves apart, s; none where all move together.
+        steps: Steps of each that moves apart, of a method of the core; none of others.
     """
 
     breakpoints: Array
@@ -60,4 +61,4 @@ class Trajectory:
     interrupted: bool = False
     estimated_error: float = np.nan
     islands: tuple[Apart, ...] = ()
-    ends: tuple[Array, ...] = ()
+    steps: tuple[Steps, ...] = ()
