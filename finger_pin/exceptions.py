@@ -37,6 +37,10 @@ class AccuracyWarning(ScenarioWarning):
     """The error of a result is far more than its tolerances suggest."""
 
 
+class LeftOutWarning(ScenarioWarning):
+    """Something of a model that moves or carries anything was not carried over."""
+
+
 class ClosureWarning(ScenarioWarning):
     """A finger whose tendons run along paths loses force closure somewhere in its range."""
 

@@ -55,7 +55,7 @@ def benchmark(
     output.mkdir(parents=True, exist_ok=True)
     with noted(f"what was measured is in {output}"):
         store = Store(output, quick, fresh)
-        around = surroundings()
+        around = machine()
         stages = {}
         for name in names:
             stages[name] = stage(name).measure(store)
@@ -66,7 +66,7 @@ def benchmark(
 
         reached = targets(stages)
         lines = report.text(stages, reached, quick)
-        whole = {"surroundings": around, "quick": quick, "stages": stages}
+        whole = {"machine": around, "quick": quick, "stages": stages}
         whole["targets"] = [each._asdict() for each in reached]
         write_text(output / "benchmark.json", json.dumps(whole, indent=1) + "\n")
         write_text(output / "benchmark.txt", lines + "\n")
@@ -88,7 +88,7 @@ def stage(name: str) -> Any:
     return import_module(f"benchmarks.{STAGES[name]}")
 
 
-def surroundings() -> dict[str, Any]:
+def machine() -> dict[str, Any]:
     """Return the circumstances of the times: processor, system, versions."""
     versions = {}
     for name in PACKAGES:

@@ -1,11 +1,13 @@
-"""The same as ``python -m finger_pin conclusions``."""
+"""Put the paper's three conclusions to the test."""
 
 import sys
 from functools import partial
 
-from finger_pin.commands.application import run
+from paper.conclusions import conclusions
 
-main = partial(run, "conclusions")
+from finger_pin.commands.application import run_function
+
+main = partial(run_function, conclusions)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,11 +1,13 @@
-"""The same as ``python -m finger_pin controllers``."""
+"""Compare controllers on the paper's Fig. 6."""
 
 import sys
 from functools import partial
 
-from finger_pin.commands.application import run
+from paper.controllers import controllers
 
-main = partial(run, "controllers")
+from finger_pin.commands.application import run_function
+
+main = partial(run_function, controllers)
 
 if __name__ == "__main__":
     sys.exit(main())

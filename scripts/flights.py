@@ -18,19 +18,18 @@ import numpy as np
 import pinocchio as pin
 from validation.flight_scenarios import FALLEN_ON, FALLING, FAMILIES, Flight, falls
 
-from finger_pin.control.compiled import core_signal
-from finger_pin.core.control import held_control
+from finger_pin.core.inputs import core_signal, held_control
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.stepping.textbook import Trajectory
-from finger_pin.description.palm import PathSignal
+from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.description.parameters import Link
-from finger_pin.description.routing import Array
+from finger_pin.description.placement import PathSignal
 from finger_pin.mechanism.contacts import contact_rows
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.solids import add_free_objects, link_solid, object_solids
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
 
 #: No fall takes more than so many times the steps, or the time, of that on a half-space.
 MOST_FALL = 10.0

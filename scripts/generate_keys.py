@@ -15,7 +15,7 @@ from pydantic_core import PydanticUndefined
 
 from finger_pin.commands.application import run_function
 from finger_pin.description.controller import ControllerSettings
-from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.scenario import EnvironmentSettings, Scenario
 from finger_pin.description.validation import Description
 

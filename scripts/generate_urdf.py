@@ -11,7 +11,7 @@ import typer
 
 from finger_pin.commands.application import run_function
 from finger_pin.description.loading import list_fingers, load_finger
-from finger_pin.mechanism.exchange.urdf import to_urdf
+from finger_pin.mechanism.urdf import to_urdf
 
 FOLDER = Path(__file__).resolve().parents[1] / "urdf"
 

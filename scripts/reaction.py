@@ -1,11 +1,13 @@
-"""The same as ``python -m finger_pin reaction``."""
+"""Measure the error of the joint reaction (17) along a scenario."""
 
 import sys
 from functools import partial
 
-from finger_pin.commands.application import run
+from paper.reaction import reaction
 
-main = partial(run, "reaction")
+from finger_pin.commands.application import run_function
+
+main = partial(run_function, reaction)
 
 if __name__ == "__main__":
     sys.exit(main())

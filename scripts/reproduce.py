@@ -1,11 +1,13 @@
-"""The same as ``python -m finger_pin reproduce``."""
+"""Draw the paper's figures."""
 
 import sys
 from functools import partial
 
-from finger_pin.commands.application import run
+from paper.reproduce import reproduce
 
-main = partial(run, "reproduce")
+from finger_pin.commands.application import run_function
+
+main = partial(run_function, reproduce)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.mechanism.finger_like import as_finger, description_of
+from finger_pin.mechanism.coerce import as_finger, description_of
 from finger_pin.simulation.energy import entries
 from finger_pin.studies.fingerprint import finger_digest
 

@@ -11,11 +11,12 @@ import scipy
 
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.routing import Array, ForceClosure
+from finger_pin.description.routing import ForceClosure
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
+from finger_pin.typing import Array
 
 # Postures from which the search for the worst goes on.
 _DEEPER = 3

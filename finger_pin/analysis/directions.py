@@ -9,8 +9,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.typing import Array
 
 # A mean nearer to the origin than this is there: rows of length one cancel but for rounding.
 _TOUCHING = 1e-7

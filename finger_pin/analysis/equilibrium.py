@@ -9,13 +9,13 @@ import numpy as np
 import scipy
 
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.tree import STATEFUL, STATELESS
+from finger_pin.typing import Array
 
 # Of an angle, rad, for differences.
 _SHIFT = 1e-7
@@ -133,8 +133,8 @@ def _refuse_restless(finger: Finger) -> None:
     """Refuse a finger that is no single one, or has parts whose rest inputs alone do not say."""
     description, tables = finger.description, finger.mechanism.rows
     driven = any(table.pulls and table.group != "tension_sources" for table in tables)
-    own = any(table.states for table in finger.made_of[1])
-    if description.hand is not None or driven or finger.layout.objects or own:
+    own = any(table.states for table in finger.constructor_args[1])
+    if description.hand is not None or driven or finger.layout.names_of("object_pose") or own:
         raise InputError("finger", "must be one finger with ideal sources of tension, without free objects")
     for name, each in (description.tree.actuators if description.tree is not None else {}).items():
         if each.integrates or each.integral:

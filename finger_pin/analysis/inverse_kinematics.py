@@ -11,13 +11,13 @@ import scipy
 
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.hand import one_finger
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import one_finger
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
-from finger_pin.mechanism.pieces import path_kinematics
+from finger_pin.mechanism.path_elements import path_kinematics
+from finger_pin.typing import Array
 
 # A fingertip this close, m, is there.
 _THERE = 1e-6

@@ -14,18 +14,19 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.control import held_control
+from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.tableaus import rodas5p
-from finger_pin.description.family import Family
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import as_finger
+from finger_pin.typing import Array
 
 # Central differences of sixth order: where to look, in steps, and weights.
 _OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
@@ -76,10 +77,8 @@ def linearise(
     else:
         scenario = load_scenario(finger_or_scenario)
         finger = _built(scenario)
-    if finger.layout.objects:
-        raise InputError(
-            "scenario.environment.objects", "a free object has no linear coordinates", finger.layout.objects
-        )
+    if objects := (finger.scene.free if finger.scene else {}):
+        raise InputError("scenario.environment.objects", "a free object has no linear coordinates", tuple(objects))
     if dt is not None and not 0.0 < dt < np.inf:
         raise InputError("dt", "must be above 0", dt)
     if parameters and scenario is None:
@@ -96,7 +95,7 @@ def linearise(
     by_parameter = [np.zeros((len(each), 0)) for each in by_state]
     if parameters:
         assert scenario is not None
-        family = Family(scenario, tuple(parameters))
+        family = ParametrisedScenario(scenario, tuple(parameters))
         for key, value in zip(parameters, family.values, strict=True):
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise InputError(key, "must be a single number of the scenario", value)
@@ -110,8 +109,8 @@ def _at_state(map_: _Map, finger: Finger, u: Array, x: Array) -> Array:
     return map_(finger, x, u)
 
 
-def _at_values(map_: _Map, family: Family, x: Array, u: Array, values: Array) -> Array:
-    return map_(_built(family.at(values.tolist())), x, u)
+def _at_values(map_: _Map, family: ParametrisedScenario, x: Array, u: Array, values: Array) -> Array:
+    return map_(_built(family.with_values(values.tolist())), x, u)
 
 
 def _built(scenario: Scenario) -> Finger:
@@ -145,12 +144,11 @@ def _over(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
         stepper = Stepper(mechanism, control, start, rodas5p(), _TIGHT, atol)
         stepper.hold(inputs)
         if ends is not None:
-            stepper.repeat(ends)
+            stepper.repeat([Steps.whole(each) for each in ends])
         found = integrate_compiled(stepper, dt, other.layout.names)
         if found.failure:
             raise InputError("state", f"cannot be integrated over dt: {found.failure}")
-        taken = list(found.ends) or [found.breakpoints]
-        return stepper.x, taken
+        return stepper.x, [each.ends for each in found.steps]
 
     # At rest nothing moves, and one step would do: those of a motion nearby follow what a change sets off.
     ends = stepped(finger, x + _NEARBY * finger.layout.scales(), u, None)[1]

@@ -41,10 +41,10 @@ from itertools import product
 
 import numpy as np
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.typing import Array
 
 _REAL = 1e-9
 _SINGULAR = 1e-12

@@ -12,12 +12,12 @@ from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.references.reference import LoopReference, SignalReference
+from finger_pin.typing import Array
 
 #: Below this margin a simulation warns: friction then multiplies tensions about sixfold.
 CLOSE_TO_LOCKING = 1.2

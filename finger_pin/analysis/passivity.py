@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.validation import Numbers, expand
 from finger_pin.laws.bristle import passive_micro_damping
+from finger_pin.typing import Array
 
 
 def micro_damping_advice(finger: FingerDescription) -> str:

@@ -27,10 +27,10 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.routing import Array
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.geometry import Groove, TendonGeometry
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)

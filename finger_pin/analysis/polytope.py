@@ -12,9 +12,9 @@ import scipy
 
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.typing import Array
 
 _RANK = 1e-6
 _FLAT = 1e-7

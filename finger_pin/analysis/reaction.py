@@ -15,12 +15,12 @@ import xarray as xr
 
 from finger_pin.analysis.pin_wrench import pin_wrench
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.embedded import described
-from finger_pin.description.hand import one_finger
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import one_finger
+from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import Groove
+from finger_pin.typing import Array
 
 _MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 
@@ -140,7 +140,7 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
     Raises:
         InputError: If something is missing in the result, or a joint carries no link.
     """
-    description = described(result.attrs).finger
+    description = read_scene(result.attrs).finger
     one_finger(description)
     finger = Finger(description)
     position, velocity, acceleration = (_values(result, name) for name in _MOTION)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
-from finger_pin.mechanism.finger_like import FingerLike, as_finger, description_of
+from finger_pin.mechanism.coerce import FingerLike, as_finger, description_of
+from finger_pin.typing import Array
 
 
 def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float, ...]:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.routing import Array
 from finger_pin.laws.bristle import friction_coefficient
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import loss_share, stribeck_share
 from finger_pin.mechanism.actuators import Actuators
-from finger_pin.mechanism.finger_like import FingerLike, description_of
+from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)

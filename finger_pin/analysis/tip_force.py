@@ -19,11 +19,11 @@ from finger_pin.analysis.tip_statics import (
     posture,
     slips,
 )
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -38,12 +38,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from finger_pin.description.hand import one_finger
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import one_finger
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
 
 #: What scipy's linear programmes report.
 INFEASIBLE, UNBOUNDED = 2, 3

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from finger_pin.analysis.directions import sliding_velocity
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.typing import Array
 
 # Since its last reversal a tendon has slid by this many bristle lengths F^n M / s0: exp(-5) from steady sliding.
 _SETTLED = 5.0

@@ -14,19 +14,7 @@ from typing import Any
 
 import typer
 
-from finger_pin.commands import (
-    conclusions,
-    controllers,
-    export,
-    force_capability,
-    identify,
-    optimise,
-    reaction,
-    reproduce,
-    self_locking,
-    simulate,
-    sweep,
-)
+from finger_pin.commands import export, force_capability, identify, optimise, self_locking, simulate, sweep
 from finger_pin.commands.console import Unsuccessful, complain
 from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, StudyError
 
@@ -39,13 +27,9 @@ COMMANDS = (
     sweep.sweep,
     optimise.optimise,
     identify.identify,
-    conclusions.conclusions,
-    controllers.controllers,
-    reaction.reaction,
     self_locking.self_locking,
     force_capability.force_capability,
     export.export,
-    reproduce.reproduce,
 )
 
 

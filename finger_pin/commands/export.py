@@ -11,7 +11,7 @@ from finger_pin.commands.console import print_text
 from finger_pin.commands.options import Settings, overrides, wrong
 
 if TYPE_CHECKING:
-    from finger_pin.description.parameters import FingerDescription
+    from finger_pin.description.finger import FingerDescription
     from finger_pin.description.scenario import Scenario
 
 #: What a file's name may end with.
@@ -76,11 +76,11 @@ def described(source: str, settings: list[str]) -> FingerDescription | Scenario:
 
 def written(described: FingerDescription | Scenario, ending: str) -> str:
     """Return a description as the text of a file."""
-    from finger_pin.description.hand import one_finger
+    from finger_pin.description.finger import one_finger
     from finger_pin.description.loading import to_toml
     from finger_pin.description.scenario import Scenario
-    from finger_pin.mechanism.exchange.mjcf import to_mjcf
-    from finger_pin.mechanism.exchange.urdf import to_urdf
+    from finger_pin.exchange.mjcf import to_mjcf
+    from finger_pin.mechanism.urdf import to_urdf
 
     if ending == ".toml":
         return to_toml(described)

@@ -31,7 +31,7 @@ def identify(
     BENCH has a table [identify]: which numbers, and which columns of which files. The same command again goes on where
     an earlier one was interrupted. For example: identify transmission
     """
-    from finger_pin.studies.identification.identifying import identify
+    from finger_pin.identification.identify import identify
 
     if listed:
         print_text(_listing())

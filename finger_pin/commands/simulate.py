@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,7 +32,6 @@ def simulate(
         Path | None, typer.Option(metavar="DIR", help="Where results go; default results/<scenario and overrides>.")
     ] = None,
     view: Annotated[bool, typer.Option(help="Open the viewer and play the result.")] = False,
-    live: Annotated[bool, typer.Option("--live", help="Watch while it computes, at most in real time.")] = False,
     figures: Figures = True,
     format: Format = None,
     check: Annotated[
@@ -60,7 +58,7 @@ def simulate(
         if check:
             tightened(loaded)
         with ResultFolder(output) as folder:
-            result, problem = compute(loaded, interrupts, quiet, live, check)
+            result, problem = compute(loaded, interrupts, quiet, check)
             if result is None:
                 assert problem is not None
                 problem.add_note("nothing was computed")
@@ -87,9 +85,10 @@ def simulate(
 
 def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
     """Return a scenario that moves the hand of a MuJoCo model; print the elements that are not carried over."""
-    from finger_pin.description.exercise import exercise
+    from finger_pin.description.demo_motion import demo_motion
     from finger_pin.description.loading import read_scenario
-    from finger_pin.mechanism.exchange.from_mujoco import LeftOutWarning, from_mujoco
+    from finger_pin.exceptions import LeftOutWarning
+    from finger_pin.exchange.from_mujoco import from_mujoco
 
     with warnings.catch_warnings():
         if not quiet:
@@ -99,7 +98,7 @@ def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
     assert description.tree is not None
     if not quiet and description.tree.left_out:
         print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))
-    return read_scenario(exercise(description), changed)
+    return read_scenario(demo_motion(description), changed)
 
 
 def default_name(scenario: Scenario, settings: list[str], duration: str | None, method: str | None) -> str:
@@ -109,23 +108,18 @@ def default_name(scenario: Scenario, settings: list[str], duration: str | None, 
 
 
 def compute(
-    scenario: Scenario, interrupts: Interrupts, quiet: bool, live: bool, check: bool
+    scenario: Scenario, interrupts: Interrupts, quiet: bool, check: bool
 ) -> tuple[xr.Dataset | None, BaseException | None]:
     """Return the result as far as it goes, its convergence if asked, and the exception that stopped it, or None."""
     from finger_pin.simulation.convergence import check_convergence
     from finger_pin.simulation.running import run
 
-    if live:
-        from finger_pin.views.viewer import LiveView
-
-        watched = LiveView(scenario.finger, title=scenario.title)
     bar = progress_bar(talks(quiet), scenario.simulation.duration)
-    with bar as progress, watched if live else nullcontext() as viewer, interrupts.patient(), warnings.catch_warnings():
+    with bar as progress, interrupts.patient(), warnings.catch_warnings():
         # The summary says what it would say.
         warnings.simplefilter("ignore", ScenarioWarning)
-        observe = viewer.observe if viewer else None
         try:
-            whole = run(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested)
+            whole = run(scenario, progress=progress, stop=lambda: interrupts.requested)
         except (IntegrationError, Interrupted) as error:
             return error.result, error
         if not check:

@@ -7,11 +7,10 @@ passive tendons' tension (`PassiveTensionLoop`). `build_controller` makes them f
 
 from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
-from finger_pin.control.distribution import Plan, PseudoInverse, TensionDistribution
-from finger_pin.control.joint_compensation import JointCompensation
-from finger_pin.control.measurement import Instant, SampledSensor
+from finger_pin.control.distribution import PseudoInverse, TensionAllocation, TensionDistribution
+from finger_pin.control.interface import Instant, SampledSensor
 from finger_pin.control.passive_loop import PassiveTensionLoop
-from finger_pin.control.tendon_feedforward import TendonFeedforward
+from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
 
 __all__ = [
@@ -19,10 +18,10 @@ __all__ = [
     "Instant",
     "JointCompensation",
     "PassiveTensionLoop",
-    "Plan",
     "PseudoInverse",
     "SampledSensor",
     "TendonFeedforward",
+    "TensionAllocation",
     "TensionDistribution",
     "TorqueLaw",
     "build_controller",

@@ -4,37 +4,32 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from finger_pin.analysis import closure_over_range, critical_friction
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.distribution import PseudoInverse, TensionDistribution
-from finger_pin.control.fingertip import FingertipForce
-from finger_pin.control.hand import joined_controller
-from finger_pin.control.joint_compensation import JointCompensation
-from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.passive_loop import PassiveTensionLoop
-from finger_pin.control.proportional import ProportionalController
-from finger_pin.control.routed import RoutedController
-from finger_pin.control.tendon_feedforward import TendonFeedforward
-from finger_pin.control.torque import TorqueLaw
+from finger_pin.control.proportional import ProportionalController, RoutedController
+from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward
+from finger_pin.control.torque import FingertipForce, TorqueLaw
 from finger_pin.description.by_finger import of_finger
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.description.validation import Numbers, expand
 from finger_pin.exceptions import ClosureWarning, InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
-
-_PAPERS: Remembered[LoopController] = Remembered()
+from finger_pin.typing import Array
 
 
 def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> LoopController:
@@ -58,7 +53,14 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     papers = all((of_finger(given, name) if given.fingers else given).is_paper for name in fingers or ("",))
     if papers and routing.force_closure().holds:
         # Of its finger the paper's knows the routing alone.
-        return _PAPERS.of((given, routing, *fingers), partial(_built, scenario, routing, finger))
+        return _paper(scenario, routing, finger)
+    return _built(scenario, routing, finger)
+
+
+@memoised(
+    lambda scenario, routing, finger: (scenario.controller, routing, *(scenario.hand.fingers if scenario.hand else ()))
+)
+def _paper(scenario: Scenario, routing: Routing, finger: Finger | None) -> LoopController:
     return _built(scenario, routing, finger)
 
 
@@ -116,7 +118,7 @@ def _distribution(scenario: Scenario, finger: Finger) -> TensionDistribution:
     if limits is None and finger.routing.force_closure().holds:
         return PseudoInverse.from_routing(finger.routing)
     # Importing the solver takes a while: only where there are limits.
-    from finger_pin.control.limited_distribution import LimitedDistribution
+    from finger_pin.control.distribution import LimitedDistribution
 
     maximum = math.inf if limits is None else limits.maximum_tension
     return LimitedDistribution(finger.routing, expand(maximum, len(finger.routing.tendons)))
@@ -172,3 +174,59 @@ def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:
 
 def _belief(given: Numbers | None, actual: Array) -> Array:
     return actual if given is None else expand(given, len(actual))
+
+
+def joined_controller(controllers: Sequence[LoopController], routing: Routing) -> LoopController:
+    """Return the controller of a hand from those of its fingers, in the order of the routing's.
+
+    Where all are of a kind that can be joined, such as the paper's, so is the whole, and is compiled like them.
+    """
+    kind, *others = {type(each) for each in controllers}
+    joined = None if others else kind.joined(controllers, routing)
+    return joined or HandController(controllers, routing)
+
+
+class HandController(LoopController):
+    """Controllers of any kind, one for each finger.
+
+    Attributes:
+        controllers: In the order of the routing's fingers.
+        routing: Of the hand.
+    """
+
+    def __init__(self, controllers: Sequence[LoopController], routing: Routing) -> None:
+        """Put controllers side by side."""
+        self.controllers, self.routing = tuple(controllers), routing
+        self.needs_sensors = any(each.needs_sensors for each in controllers)
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return the commands of all for shapes (..., n)."""
+        torque, lead = np.zeros_like(position), position.shape[:-1]
+        tension, torque_deficit = np.zeros((*lead, len(self.routing.tendons))), np.zeros_like(position)
+        limited = False
+        for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
+            desired = ReferenceSignals(reference.position[..., joints], reference.velocity[..., joints])
+            own = controller.command(time, desired, position[..., joints], velocity[..., joints])
+            torque[..., joints], tension[..., tendons] = own.torque, own.tension
+            if own.torque_deficit is not None:
+                limited = True
+                torque_deficit[..., joints] = own.torque_deficit
+        return ControlSignals(torque, tension, torque_deficit if limited else None)
+
+    def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
+        """Pass on the readings of each finger's sensors, with the time since the last ones, s."""
+        for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
+            of = {"tendon_tension": tendons, "joint_position": joints, "joint_velocity": joints}
+            controller.sense({name: readings[name][places] for name, places in of.items()}, elapsed)
+
+    def signals(self) -> tuple[Signal, ...]:
+        """Return the signals that any of them follows."""
+        return tuple(signal for each in self.controllers for signal in each.signals())
+
+    def stateless(self) -> HandController | None:
+        """Return the controllers that remember nothing, side by side, if there is one of each."""
+        own = [each.stateless() for each in self.controllers]
+        known = [each for each in own if each is not None]
+        return HandController(known, self.routing) if len(known) == len(own) else None

@@ -2,68 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
-from finger_pin.control.compiled import Bindings
-from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.moved_objects import Guides
-from finger_pin.control.palm import PalmPath
+from finger_pin.control.interface import Controller, ControlSignals, Dynamics, LoopController
+from finger_pin.control.palm import PalmPath, PrescribedObjects
 from finger_pin.control.position_drive import DriveSignals
-from finger_pin.control.proportional import Controller, ControlSignals
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
-from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
+from finger_pin.core.compiled_fingers import Bindings
+from finger_pin.core.inputs import InputTable, core_signal, held_control
+from finger_pin.description.caching import memoised
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.kinematics import Motion
+from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
 
 _NO_FORCE = ForceSignal()
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
 
-# Nothing of a finger changes in a run: those of a scenario that is run again share it.
-_FINGERS: Remembered[Finger] = Remembered(4)
-# Likewise of signals, which runs that are prepared share.
-_KNOTS: Remembered[Array] = Remembered(16)
 
 _Acting = tuple[Array, Array, Array | None]
 
 
-class Dynamics(Protocol):
-    """An evaluator of a finger: `Finger`, or the compiled core."""
+# Nothing of a finger changes in a run: those of a scenario that is run again share it.
+@memoised(lambda scenario: (scenario.finger, scenario.environment), most=4)
+def _finger(scenario: Scenario) -> Finger:
+    return Finger(scenario.finger, objects=scenario.environment.objects)
 
-    def evaluate(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return all signals at packed states under given tensions, on a base that moves or rests."""
 
-    def exerted(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the same, if that is sooner without accelerations."""
-
-    def forces(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the same, if that is sooner with no more than forces."""
-
-    def powers(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Return powers of the rows, and J^T F."""
-
-    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
-        """Return fingertip and energies of the rigid body."""
+# Runs that are prepared share their signals.
+@memoised(lambda signals, tolerance: (*signals, tolerance), most=16)
+def _knots(signals: Sequence[Signal], tolerance: float) -> Array:
+    return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +80,7 @@ class ClosedLoop:
     start: Array | None = None
     drives: DriveSignals | None = None
     palm: PalmPath | None = None
-    guides: Guides | None = None
+    guides: PrescribedObjects | None = None
 
     @classmethod
     def from_scenario(
@@ -127,8 +106,7 @@ class ClosedLoop:
                 or are not finite, or tensions are negative.
         """
         start, acting = scenario.simulation.start_time, scenario.environments()
-        parts = scenario.finger, scenario.environment
-        finger = finger or _FINGERS.of(parts, lambda: Finger(scenario.finger, objects=scenario.environment.objects))
+        finger = finger or _finger(scenario)
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
             ("tendons", finger.routing.tendons, scenario.finger.tendons),
@@ -143,7 +121,7 @@ class ClosedLoop:
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
             palm=PalmPath.of(scenario.hand, start, finger, scenario.simulation.rtol),
-            guides=Guides.of(finger, start, scenario.simulation.rtol),
+            guides=PrescribedObjects.of(finger, start, scenario.simulation.rtol),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:
@@ -167,7 +145,7 @@ class ClosedLoop:
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
         """Return the packed state at a posture, with tendons on spools stretched by the tensions commanded there."""
-        controller, tension = self.controller.without_memory(), None
+        controller, tension = self.controller.stateless(), None
         if self.finger.actuators.names and controller is not None:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
@@ -202,10 +180,7 @@ class ClosedLoop:
         guided = [each and each.signal for each in (self.palm, self.guides)]
         other = [each for each in (self.varying_force, *guided) if each]
         signals = (*self.reference.signals(), *self.controller.signals(), *other)
-        return _KNOTS.of(
-            (*signals, tolerance),
-            lambda: np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)])),
-        ).copy()
+        return _knots(signals, tolerance).copy()
 
     def longest_step(self, tolerance: float) -> float:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
@@ -247,9 +222,9 @@ class ClosedLoop:
 
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips, base frame, and energies in the world at times (m,) and states."""
-        base, around, objects = self.base(time), self.finger.surroundings, None
+        base, around, objects = self.base(time), self.finger.scene, None
         found = self.dynamics.motion(state.position, state.velocity, base)
-        if around is not None and state.object_pose is not None and state.object_velocity is not None:
+        if around is not None:
             objects = around.energies(state.object_pose, state.object_velocity, base)
         if self.palm is not None:
             higher = found.potential_energy + self.palm.lifted(time, self.finger.rigid_body.mass)
@@ -268,3 +243,31 @@ class ClosedLoop:
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""
         return self.evaluate(time, x).finger.rate
+
+
+def compiled_control(loop: ClosedLoop) -> InputTable | None:
+    """Return a loop's controller, reference and varying force as arrays, or None if the first two are Python."""
+    if len(loop.finger.actuators.positioned) == loop.finger.mechanism.channels:
+        # Nothing of what the controller plans goes to the finger at once.
+        return sampled_control(loop)
+    control = loop.controller.as_control(loop.reference, loop.finger)
+    return None if control is None else with_force(control, loop)
+
+
+def sampled_control(loop: ClosedLoop) -> InputTable:
+    """Return inputs that hold the commands of a sampled controller, with the loop's varying force."""
+    mechanism = loop.finger.mechanism
+    return with_force(held_control(mechanism.channels, mechanism.coordinates), loop)
+
+
+def with_force(control: InputTable, loop: ClosedLoop) -> InputTable:
+    """Return inputs with the path of the palm and the force at the fingertip, its varying and its constant part."""
+    if loop.palm is not None:
+        control = control._replace(palm=core_signal(loop.palm.signal))
+    if loop.guides is not None:
+        control = control._replace(guide=core_signal(loop.guides.signal))
+    if loop.varying_force is None:
+        return control
+    force = core_signal(loop.varying_force)
+    force.harmonics[:, 0] += loop.fingertip_force.ravel()
+    return control._replace(force=force)

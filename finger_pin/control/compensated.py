@@ -6,16 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.control.distribution import Plan, TensionDistribution
-from finger_pin.control.fingertip import FingertipForce
-from finger_pin.control.joint_compensation import JointCompensation
-from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.tendon_feedforward import TendonFeedforward, undivided
-from finger_pin.control.torque import TorqueLaw
-from finger_pin.description.routing import Array, Routing
+from finger_pin.control.distribution import TensionAllocation, TensionDistribution
+from finger_pin.control.interface import ControlSignals, LoopController
+from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward, undivided
+from finger_pin.control.torque import FingertipForce, TorqueLaw
+from finger_pin.description.routing import Routing
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
 
 # Newton's method converges in a few iterations; if it cycles, plain iteration takes over.
 _SETTLED, _NEWTON, _TURNS = 1e-9, 20, 200
@@ -57,7 +55,7 @@ class CompensatedController(LoopController):
         """Return the functions of time of the wanted fingertip force."""
         return () if self.fingertip is None else (self.fingertip.wanted,)
 
-    def without_memory(self) -> CompensatedController:
+    def stateless(self) -> CompensatedController:
         """Return itself: it remembers nothing."""
         return self
 
@@ -77,9 +75,11 @@ class CompensatedController(LoopController):
         command = plan.tension
         if self.tendons is not None:
             command = self.tendons.command(command, position, reference.velocity)
-        return ControlSignals(wanted, command, plan.shortfall)
+        return ControlSignals(wanted, command, plan.torque_deficit)
 
-    def _closed(self, wanted: Array, matrix: Array, minimum: Array, plan: Plan) -> tuple[Array, Plan]:
+    def _closed(
+        self, wanted: Array, matrix: Array, minimum: Array, plan: TensionAllocation
+    ) -> tuple[Array, TensionAllocation]:
         """Return the torque and the plan that agree: tau = wanted + matrix f_hat, and f_hat is the plan for tau.
 
         Newton's method: between changes of the tendons that are at a limit, all is linear.

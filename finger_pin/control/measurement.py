@@ -2,72 +2,17 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from finger_pin.description.routing import Array
+from finger_pin.control.interface import Instant, SampledSensor
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.state import State
+from finger_pin.typing import Array
 
 if TYPE_CHECKING:
-    from finger_pin.control.closed_loop import ClosedLoop
-    from finger_pin.mechanism.finger_signals import FingerSignals
-
-
-@dataclass(frozen=True, eq=False)
-class Instant:
-    """A finger at a sample, under the tensions that act until then.
-
-    Attributes:
-        loop: The finger under control.
-        time: s.
-        x: The packed state, shape (size,).
-        tension: Of the actuated tendons, zero before the first sample, shape (a,), N.
-    """
-
-    loop: ClosedLoop
-    time: float
-    x: Array
-    tension: Array
-
-    @cached_property
-    def state(self) -> State:
-        """The state by name."""
-        return self.loop.finger.layout.unpack(self.x)
-
-    @cached_property
-    def signals(self) -> FingerSignals:
-        """All signals of the finger; of motors in position drive without their voltages."""
-        loop = self.loop
-        return loop.dynamics.evaluate(self.x, self.tension, loop.force(self.time), loop.base(self.time))
-
-
-class SampledSensor(ABC):
-    """A sensor of a sampled controller: its readings are recorded, and passed to a controller with `sense`.
-
-    A controller of one's own names its own in ``sensors``. One object belongs to one simulation: it may remember.
-
-    Attributes:
-        name: In a result it follows ``measured_``.
-        units: Of what it reads.
-        dimension: Of its values, ``joint`` and ``tendon`` among others; empty for one number.
-        labels: Names along a dimension of its own.
-    """
-
-    name: ClassVar[str]
-    units: ClassVar[str] = "1"
-    dimension: ClassVar[str] = ""
-    labels: tuple[str, ...] = ()
-
-    @abstractmethod
-    def read(self, now: Instant) -> ArrayLike:
-        """Return its values: one number, or shape (k,)."""
+    pass
 
 
 def readings(sensors: Sequence[SampledSensor], now: Instant) -> dict[str, Array]:

@@ -9,11 +9,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.control.compiled import core_signal
-from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.proportional import ControlSignals
-from finger_pin.core.control import Control, scheduled_control
-from finger_pin.description.routing import Array, Routing
+from finger_pin.control.interface import ControlSignals, LoopController
+from finger_pin.core.inputs import InputTable, core_signal, scheduled_control
+from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import ForceSignal, InputSignal, SignalSettings
 from finger_pin.description.validation import expand
@@ -21,6 +19,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, ReferenceSignals
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +84,7 @@ class OpenLoopTensions(LoopController):
             inputs=given[..., actuated:],
         )
 
-    def as_control(self, reference: LoopReference, finger: Finger) -> Control:
+    def as_control(self, reference: LoopReference, finger: Finger) -> InputTable:
         """Return the schedule as inputs, but for motors in position drive, which pull as their loops say."""
         schedule, positioned = core_signal(self.signal), finger.actuators.positioned
         schedule.harmonics[positioned] = 0.0
@@ -96,7 +95,7 @@ class OpenLoopTensions(LoopController):
         """Return the schedule."""
         return (self.signal,)
 
-    def without_memory(self) -> OpenLoopTensions:
+    def stateless(self) -> OpenLoopTensions:
         """Return itself: it remembers nothing."""
         return self
 

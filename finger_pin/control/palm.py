@@ -6,12 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.hand import HandSettings
-from finger_pin.description.palm import PATH
-from finger_pin.description.routing import Array
-from finger_pin.laws.palm import base_motion
+from finger_pin.description.finger import HandSettings
+from finger_pin.description.objects import PATH as OBJECT_PATH
+from finger_pin.description.placement import PATH, PathSignal
+from finger_pin.laws.inputs import base_motion
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.scene import POSE, VELOCITY
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
+
+_STILL = PathSignal()
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +43,7 @@ class PalmPath:
         if hand is None or hand.palm.path is None:
             return None
         settings = [hand.palm.on_path(name) for name in PATH]
-        carries = finger is not None and bool(finger.layout.world)
+        carries = finger is not None and bool(finger.layout.names_of("world_position"))
         return cls(Signal.from_settings(settings, tolerance).later(start), np.array(hand.gravity), carries)
 
     def place(self, time: Array | float) -> tuple[Array, Array]:
@@ -57,7 +61,6 @@ class PalmPath:
         """Return a packed state with the world's placement at the start, seen from the palm."""
         if self.carries:
             state = finger.layout.unpack(x)
-            assert state.world_position is not None and state.world_velocity is not None
             state.world_position[:], state.world_velocity[:] = (self._world(order, 0.0) for order in range(2))
         return x
 
@@ -85,3 +88,50 @@ class PalmPath:
     def lifted(self, time: Array, mass: float) -> Array:
         """Return the potential energy that a mass gains with the palm's height at times (m,), J."""
         return np.asarray(-mass * self.place(time)[0] @ self.gravity)
+
+
+@dataclass(frozen=True, eq=False)
+class PrescribedObjects:
+    """The paths of k objects.
+
+    Attributes:
+        signal: Of each its displacement along x, y, z, m, and three turns, which are zero: 6 k functions of time.
+        places: Which of the objects that move they are, shape (k,).
+        gravity: In the base frame, shape (3,), m/s2.
+    """
+
+    signal: Signal
+    places: Array
+    gravity: Array
+
+    @classmethod
+    def of(cls, finger: Finger, start: float, tolerance: float) -> PrescribedObjects | None:
+        """Return the paths of the moved objects around a finger from a time on, s, or None.
+
+        The tolerance is that of `Signal.from_settings`.
+        """
+        around = finger.scene
+        paths = {} if around is None else {name: each.path for name, each in around.free.items() if each.path}
+        if around is None or not paths:
+            return None
+        settings = [path.get(axis, _STILL) for path in paths.values() for axis in (*OBJECT_PATH, "", "", "")]
+        names = list(around.free)
+        places = np.array([names.index(name) for name in paths])
+        return cls(
+            Signal.from_settings(settings, tolerance).later(start), places, np.array(around.body.model.gravity.linear)
+        )
+
+    def place(self, finger: Finger, x: Array) -> Array:
+        """Return a packed state with the objects at the beginnings of their paths."""
+        state = finger.layout.unpack(x)
+        value, rate = (each.reshape(-1, 6)[:, :3] for each in self.signal.at(0.0))
+        state.object_pose.reshape(-1, POSE)[self.places, :3] += value
+        state.object_velocity.reshape(-1, VELOCITY)[self.places, :3] = rate
+        return x
+
+    def base(self, time: Array | float) -> Array:
+        """Return the 27 numbers of `base_motion` for a base at rest, and the 6 k accelerations, at times (...)."""
+        acceleration = self.signal.derivative(time, 2)
+        rest = np.zeros((*np.shape(time), 27))
+        rest[..., 9:12], rest[..., 12:15] = -self.gravity, self.gravity
+        return np.concatenate([rest, acceleration], axis=-1)

@@ -7,10 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from finger_pin.control.compensated import CompensatedController
-from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.proportional import ControlSignals
-from finger_pin.description.routing import Array
+from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.references.reference import ReferenceSignals
+from finger_pin.typing import Array
 
 
 class PassiveTensionLoop(LoopController):
@@ -34,7 +33,7 @@ class PassiveTensionLoop(LoopController):
         correction: k_P e + I at present, shape (p,), N.
     """
 
-    measures = True
+    needs_sensors = True
 
     def __init__(
         self, controller: CompensatedController, wish: Array, proportional: float, integral: float, limit: float
@@ -55,7 +54,7 @@ class PassiveTensionLoop(LoopController):
         self._sum = np.clip(self._sum + self.integral * elapsed * error, lowest, self.limit)
         self.correction = self.proportional * error + self._sum
 
-    def without_memory(self) -> CompensatedController:
+    def stateless(self) -> CompensatedController:
         """Return the controller inside, without the correction."""
         return self.controller
 

@@ -15,14 +15,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.control.proportional import Controller, ControlSignals
+from finger_pin.control.interface import Controller, ControlSignals
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.description.actuators import Actuator
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
 
 
 class DriveSignals(Protocol):

@@ -4,46 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.control.compiled import core_signal
-from finger_pin.control.loop_controller import LoopController
-from finger_pin.core.control import Control, planned_control
-from finger_pin.description.routing import Array, Routing
+from finger_pin.control.interface import ControlSignals, LoopController
+from finger_pin.control.torque import TorqueLaw
+from finger_pin.core.inputs import InputTable, core_signal, planned_control
+from finger_pin.description.routing import ForceClosure, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
-from finger_pin.laws.controller import internal_level, proportional_torque
+from finger_pin.laws.inputs import internal_level, proportional_torque
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, ReferenceSignals
-
-
-@dataclass(frozen=True, eq=False)
-class ControlSignals:
-    """The commands of a controller.
-
-    Attributes:
-        torque: tau^d, shape (..., n), N m.
-        tension: f_hat, shape (..., t), N: commands of the actuated tendons, then the planned passive tensions.
-        shortfall: Part of tau^d beyond the tension limits, shape (..., n), N m; None without limits.
-        inputs: Of the actuators of a tree, shape (..., k); None without any.
-    """
-
-    torque: Array
-    tension: Array
-    shortfall: Array | None = None
-    inputs: Array | None = None
-
-
-class Controller(Protocol):
-    """A controller: from references and measured motion to tendon tensions."""
-
-    def command(
-        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
-    ) -> ControlSignals:
-        """Return the commands for shapes (..., n)."""
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +73,7 @@ class ProportionalController(LoopController):
             level = np.stack(fingers, axis=-1)[..., self.loop]
         return ControlSignals(torque, minimal + level * self.internal)
 
-    def as_control(self, reference: LoopReference, finger: Finger) -> Control | None:
+    def as_control(self, reference: LoopReference, finger: Finger) -> InputTable | None:
         """Return it as inputs of a finger's mechanism, whose coordinates begin with the joints.
 
         What it plans for tendons that motors in position drive pull is no input.
@@ -129,7 +103,7 @@ class ProportionalController(LoopController):
             loop=self.loop,
         )
 
-    def without_memory(self) -> ProportionalController:
+    def stateless(self) -> ProportionalController:
         """Return itself: it remembers nothing."""
         return self
 
@@ -144,3 +118,38 @@ class ProportionalController(LoopController):
             minimum[pulled], internal[pulled] = each.minimum, each.internal
             inverse[np.ix_(pulled, turned)], loop[pulled] = each.inverse, index
         return cls(gain, minimum, inverse, internal, damping, loop)
+
+
+@dataclass(frozen=True, eq=False)
+class RoutedController(LoopController):
+    """tau^d by the pseudo-inverse of H_c(theta)^T, raised by the internal tensions of the posture.
+
+    Where a posture has no force closure, tensions below f0 are raised to it alone, which turns joints.
+
+    Attributes:
+        finger: The finger.
+        law: tau^d.
+        minimum: f0, shape (t,), N.
+    """
+
+    finger: Finger
+    law: TorqueLaw
+    minimum: Array
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return tau^d and tensions for shapes (..., n)."""
+        torque = self.law.torque(reference, position, velocity)
+        flat = position.reshape(-1, position.shape[-1])
+        planned = [self._planned(*each) for each in zip(torque.reshape(flat.shape), flat, strict=True)]
+        return ControlSignals(torque, np.array(planned).reshape(*position.shape[:-1], -1))
+
+    def _planned(self, torque: Array, position: Array) -> Array:
+        coupling = self.finger.coupling_at(position)
+        minimal = np.linalg.pinv(coupling.T) @ torque
+        closure = ForceClosure.of(coupling, self.finger.routing.tendons)
+        if not closure.holds:
+            return np.maximum(minimal, self.minimum)
+        level = np.max(internal_level(self.minimum, minimal, closure.tension))
+        return np.asarray(minimal + level * closure.tension)

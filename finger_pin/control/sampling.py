@@ -7,15 +7,14 @@ import math
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.measurement import Instant, JointEncoder, JointSpeed, SampledSensor, TensionSensor, readings
-from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.interface import ControlSignals, Instant, LoopController, SampledSensor
+from finger_pin.control.measurement import JointEncoder, JointSpeed, TensionSensor, readings
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.description.controller import SamplingSettings
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.references.reference import ReferenceSignals
+from finger_pin.typing import Array
 
 # A delay this close to a multiple of the period, in periods, is one: a step between the two would be of no length.
 _COINCIDENT = 1e-9
@@ -38,7 +37,7 @@ class SampledController(LoopController):
         self.period = settings.period
         self.instant = 0.0
         self._loop = loop
-        resolution, listens = settings.encoder_resolution, loop.controller.measures
+        resolution, listens = settings.encoder_resolution, loop.controller.needs_sensors
         tension = [TensionSensor(settings.tension_noise, settings.seed)] if listens else []
         encoders = JointEncoder(resolution), JointSpeed(settings.period, resolution)
         self.sensors: tuple[SampledSensor, ...] = (*encoders, *tension, *loop.controller.sensors)
@@ -69,9 +68,9 @@ class SampledController(LoopController):
         index = np.clip(index, 0, len(self._samples) - 1)
         torques = np.array([sample.torque for sample in self._samples])
         tensions = np.array([sample.tension for sample in self._samples])
-        missing = [sample.shortfall for sample in self._samples if sample.shortfall is not None]
-        shortfall = np.array(missing)[index] if len(missing) == len(self._samples) else None
-        return ControlSignals(torques[index], tensions[index], shortfall)
+        missing = [sample.torque_deficit for sample in self._samples if sample.torque_deficit is not None]
+        torque_deficit = np.array(missing)[index] if len(missing) == len(self._samples) else None
+        return ControlSignals(torques[index], tensions[index], torque_deficit)
 
     def measured(self, name: str, times: Array) -> Array:
         """Return the last readings of a sensor at times (m,), shape (m,) or (m, k)."""
@@ -91,7 +90,7 @@ class SampledController(LoopController):
         now = Instant(loop, time, x.copy(), acting)
         found = readings(self.sensors, now)
         self._readings.append(found)
-        if controller.measures:
+        if controller.needs_sensors:
             controller.sense(found, self.period if self._samples else 0.0)
         position, velocity = (found[each.name] for each in (JointEncoder, JointSpeed))
         return controller.command(time, loop.reference.at(time), position, velocity)

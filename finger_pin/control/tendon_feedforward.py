@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from finger_pin.control.direction import direction, signed_coefficient
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Routing
+from finger_pin.laws.bristle import friction_coefficient
 from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.mechanism.joints import JointFriction
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.typing import Array
 
 # A tendon whose friction exceeds its tension cannot be moved by pulling harder: compensation stops short of that.
 _MOST = 0.9
@@ -82,3 +85,71 @@ class TendonFeedforward:
         tendons = self.tendons
         actuated = desired_velocity @ tendons.routing.actuated_coupling.T
         return np.concatenate([actuated, tendons.rest_position(desired_velocity)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class JointCompensation:
+    """tau = M(v) R direction(v) + b v, the steady sliding of (9) with the reaction (17) of the planned tensions.
+
+    No external force is known to it. The torque asks for tensions, which load the joints: the plan of the tensions
+    closes that loop.
+
+    Attributes:
+        friction: The joints' friction as it is believed to be.
+        share: Part of the friction that is compensated.
+        reversal_speed: v_r, rad/s.
+    """
+
+    friction: JointFriction
+    share: float
+    reversal_speed: float
+
+    def load_matrix(self, strand_matrix: Array, desired_velocity: Array) -> Array:
+        """Return the slope of the torque by planned tensions, shape (..., n, t), m: M(v) direction(v) dR/df_hat.
+
+        Tensions are not negative, so that without an external force R = S, the sum of those that cross the joint.
+
+        Args:
+            strand_matrix: W, shape (..., s, t); the tensions of the strands are W f_hat.
+            desired_velocity: theta^d', shape (..., n), rad/s.
+        """
+        law = self.friction
+        coefficient = signed_coefficient(
+            desired_velocity, law.kinetic, law.static, law.stribeck_velocity, law.stribeck_exponent, self.reversal_speed
+        )
+        matrix: Array = self.share * coefficient[..., None] * (law.loads @ strand_matrix)
+        return matrix
+
+    def viscous_torque(self, desired_velocity: Array) -> Array:
+        """Return b v, shape (..., n), N m."""
+        return self.share * self.friction.viscous * desired_velocity
+
+
+def direction(velocity: Any, reversal_speed: Any) -> Any:
+    """Return the direction of a desired motion, tanh(v / v_r): -1 to 1, smooth at a reversal.
+
+    The velocity is the desired one. A measured one would close a loop through the sign of a small, noisy number, and
+    chatter; a desired one passes through zero once per reversal, and the compensation moves once from one side to the
+    other. Where nothing is meant to move the direction is 0, and nothing is compensated.
+
+    Args:
+        velocity: Desired velocity v^d.
+        reversal_speed: v_r, in the unit of the velocity.
+    """
+    return np.tanh(velocity / reversal_speed)
+
+
+def signed_coefficient(
+    velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any, reversal_speed: Any
+) -> Any:
+    """Return M(v) of (9b) times the direction: the friction of steady sliding over its normal force.
+
+    Args:
+        velocity: Desired velocity v^d.
+        kinetic: M^d.
+        static: M^c.
+        stribeck: omega, in the unit of the velocity.
+        exponent: Of the Stribeck curve, 1 or 2.
+        reversal_speed: v_r, in the unit of the velocity.
+    """
+    return friction_coefficient(velocity, kinetic, static, stribeck, exponent) * direction(velocity, reversal_speed)

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
-from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.interface import Controller, ControlSignals, LoopController
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.proportional import Controller, ControlSignals
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals, SignalReference
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
 
 #: Times, shape (m,), s, and values, one row for each.
 Samples = tuple[ArrayLike, ArrayLike]
@@ -29,7 +29,7 @@ Samples = tuple[ArrayLike, ArrayLike]
 _LEAST = -1e-6
 
 
-class OwnReference:
+class UserReference:
     """A reference of one's own.
 
     Attributes:
@@ -83,7 +83,7 @@ class OwnReference:
         return ReferenceSignals(*values)
 
 
-class OwnController(LoopController):
+class UserController(LoopController):
     """A controller of one's own.
 
     It returns `ControlSignals`, or only the tensions: of all tendons, or of the actuated ones.
@@ -106,7 +106,7 @@ class OwnController(LoopController):
             )
             raise InputError("controller", allowed, type(controller).__name__)
         self.controller, self.problem, self.problem_time = controller, "", -np.inf
-        self.measures = callable(getattr(controller, "sense", None))
+        self.needs_sensors = callable(getattr(controller, "sense", None))
         self.sensors = tuple(getattr(controller, "sensors", ()))
         self._routing, self._start, self._asked = routing, start, False
 
@@ -123,7 +123,7 @@ class OwnController(LoopController):
         times = np.broadcast_to(time, len(position))
         rows = zip(times, reference.position, reference.velocity, position, velocity, strict=True)
         found = [self._one(float(t), ReferenceSignals(p, v), *motion) for t, p, v, *motion in rows]
-        missing = [each.shortfall for each in found if each.shortfall is not None]
+        missing = [each.torque_deficit for each in found if each.torque_deficit is not None]
         return ControlSignals(
             np.array([each.torque for each in found]),
             np.array([each.tension for each in found]),
@@ -168,7 +168,7 @@ class OwnController(LoopController):
             raise InputError("controller", allowed)
         # A passive tendon without a planned tension is planned to carry none.
         tension = np.append(tension, np.zeros(len(routing.tendons) - len(tension)))
-        return ControlSignals(torque, tension, getattr(found, "shortfall", None))
+        return ControlSignals(torque, tension, getattr(found, "torque_deficit", None))
 
     def _check(self, found: ControlSignals, finite: bool) -> None:
         for name, tension in zip(self._routing.tendons, found.tension, strict=True):
@@ -196,7 +196,7 @@ def choose_controller(given: Controller | Samples | None, scenario: Scenario, fi
         return OpenLoopTensions.from_samples(given, scenario, finger.routing)
     if isinstance(given, LoopController):
         return given
-    return OwnController(given, finger.routing, scenario.simulation.start_time)
+    return UserController(given, finger.routing, scenario.simulation.start_time)
 
 
 def choose_reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> LoopReference:
@@ -211,4 +211,4 @@ def choose_reference(given: Reference | Samples | None, scenario: Scenario, rout
         return SignalReference.from_samples(given, scenario, routing)
     if isinstance(given, SignalReference):
         return given
-    return OwnReference(given, routing.joints, scenario.simulation.start_time)
+    return UserReference(given, routing.joints, scenario.simulation.start_time)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.core.buffers import Work, build_linear, build_work, renew_linear, renew_work
-from finger_pin.core.control import Control, held_control
 from finger_pin.core.evaluation.condensation import condense
 from finger_pin.core.evaluation.contacts import add_pushes, fill_contact_gains, measure
 from finger_pin.core.evaluation.dynamics import evaluate, exert
@@ -18,13 +17,14 @@ from finger_pin.core.evaluation.moving_base import base_power, bias_rate, move_b
 from finger_pin.core.evaluation.path_derivatives import linearise_paths
 from finger_pin.core.evaluation.paths import look
 from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
-from finger_pin.core.jit import bound, call, copied, refill
+from finger_pin.core.inputs import InputTable, held_control
+from finger_pin.core.jit import call, copied, pack, refill
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.tables import Tables
 from finger_pin.core.threads import in_threads, threads
-from finger_pin.description.routing import Array
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import GUIDES
+from finger_pin.typing import Array
 
 #: Fewer states than this are not worth a second thread.
 FEW = 1000
@@ -87,10 +87,10 @@ class BoundModel:
 
     Attributes:
         model: Its arrays, which live as long as this.
-        address: Of what `bound_at` reads.
+        address: Of what `unpack` reads.
     """
 
-    def __init__(self, tables: Tables, control: Control, work: Work, moved: bool = False) -> None:
+    def __init__(self, tables: Tables, control: InputTable, work: Work, moved: bool = False) -> None:
         """Bind; arrays are taken as they are, not copied. The base may be ``moved`` by others than its control."""
         size = 2 * len(work.torque) + len(tables.state_row)
         moved = moved or len(control.palm.harmonics) > 0
@@ -100,12 +100,12 @@ class BoundModel:
         units += [unit.address if through_space else 0 for unit in _THROUGH_SPACE]
         units += [unit.address if moved else 0 for unit in _MOVED]
         self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
-        self._block = bound(self.model, MODEL)
+        self._block = pack(self.model, MODEL)
         # Of tables what changes in place is copied wherever it is handed over.
         self._filled: Tables | None = None
         self.address = self._block.address
 
-    def renew(self, tables: Tables, control: Control) -> None:
+    def renew(self, tables: Tables, control: InputTable) -> None:
         """Take the numbers of other tables and another control, which fit, into the arrays that are bound."""
         own = self.model
         refill(own.tables, tables, self._filled)

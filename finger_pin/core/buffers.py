@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.control import Control
 from finger_pin.core.evaluation.law_code import SLOPES, widest
 from finger_pin.core.evaluation.rigid_body import SPATIAL_LAYERS, SQUARE_LAYERS
+from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import PathWork, build_path_work
 from finger_pin.core.stepping.islands import find_islands
@@ -161,7 +161,7 @@ class Blocks(NamedTuple):
     current: Indices
 
 
-def build_blocks(tables: Tables, control: Control) -> Blocks:
+def build_blocks(tables: Tables, control: InputTable) -> Blocks:
     """Return the blocks of tables while nothing touches."""
     count, width, states = len(tables.state), len(tables.guided), len(tables.state_row)
     atom, row_atom, atoms = np.zeros(width, dtype=np.int64), np.zeros(count, dtype=np.int64), 1
@@ -254,7 +254,7 @@ class Linear(NamedTuple):
     blocks: Blocks
 
 
-def build_linear(tables: Tables, control: Control) -> Linear:
+def build_linear(tables: Tables, control: InputTable) -> Linear:
     """Allocate the linearisation of tables."""
     count, width, states = len(tables.state), len(tables.guided), len(tables.state_row)
     wide = 2 * width + states + 1

@@ -19,10 +19,10 @@ from finger_pin.core.evaluation.rigid_body import (
     ROTATION,
     TRANSLATION,
 )
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import FREE_JOINTS, RigidBody
 from finger_pin.mechanism.solids import WORLD
+from finger_pin.typing import Array
 
 # Less of a unit axis is rounding.
 _STILL = 1e-8

@@ -11,16 +11,16 @@ from finger_pin.core.bound_models import FEW, Models, Room, fill, path_motions, 
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
-from finger_pin.core.jit import Block, alike, bound, fits
+from finger_pin.core.jit import Block, alike, fits, pack
 from finger_pin.core.tables import build_tables
-from finger_pin.description.routing import Array
 from finger_pin.laws.contact import CONTACT
-from finger_pin.mechanism.evaluation import Evaluation, Touching
+from finger_pin.mechanism.evaluation import ContactPoints, Evaluation
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import RowSignals
+from finger_pin.typing import Array
 
 _Asked = tuple[Motions, Array, Block]
 
@@ -136,7 +136,7 @@ class CompiledMechanism:
             rate[at],
             base_power=room.booked[at][..., -1:] if mechanism.moved else None,
             booked=room.booked[at],
-            touching=Touching(*np.split(room.touches[at], 3, axis=-1)) if room.touches.size else None,
+            touching=ContactPoints(*np.split(room.touches[at], 3, axis=-1)) if room.touches.size else None,
         )
 
     def powers(
@@ -192,7 +192,7 @@ class CompiledMechanism:
         motions = Motions(
             self.models.model().address, np.zeros(shape), np.zeros(shape), *filled, path_motions(base, count, 0)
         )
-        block, tips = bound(motions, MOTIONS), motions.tips
+        block, tips = pack(motions, MOTIONS), motions.tips
         # Of one tip there is no axis.
         return motions, tips if tips.shape[1] != 1 else tips[:, 0], block
 
@@ -253,6 +253,6 @@ class CompiledFinger:
     @cached_property
     def _alone(self) -> CompiledMechanism:
         """The mechanism of the finger without its surroundings, for fingertip and energies."""
-        if self.finger.surroundings is None:
+        if self.finger.scene is None:
             return self.mechanism
         return CompiledMechanism(Mechanism(self.finger.rigid_body, [], moved=self.finger.mechanism.moved))

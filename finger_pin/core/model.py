@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from finger_pin.core.buffers import Linear, Work
-from finger_pin.core.control import Control
-from finger_pin.core.jit import Kind, Vector
+from finger_pin.core.inputs import InputTable
+from finger_pin.core.jit import StructType, Vector
 from finger_pin.core.tables import Tables
 
 
@@ -35,7 +35,7 @@ class Model(NamedTuple):
     """
 
     tables: Tables
-    control: Control
+    control: InputTable
     work: Work
     linear: Linear
     state: Vector
@@ -54,4 +54,4 @@ class Model(NamedTuple):
     base_power: int
 
 
-MODEL = Kind(Model)
+MODEL = StructType(Model)

@@ -13,7 +13,7 @@ from finger_pin.core.chains import Chains
 from finger_pin.core.collision.motion_bounds import Carrying, levers
 from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
-from finger_pin.mechanism.pieces import Leg, Piece, Place
+from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 
 # Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
 COLUMNS, WRENCH = 3, 12
@@ -143,10 +143,10 @@ class PathWork(NamedTuple):
     wrench_slope: Layers
 
 
-def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
+def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
     """Return the arrays of the paths of all rows, each empty for none, through the bodies of a model."""
     parents, last, turns = chains.parents, chains.last, chains.turns
-    pieces: list[Piece] = list(dict.fromkeys(leg.piece for legs in paths for leg in legs))
+    pieces: list[PathElement] = list(dict.fromkeys(leg.piece for legs in paths for leg in legs))
     number = {piece: e for e, piece in enumerate(pieces)}
     first_row = {leg.piece: k for k, each in reversed(list(enumerate(paths))) for leg in each}
     legs = [leg for each in paths for leg in each]

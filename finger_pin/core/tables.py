@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Annotated, Any, NamedTuple, NoReturn
 from weakref import WeakKeyDictionary
 
@@ -15,11 +14,11 @@ from finger_pin.core.chains import Chains, read_chains, tree_arrays, weighed
 from finger_pin.core.evaluation.law_code import addresses, kink_column
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.core.path_tables import Paths, reached, read_paths
-from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
+from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import Form, RigidBody
+from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.rows import Rows
+from finger_pin.typing import Array
 
 # Columns of the table of groups.
 FIRST, END, FED, PRESSED, KINK = range(5)
@@ -128,9 +127,7 @@ class Tables(NamedTuple):
 
 
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
-_PATHS: Remembered[Paths] = Remembered()
-_WIRED: Remembered[dict[str, Any]] = Remembered()
-_FORMS: WeakKeyDictionary[Form, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
+_FORMS: WeakKeyDictionary[Topology, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
 _WEIGHED: WeakKeyDictionary[RigidBody, Array] = WeakKeyDictionary()
 
 
@@ -157,8 +154,7 @@ def _read(mechanism: Mechanism) -> Tables:
         chains = read_chains(body.model)
         _FORMS[body.form] = chains, tree_arrays(body, chains)
     chains, placed = _FORMS[body.form]
-    # Inertias and parameters of laws change from run to run; how rows are wired seldom does.
-    wired = _WIRED.of((body.form, *(table.form.content for table in rows)), partial(_of_rows, mechanism, chains))
+    wired = _of_rows(mechanism, chains)
     if body not in _WEIGHED:
         _WEIGHED[body] = weighed(chains, body.model)
     return Tables(
@@ -183,11 +179,18 @@ def _parameters(rows: Sequence[Rows]) -> Array:
     return found
 
 
+@memoised(lambda legs, form, chains: (legs, form))
+def _of_paths(legs: tuple[tuple[Any, ...], ...], form: Topology, chains: Chains) -> Paths:
+    return read_paths([path for each in legs for path in each], chains)
+
+
+# Inertias and parameters of laws change from run to run; how rows are wired seldom does.
+@memoised(lambda mechanism, chains: (mechanism.body.form, *(table.form.content for table in mechanism.rows)))
 def _of_rows(mechanism: Mechanism, chains: Chains) -> dict[str, Any]:
     """Return laws, states, wiring, arms and paths of the rows."""
     rows, count = mechanism.rows, sum(table.count for table in mechanism.rows)
     legs = tuple(table.paths for table in rows)
-    paths = _PATHS.of((legs, mechanism.body.form), lambda: read_paths([path for each in legs for path in each], chains))
+    paths = _of_paths(legs, mechanism.body.form, chains)
     return {
         "laws": np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
         "energies": _energies(mechanism),

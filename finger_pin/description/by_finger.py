@@ -7,14 +7,13 @@ from typing import Any, TypeVar
 
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.validation import Description, problem
 
 _Settings = TypeVar("_Settings", bound=Description)
-_OWN: Remembered[Any] = Remembered()
 
 
-def flat(table: Any) -> Any:
+def flatten(table: Any) -> Any:
     """Return ``{index = {medial = {...}}}`` as ``{index.medial = {...}}``: tables of tables lose a level."""
     return _flat(table, lambda value: all(isinstance(each, dict | Description) for each in value.values()))
 
@@ -24,7 +23,7 @@ def flat_numbers(table: Any) -> Any:
     return _flat(table, lambda value: True)
 
 
-def nested(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> Any:
+def unflatten(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> Any:
     """Serialise ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it."""
     if table is None:
         return None
@@ -38,23 +37,19 @@ def nested(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> An
     return found
 
 
-def given(table: Mapping[str, Description] | None) -> Any:
+def dump_set_fields(table: Mapping[str, Description] | None) -> Any:
     """Serialise tables by finger with the entries that they were given, and no others."""
     if table is None:
         return None
     return {name: settings.model_dump(exclude_unset=True, exclude_none=True) for name, settings in table.items()}
 
 
+@memoised(lambda settings, name: (settings, name))
 def of_finger(settings: _Settings, name: str) -> _Settings:
     """Return settings for all fingers with the entries for one, from their table ``fingers``, on top.
 
     A table of another ``kind`` replaces, rather than completes.
     """
-    found: _Settings = _OWN.of((settings, name), lambda: _of_finger(settings, name))
-    return found
-
-
-def _of_finger(settings: _Settings, name: str) -> _Settings:
     whole = settings.updated(fingers=None)
     own: _Settings | None = (getattr(settings, "fingers") or {}).get(name)  # noqa: B009
     if own is None:

@@ -9,16 +9,17 @@ import gc
 import os
 import sys
 from collections.abc import Callable, Hashable, Sequence
+from functools import wraps
 from threading import Lock
 from types import BuiltinFunctionType, FunctionType, ModuleType
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 from pydantic import BaseModel
 
 _Made = TypeVar("_Made")
 _Key = tuple[Hashable, ...]
-_MOST = 128
+_P = ParamSpec("_P")
 #: Bytes of all that is remembered.
 LIMIT = 64 * 2**20
 
@@ -62,10 +63,10 @@ class _Account:
 
     def __init__(self) -> None:
         self.lock, self.total = Lock(), 0
-        self._entries: dict[tuple[Remembered[Any], _Key], tuple[int, list[object]]] = {}
+        self._entries: dict[tuple[_Memory[Any], _Key], tuple[int, list[object]]] = {}
         self._held: dict[int, _Held] = {}
 
-    def add(self, owner: Remembered[Any], key: _Key, parts: tuple[object, ...], made: object) -> None:
+    def add(self, owner: _Memory[Any], key: _Key, parts: tuple[object, ...], made: object) -> None:
         """Count an entry, and forget the oldest ones until all fit, or it is the only one."""
         before, holds, size = self.total, list[object](), owner.latest
         if owner.asked % _EVERY == 0:
@@ -80,7 +81,7 @@ class _Account:
             oldest, first = next(iter(self._entries))
             oldest.forget(first)
 
-    def drop(self, owner: Remembered[Any], key: _Key) -> None:
+    def drop(self, owner: _Memory[Any], key: _Key) -> None:
         """Count an entry no more."""
         size, holds = self._entries.pop((owner, key))
         self.total -= size
@@ -142,7 +143,7 @@ if hasattr(os, "register_at_fork"):
     )
 
 
-class Remembered(Generic[_Made]):
+class _Memory(Generic[_Made]):
     """The latest things made, by the parts they were made of: descriptions as objects, all else by value.
 
     Attributes:
@@ -152,7 +153,7 @@ class Remembered(Generic[_Made]):
 
     asked, latest = 0, 0
 
-    def __init__(self, most: int = _MOST) -> None:
+    def __init__(self, most: int) -> None:
         """Remember nothing yet, and never more than so many."""
         self._most = most
         self._known: dict[_Key, tuple[tuple[object, ...], _Made]] = {}
@@ -177,3 +178,26 @@ class Remembered(Generic[_Made]):
         """Forget an entry; the account's lock is held."""
         del self._known[key]
         _ACCOUNT.drop(self, key)
+
+
+def memoised(
+    parts: Callable[..., tuple[object, ...]], most: int = 128
+) -> Callable[[Callable[_P, _Made]], Callable[_P, _Made]]:
+    """Return a decorator by which a function remembers its latest values.
+
+    Args:
+        parts: From the function's arguments to all that its value depends on: descriptions, which are frozen, count as
+            objects, all else by value.
+        most: The number of values that are remembered, at most.
+    """
+
+    def decorate(function: Callable[_P, _Made]) -> Callable[_P, _Made]:
+        memory: _Memory[_Made] = _Memory(most)
+
+        @wraps(function)
+        def remembering(*arguments: _P.args, **options: _P.kwargs) -> _Made:
+            return memory.of(parts(*arguments, **options), lambda: function(*arguments, **options))
+
+        return remembering
+
+    return decorate

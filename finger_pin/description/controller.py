@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, field_serializer, field_validator
 
-from finger_pin.description.by_finger import flat, given, nested
-from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.by_finger import dump_set_fields, flatten, unflatten
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.signals import ForceSignal, InputSignal, of_axes
 from finger_pin.description.validation import (
     Description,
@@ -144,9 +144,9 @@ class ControllerSettings(Description):
 
     fingers: dict[Name, ControllerSettings] | None = Field(None, description="By finger, entries that differ there.")
 
-    _flat = field_validator("tensions", mode="before")(flat)
-    _nested = field_serializer("tensions", mode="wrap")(nested)
-    _sparse = field_serializer("fingers")(given)
+    _flat = field_validator("tensions", mode="before")(flatten)
+    _nested = field_serializer("tensions", mode="wrap")(unflatten)
+    _sparse = field_serializer("fingers")(dump_set_fields)
 
     @property
     def is_paper(self) -> bool:

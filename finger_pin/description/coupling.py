@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.caching import memoised
+from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
-
-_COUPLINGS: Remembered[PassiveCoupling] = Remembered()
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +30,7 @@ class PassiveCoupling:
     followers: tuple[int, ...]
 
     @classmethod
+    @memoised(lambda cls, routing, tension, stiffness: (routing, tension.tobytes(), stiffness.tobytes()))
     def from_routing(cls, routing: Routing, tension: Array, stiffness: Array) -> PassiveCoupling:
         """Solve H_c theta^d = -f^d / K_t for the follower joints.
 
@@ -43,21 +42,6 @@ class PassiveCoupling:
         Raises:
             InputError: If two passive tendons would determine the same joint.
         """
-        parts = (routing, tension.tobytes(), stiffness.tobytes())
-        return _COUPLINGS.of(parts, partial(cls._from_routing, routing, tension, stiffness))
-
-    @classmethod
-    def inextensible(cls, routing: Routing) -> PassiveCoupling:
-        """Return the coupling by tendons that do not stretch and carry nothing, H_c theta = 0 in their rows: (4)."""
-        return cls.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
-
-    @property
-    def free(self) -> list[int]:
-        """Indices of the joints that are no followers."""
-        return [joint for joint in range(len(self.offset)) if joint not in self.followers]
-
-    @classmethod
-    def _from_routing(cls, routing: Routing, tension: Array, stiffness: Array) -> PassiveCoupling:
         size = len(routing.joints)
         rows, followers = [], []
         for index, row in enumerate(routing.coupling[routing.actuated :]):
@@ -77,3 +61,13 @@ class PassiveCoupling:
         matrix[followers] = -np.linalg.solve(driven, coupling @ matrix)
         offset[followers] = -np.linalg.solve(driven, (tension / stiffness)[rows])
         return cls(matrix, offset, tuple(followers))
+
+    @classmethod
+    def inextensible(cls, routing: Routing) -> PassiveCoupling:
+        """Return the coupling by tendons that do not stretch and carry nothing, H_c theta = 0 in their rows: (4)."""
+        return cls.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
+
+    @property
+    def free(self) -> list[int]:
+        """Indices of the joints that are no followers."""
+        return [joint for joint in range(len(self.offset)) if joint not in self.followers]

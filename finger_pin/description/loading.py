@@ -6,16 +6,15 @@ import copy
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import tomli_w
 
-from finger_pin.description.caching import Remembered
-from finger_pin.description.hand import HandSettings
-from finger_pin.description.overriding import from_here, override
-from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.overriding import normalise_overrides, override
 from finger_pin.description.reading import (
     Table,
     as_name,
@@ -37,7 +36,6 @@ from finger_pin.exceptions import InputError
 _MANY = 10_000
 _Described = TypeVar("_Described", bound=Description)
 # Few: some have millions of numbers.
-_TEXTS: Remembered[str] = Remembered(4)
 #: Wherever a scenario is taken: itself, the name of one that ships, or the path of a file.
 ScenarioLike: TypeAlias = Scenario | str | Path
 #: Likewise a finger; a hand is one, too, and a scenario stands for its own.
@@ -148,7 +146,7 @@ def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None
         return read_scenario(name.model_dump(mode="python", exclude_unset=True), overrides) if overrides else name
     if not overrides and not is_path(str(name)):
         return _shipped_scenario(str(name))
-    overrides = from_here(overrides or {}, set(Scenario.model_fields))
+    overrides = normalise_overrides(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
         return _scenario(*read_scenario_file(str(name), Path()), str(name), overrides)
 
@@ -173,7 +171,7 @@ def load_bench(
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    checked = from_here(overrides or {}, set(Scenario.model_fields))
+    checked = normalise_overrides(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
         table, folder = ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(str(name), Path())
         wanted = merge(as_table(table.pop("identify", None)), dict(identify or {}))
@@ -202,7 +200,7 @@ def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None 
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    checked, whole = from_here(overrides or {}, set(Scenario.model_fields)), copy.deepcopy(dict(table))
+    checked, whole = normalise_overrides(overrides or {}, set(Scenario.model_fields)), copy.deepcopy(dict(table))
     with _depth_limited("scenario"):
         override(checked, whole, Path())
         resolve_signals(whole, Path())
@@ -222,9 +220,10 @@ def to_toml(description: Description) -> str:
         raise InputError("description", allowed, type(description).__name__)
     if isinstance(description, FingerDescription) and description.hand is not None:
         description = description.hand
-    return _TEXTS.of((description,), partial(_text, description))
+    return _text(description)
 
 
+@memoised(lambda description: (description,), most=4)
 def _text(description: Description) -> str:
     long: list[str] = []
     text = tomli_w.dumps(_plain(description.model_dump(mode="python", exclude_none=True), long))
@@ -236,7 +235,7 @@ def _text(description: Description) -> str:
 
 def _load(kind: str, model: type[_Described], name: str | Path, overrides: Mapping[str, Any] | None) -> _Described:
     """Load a finger or a hand."""
-    checked = from_here(overrides or {}, {kind})
+    checked = normalise_overrides(overrides or {}, {kind})
     table: Table = {kind: str(name)}
     with _depth_limited(kind):
         override(checked, table, Path())

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from finger_pin.description.palm import PathSignal
+from finger_pin.description.placement import PathSignal
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
 from finger_pin.description.validation import Name, choice, problem, quantity, real, vector
 

@@ -48,13 +48,13 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
         refuse_other(key, hand="hand" in table, finger="finger" in table)
     if "hand" in table:
         table["hand"] = resolve_hand(table["hand"], folder)
-        _apply(_spelt_out(whole, table), table)
+        _apply(_expand_wildcards(whole, table), table)
         table["hand"] = resolve_hand(table["hand"], folder)
     elif "finger" not in table:
         raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
     else:
         table["finger"] = resolve_finger(table["finger"], folder)
-    spelt_out = _spelt_out(overrides, table)
+    spelt_out = _expand_wildcards(overrides, table)
     # A kind comes before what belongs to it, and a motor before its entries.
     first = (".kind", ".motor")
     for early in (True, False):
@@ -63,7 +63,7 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
             with_motors(as_table(finger), Path())
 
 
-def _spelt_out(overrides: Table, table: Table) -> Table:
+def _expand_wildcards(overrides: Table, table: Table) -> Table:
     return {each: value for key, value in overrides.items() for each in _each(key, table)}
 
 
@@ -135,12 +135,12 @@ def _fingers(table: Table) -> Table:
     return as_table(as_table(table.get("hand")).get("fingers"))
 
 
-def from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
+def normalise_overrides(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
     """Return overrides whose keys begin with an allowed one, with the path of a finger's file made absolute."""
     checked: Table = {}
     if not isinstance(overrides, Mapping):
         raise InputError("overrides", 'must be values by dotted key, such as {"controller.gain": 2.0}', overrides)
-    for key, value in _placed(overrides):
+    for key, value in _flatten_overrides(overrides):
         first, *rest = key.split(".")
         if first not in allowed:
             near = nearest(first, allowed)
@@ -157,11 +157,11 @@ def from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
     return checked
 
 
-def _placed(overrides: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _flatten_overrides(overrides: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield overrides, tables of a hand's fingers entry by entry: they go on top of earlier entries, as in a file."""
     for key, value in overrides.items():
         if isinstance(value, Mapping) and (key == "hand.fingers" or _PLACE.fullmatch(key)):
-            yield from _placed({f"{key}.{name}": entry for name, entry in value.items()})
+            yield from _flatten_overrides({f"{key}.{name}": entry for name, entry in value.items()})
         else:
             yield key, value
 

@@ -1,4 +1,4 @@
-"""The finger as data: links, joints, tendon routing, friction, limiters. SI units throughout.
+"""The parts of a finger as data: links, joints, springs, tendons and their crossings, limiters. SI units throughout.
 
 Every description is frozen and validated; nothing here computes physics.
 """
@@ -6,21 +6,16 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from finger_pin.description.actuators import Actuator, check_actuators
-from finger_pin.description.effects import OF_FINGER, refuse_idle
-from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
-from finger_pin.description.tree import Tree
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
     Description,
     Name,
     Numbers,
-    check_size,
     choice,
     problem,
     quantity,
@@ -28,9 +23,6 @@ from finger_pin.description.validation import (
     reals,
     vector,
 )
-
-if TYPE_CHECKING:
-    from finger_pin.description.hand import HandSettings
 
 _MILLIMETRES = " m (is it in millimetres?)"
 _MOST_TENSION = 1e6
@@ -205,116 +197,3 @@ class StrokeLimiterSettings(Description):
 
     stiffness: Annotated[Numbers, reals(0.0, 1e7)] = quantity(50.0, unit="N m/rad", source="estimate", doc="k.")
     damping: Annotated[Numbers, reals(0.0, 1e5)] = quantity(0.5, unit="s/rad", source="estimate", doc="c.")
-
-
-class FingerDescription(Description):
-    """A finger of links, all fingers of a hand together, or a tree of bodies. Actuated tendons come first.
-
-    Lists of numbers follow the order of the joints, of all tendons, or of the passive tendons.
-    """
-
-    file_keys = ("base",)
-
-    def __repr__(self) -> str:
-        """Return its name and size in a line; `to_toml` writes all of it."""
-        return f"<{type(self).__name__} {self.name}: {len(self.joints)} joints, {len(self.tendons)} tendons>"
-
-    __str__ = __repr__
-
-    name: Name = Field(description="Name of the finger, and of the robot in the URDF.")
-    title: str = Field("", strict=True, max_length=200, description="One line for listings.")
-    gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
-        (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="Base frame; in a hand `hand.gravity`."
-    )
-    joints: dict[Name, Joint] = Field(min_length=1, description="Joints by name, from the base to the tip.")
-    tendons: dict[Name, Tendon] = Field(description="Tendons by name; at least one, unless there is a tree.")
-    tendon_friction: TendonFrictionSettings = TendonFrictionSettings()
-    joint_friction: JointFrictionSettings = JointFrictionSettings()
-    passive_tendon: PassiveTendon = PassiveTendon()
-    stroke_limiter: StrokeLimiterSettings = StrokeLimiterSettings()
-    actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
-    touches_itself: bool = Field(
-        False,
-        strict=True,
-        description="Whether links that are not neighbours touch each other, where there are contacts.",
-    )
-    _hand: Any = PrivateAttr(None)
-    tree: Tree | None = Field(None, description="Bodies in place of links, with joints, tendons and actuators.")
-
-    @field_validator("tendons")
-    @classmethod
-    def _actuated_first(cls, value: dict[str, Tendon]) -> dict[str, Tendon]:
-        return dict(sorted(value.items(), key=lambda item: item[1].kind))
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        joints, tendons = tuple(self.joints), tuple(self.tendons)
-        if not self.tendons and self.tree is None:
-            raise problem("tendons", "must have at least one entry")
-        if self.tree is not None and tuple(self.tree.joints) != joints:
-            raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
-        for name, tendon in self.tendons.items():
-            paths = tuple(self.tree.tendons) if self.tree else ()
-            if tendon.along is not None and tendon.along not in paths:
-                allowed = f"no such tendon of the tree; there are {', '.join(paths) or 'none'}"
-                raise problem(f"tendons.{name}.along", allowed, tendon.along)
-            for joint in tendon.crossings:
-                if joint not in self.joints:
-                    allowed = f"no such joint; the joints are {', '.join(joints)}"
-                    raise problem(f"tendons.{name}.crossings.{joint}", allowed)
-        driven = (*self.actuated_names, *self.tree.actuators) if self.tree is not None else ()
-        for key, keyframe in (self.tree.keyframes if self.tree is not None else {}).items():
-            for name in keyframe.inputs:
-                if name not in driven:
-                    allowed = f"no such actuator or tendon; there are {', '.join(driven)}"
-                    raise problem(f"tree.keyframes.{key}.inputs.{name}", allowed)
-        check_actuators(self.actuators, self.actuated_names, self.passive_names)
-        for key, each in self.actuators.items():
-            for name in each.tendons:
-                if self.tendons[name].maximum_tension is not None:
-                    allowed = f"is for ideal sources: actuators.{key} pulls it"
-                    raise problem(f"tendons.{name}.maximum_tension", allowed, self.tendons[name].maximum_tension)
-        for group, names, what in (
-            ("tendon_friction", (*tendons, *self.canals), "tendon"),
-            ("joint_friction", joints, "joint"),
-            ("passive_tendon", self.passive_names, "passive tendon"),
-            ("stroke_limiter", joints, "joint"),
-        ):
-            for field, value in getattr(self, group):
-                check_size(value, names, f"{group}.{field}", what)
-        refuse_idle(self, OF_FINGER)
-        return self
-
-    @property
-    def outline(self) -> str:
-        """Name, joints and tendons, in a line."""
-        if self.hand is not None:
-            sizes = f"{len(self.joints)} joints, {len(self.tendons)} tendons"
-            return f"{self.name}: fingers {', '.join(self.hand.fingers)}; {sizes}"
-        if self.tree is not None:
-            tree, pulled = self.tree, len(self.tendons)
-            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
-            return f"{self.name}: a tree of {sizes}, {len(tree.actuators)} actuators"
-        tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in self.tendons.items())
-        return f"{self.name}: joints {', '.join(self.joints)}; tendons {tendons}"
-
-    @property
-    def hand(self) -> HandSettings | None:
-        """The palm and the fingers on it, if it is a hand of such."""
-        hand: HandSettings | None = self._hand
-        return hand
-
-    @property
-    def canals(self) -> tuple[str, ...]:
-        """Names of the tree's tendons that something else than ideal sources pulls: they rub as all tendons do."""
-        return self.tree.rubbing if self.tree is not None else ()
-
-    @property
-    def passive_names(self) -> tuple[str, ...]:
-        """Names of the passive tendons."""
-        return tuple(name for name, tendon in self.tendons.items() if tendon.kind == "passive")
-
-    @property
-    def actuated_names(self) -> tuple[str, ...]:
-        """Names of the actuated tendons."""
-        return tuple(name for name, tendon in self.tendons.items() if tendon.kind == "actuated")

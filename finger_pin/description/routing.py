@@ -7,21 +7,23 @@ then for each passive tendon its proximal and its distal half, since friction ma
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from finger_pin.description.caching import Remembered
-from finger_pin.description.parameters import FingerDescription
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription
+from finger_pin.typing import Array, Indices
 
 # Below this share of the largest, an internal tension counts as none.
 _SLACK = 1e-9
-_ROUTINGS: Remembered[Routing] = Remembered()
+
+
+def _parts(_: object, description: FingerDescription) -> tuple[object, ...]:
+    """Return the parts of a description that its routing depends on."""
+    joints = (description.hand and tuple(description.hand.fingers), description.tree, *description.joints)
+    return (*joints, None, *description.tendons, *description.tendons.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +53,9 @@ class Routing:
     fingers: tuple[tuple[Indices, Indices], ...]
 
     @classmethod
+    @memoised(_parts)
     def from_description(cls, description: FingerDescription) -> Routing:
         """Build the matrices from the crossings of every tendon."""
-        parts = (description.hand and tuple(description.hand.fingers), description.tree, *description.joints)
-        made = partial(cls._from_description, description)
-        return _ROUTINGS.of((*parts, None, *description.tendons, *description.tendons.values()), made)
-
-    @classmethod
-    def _from_description(cls, description: FingerDescription) -> Routing:
         joints, tendons = tuple(description.joints), tuple(description.tendons)
         names = [""] if description.hand is None else [f"{name}." for name in description.hand.fingers]
         column = {name: index for index, name in enumerate(joints)}

@@ -19,25 +19,23 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from finger_pin.description.actuators import check_currents, check_sources
-from finger_pin.description.by_finger import error_of_finger, flat, given, nested, of_finger
-from finger_pin.description.caching import Remembered
+from finger_pin.description.by_finger import dump_set_fields, error_of_finger, flatten, of_finger, unflatten
+from finger_pin.description.caching import memoised
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.effects import OF_SCENARIO, idle, shown
-from finger_pin.description.hand import HandSettings
+from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.objects import Object
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Routing
 from finger_pin.description.signals import ForceSignal, JointReference, of_axes
 from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
 from finger_pin.description.tautness import Tautness
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.description.validation import Description, FullName, Name, expand, problem, quantity, suggestion, vector
 from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
 
 _Item = TypeVar("_Item")
-_PARTS: Remembered[dict[str, Scenario]] = Remembered()
-_CHECKED: Remembered[None] = Remembered()
 
 
 class ReferenceSettings(Description):
@@ -52,8 +50,8 @@ class ReferenceSettings(Description):
 
     joints: dict[FullName, JointReference] = Field({}, description="By joint.")
 
-    _flat = field_validator("joints", mode="before")(flat)
-    _nested = field_serializer("joints", mode="wrap")(nested)
+    _flat = field_validator("joints", mode="before")(flatten)
+    _nested = field_serializer("joints", mode="wrap")(unflatten)
 
 
 class EnvironmentSettings(Description):
@@ -73,9 +71,17 @@ class EnvironmentSettings(Description):
     )
     fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, entries that differ there.")
 
-    _sparse = field_serializer("fingers")(given)
+    _sparse = field_serializer("fingers")(dump_set_fields)
 
     objects: dict[Name, Object] | None = Field(None, description="Objects that the finger may touch, by name.")
+
+
+def _checked(scenario: Scenario) -> tuple[object, ...]:
+    """Return all of a scenario that is checked of its fingers: other friction, for one, is nothing to that."""
+    fingers, finger = () if scenario.hand is None else tuple(scenario.hand.fingers), scenario.finger
+    tables = finger.joints, finger.tendons, finger.actuators
+    named = (part for table in tables for part in (*table, *table.values(), None))
+    return (scenario.controller, scenario.reference, finger.tree, finger.passive_tendon, fingers, *named)
 
 
 class Scenario(Description):
@@ -118,12 +124,7 @@ class Scenario(Description):
             object.__setattr__(self, "environment", environment)
         self._check_names()
         self._check_effects()
-        fingers, finger = () if self.hand is None else tuple(self.hand.fingers), self.finger
-        tables = finger.joints, finger.tendons, finger.actuators
-        settings = self.controller, self.reference, finger.tree, finger.passive_tendon
-        # Other friction, for one, is nothing to what is checked.
-        named = (part for table in tables for part in (*table, *table.values(), None))
-        _CHECKED.of((*settings, fingers, *named), self._check_parts)
+        self._check_parts()
         return self
 
     def _check_effects(self) -> None:
@@ -138,6 +139,7 @@ class Scenario(Description):
                 if all(entry in each for each in found.values()):
                     raise problem(entry, says, shown(value))
 
+    @memoised(_checked)
     def _check_parts(self) -> None:
         """Refuse tables that do not fit each other, finger by finger."""
         for name, part in self.parts().items():
@@ -166,7 +168,7 @@ class Scenario(Description):
 
         Of a finger it is the scenario itself, under no name.
         """
-        return dict(_PARTS.of((self,), self._parted))
+        return dict(self._parted())
 
     def environments(self) -> dict[str, EnvironmentSettings]:
         """Return the environments of the fingers of a hand, by name; of a finger its own, under no name."""
@@ -175,6 +177,7 @@ class Scenario(Description):
             return {"": own}
         return {name: of_finger(own, name) if own.fingers else own for name in self.hand.fingers}
 
+    @memoised(lambda self: (self,))
     def _parted(self) -> dict[str, Scenario]:
         if self.hand is None:
             return {"": self}

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, field_serializer, field_validator, model_validator
 
-from finger_pin.description.by_finger import flat_numbers, nested
+from finger_pin.description.by_finger import flat_numbers, unflatten
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
@@ -40,7 +40,7 @@ class InitialSettings(Description):
     )
 
     _flat = field_validator("position", "velocity", mode="before")(flat_numbers)
-    _nested = field_serializer("position", "velocity", mode="wrap")(nested)
+    _nested = field_serializer("position", "velocity", mode="wrap")(unflatten)
 
 
 class SimulationSettings(Description):

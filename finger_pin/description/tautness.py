@@ -8,8 +8,9 @@ from itertools import product
 import numpy as np
 
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.routing import Routing
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,7 +83,8 @@ def _slopes(touch: Touch, p: Any, signals: Any) -> Any:
     normal = spring * factor * held
     by_gap = -kn * exponent * np.abs(depth) ** (exponent - 1.0) * factor * held * touching
     by_speed = -damping * spring * held
-    pressing, pressed = np.maximum(normal, 0.0), 1.0 * (normal > 0.0)
+    # A step held in touch must not depend on whether its start is just before or just behind the touch.
+    pressing, pressed = np.maximum(normal, 0.0), 1.0 * ((normal > 0.0) | (touch.side > 0.0))
     bend_1, bend_2, bend, sliding, friction, excess = _cone(touch, pressing, p)
     level = friction * pressing
     reach = np.maximum(np.maximum(stiffness * bend, level), floor)

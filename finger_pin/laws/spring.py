@@ -1,10 +1,24 @@
-"""Torsion springs at joints, such as those that open a finger whose tendons only close it."""
+"""Springs: of joints, of tendons along paths, of elastic and passive tendons, and what any of them loses in a cycle.
+
+Hysteresis is bristles beside a spring that hold a share of the spring's own force,
+
+    F^s' = s0 (v - F^s |v| / max(h N, floor)),   N the magnitude of the spring's force
+
+Rubber, flexures and braids give back less than was put in, by an amount that grows with the force and hardly depends on
+speed: law (9) with the spring's force in place of the normal force says so with one number h. Where a spring k that was
+relaxed is stretched by x, F^s = c k x solves the law with c = h / (1 + h k / s0); let go after it has slipped the other
+way, it pulls with 1 - h / (1 - h k / s0) of its force.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.laws.law import Law, Row
+import numpy as np
+
+from finger_pin.laws.bristle import bristle_energy, coulomb_loss, friction_level, stiction_rate, stiction_rate_slopes
+from finger_pin.laws.law import Law, Row, beyond
+from finger_pin.laws.limiter import penetration
 
 
 def spring_torque(position: Any, velocity: Any, stiffness: Any, rest: Any, damping: Any) -> Any:
@@ -72,3 +86,136 @@ def _constant_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> 
 
 #: A force that is the same everywhere, such as a weight that is compensated; it stores what it lets down.
 CONSTANT_FORCE = Law("constant force", ("force",), _constant, _constant_slopes, _constant_account)
+
+
+def half_tension(stretch: Any, stiffness: Any) -> Any:
+    """Return max(0, K_h stretch), N: one half of a passive tendon, equations (5) and (12)."""
+    return np.maximum(0.0, stiffness * stretch)
+
+
+def half_energy(stretch: Any, stiffness: Any) -> Any:
+    """Return the elastic energy of one half of a passive tendon, J; zero when slack."""
+    return 0.5 * stiffness * np.maximum(0.0, stretch) ** 2
+
+
+def _half_value(row: Row, p: Any) -> Any:
+    (stiffness,) = p
+    return half_tension(-row.length, stiffness), 0.0 * row.length
+
+
+def _half_slopes(row: Row, p: Any, signals: Any) -> Any:
+    (stiffness,) = p
+    by_length = -stiffness * (row.length < 0.0)
+    return (by_length, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _half_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    (stiffness,) = p
+    return (half_energy(-row.length, stiffness),)
+
+
+#: One half of a passive tendon, a spring that only pulls; it is stretched where its length is negative.
+TENDON_HALF = Law(
+    name="half of a passive tendon (5), (12)",
+    parameters=("stiffness",),
+    value=_half_value,
+    slopes=_half_slopes,
+    account=_half_account,
+)
+
+
+def elastic_energy(stretch: Any, stiffness: Any) -> Any:
+    """Return the elastic energy K e^2 / 2, J; zero when slack."""
+    return 0.5 * stiffness * np.maximum(0.0, stretch) ** 2
+
+
+def _elastic_value(row: Row, p: Any) -> Any:
+    stiffness, damping = p
+    pull = -stiffness * row.length - damping * row.speed
+    return pull * beyond(pull, row.side), 0.0 * row.length, pull
+
+
+def _elastic_slopes(row: Row, p: Any, signals: Any) -> Any:
+    stiffness, damping = p
+    taut = beyond(signals[0], row.side)
+    return (-stiffness * taut, -damping * taut, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _elastic_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    stiffness, stretch = p[0], np.maximum(0.0, -row.length)
+    return elastic_energy(stretch, stiffness), (stiffness * stretch - force) * row.speed
+
+
+#: f^m = max(0, K e + D e'); the stretch e is the length of the row taken negative.
+ELASTIC_TENDON = Law(
+    name="elastic tendon",
+    parameters=("stiffness", "damping"),
+    value=_elastic_value,
+    slopes=_elastic_slopes,
+    account=_elastic_account,
+    signals=("pull",),
+    losses=("damping",),
+    kink="pull",
+)
+
+
+def _dead_band_value(row: Row, p: Any) -> Any:
+    stiffness, lower, upper, damping = p
+    stretch = penetration(row.length, lower, upper)
+    return -stiffness * stretch - damping * row.speed, 0.0 * row.length, stretch
+
+
+def _dead_band_slopes(row: Row, p: Any, signals: Any) -> Any:
+    stiffness, _, _, damping = p
+    by_length = -stiffness * np.abs(np.sign(signals[0]))
+    return (by_length, -damping, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _dead_band_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    stiffness, _, _, damping = p
+    return spring_energy(signals[0], stiffness, 0.0), spring_loss(row.speed, damping)
+
+
+#: The spring of a MuJoCo tendon: it pushes below the first and pulls beyond the second of its spring lengths.
+DEAD_BAND_SPRING = Law(
+    name="spring with a dead band",
+    parameters=("stiffness", "lower", "upper", "damping"),
+    value=_dead_band_value,
+    slopes=_dead_band_slopes,
+    account=_dead_band_account,
+    signals=("stretch",),
+    losses=("damping",),
+)
+
+
+def _hysteresis_value(row: Row, p: Any) -> Any:
+    share, stiffness, floor = p
+    level = friction_level(row.load, share, floor)
+    return -row.state, stiction_rate(row.state, row.speed, level, stiffness, row.side), level
+
+
+def _hysteresis_slopes(row: Row, p: Any, signals: Any) -> Any:
+    share, stiffness, floor = p
+    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, signals[0], stiffness, row.side)
+    by_load = by_level * share * (signals[0] > floor)
+    return (0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_load, 0.0, 0.0)
+
+
+def _hysteresis_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    return bristle_energy(row.state, p[1]), coulomb_loss(row.state, row.speed, signals[0])
+
+
+#: What a spring loses in a cycle whatever its speed; the load is the spring's force.
+HYSTERESIS = Law(
+    name="hysteresis of a spring",
+    parameters=("share", "stiffness", "floor"),
+    value=_hysteresis_value,
+    slopes=_hysteresis_slopes,
+    account=_hysteresis_account,
+    signals=("level",),
+    losses=("coulomb",),
+    scale=1e-2,
+    kink="speed",
+)
+#: The stiffness of its bristles over the spring's own: how sharply the force turns where the motion does.
+STIFFER = 10.0

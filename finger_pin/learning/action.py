@@ -10,16 +10,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.position_drive import build_drives, loop_period
-from finger_pin.control.proportional import ControlSignals
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import ReferenceSignals
+from finger_pin.typing import Array
 
 # Tension that an action may ask for by default, and by which it may stretch a tendon on a spool, N.
 _STRONGEST = 20.0
@@ -34,7 +33,7 @@ class Action(LoopController):
         low: Least action, shape (k,).
         high: Largest action, shape (k,).
         given: The last action, shape (k,).
-        held: Present inputs, shape (u,), N; zero before the first action, and for motors in position drive.
+        held: BatchedSnapshot inputs, shape (u,), N; zero before the first action, and for motors in position drive.
         channels: Inputs that are voltages of motors in position drive.
         names: Of the numbers of an action.
     """
@@ -78,14 +77,14 @@ class Action(LoopController):
                 self.low, self.high = (each * scale for each in _reach(finger))
             rows = math.ceil(duration / loop_period(finger)) + 1
             self._drives = build_drives(finger, np.zeros((rows, len(radius))))
-        self.begin(0.0)
+        self.reset(0.0)
 
     @property
     def compiled(self) -> Drives | None:
         """The loops of motors in position drive, with the goals so far; None without."""
         return self._drives
 
-    def begin(self, delay: float) -> None:
+    def reset(self, delay: float) -> None:
         """Begin an episode, whose actions arrive after a delay, s."""
         self._delay, self.given = delay, self.low.copy()
         self.held = np.zeros(self._finger.mechanism.channels)

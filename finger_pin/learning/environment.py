@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.learning.task import Task
 from finger_pin.learning.worlds import Worlds, read_actions, read_render_mode
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.coerce import FingerLike
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,9 +89,9 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """Begin an episode with numbers, start and goal drawn anew; the same seed draws the same."""
         super().reset(seed=seed)
         self._begun = True
-        self._worlds.begin((0,), [self.np_random])
+        self._worlds.reset((0,), [self.np_random])
         observations, _ = self._worlds.observe(_ALONE, judged=False)
-        return observations[0], {"drawn": dict(self._worlds.each[0].drawn)}
+        return observations[0], {"drawn": dict(self._worlds.each[0].sampled)}
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Act for one control period.

@@ -67,7 +67,7 @@ class Randomisation:
             known = ", ".join(f"{_SENSOR}{each}.{{{','.join(_OF_SENSOR)}}}" for each in task.sensors)
             raise InputError("randomise", f"no such number of a sensor; there are {known}", key)
 
-    def draw(self, random: np.random.Generator) -> dict[str, Any]:
+    def sample_context(self, random: np.random.Generator) -> dict[str, Any]:
         """Return a value for every key."""
         return {key: each.draw(random) for key, each in self._distributions.items()}
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Measurement:
         # How many samples a world has taken in its episode.
         self._count = np.zeros(worlds, dtype=np.int64)
 
-    def begin(self, world: int, sensor: Sensor) -> None:
+    def reset(self, world: int, sensor: Sensor) -> None:
         """Begin an episode of a world with a sensor, and no samples."""
         numbers = sensor.noise, sensor.quantisation, sensor.offset
         self._noise[world], self._quantisation[world], self._offset[world] = numbers

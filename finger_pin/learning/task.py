@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import all_finite, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.learning.distributions import Distribution
 from finger_pin.learning.sensors import Sensor
+from finger_pin.typing import Array
 
 #: What a reward or an end is told: variables by name, what was drawn for the episode, and ``action``.
 Signals = Mapping[str, Array]

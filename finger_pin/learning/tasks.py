@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.loading import load_scenario
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.learning.distributions import Uniform
 from finger_pin.learning.environment import Environment
@@ -18,6 +17,7 @@ from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Function, Signals
 from finger_pin.learning.vector_environment import VectorEnvironment
 from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
 
 #: At these tolerances angles err by about a thousandth of a radian, which no policy feels.
 COARSE = {"simulation.method": "Rodas4", "simulation.rtol": 1e-2, "simulation.atol_scale": 2e-2}

@@ -17,7 +17,7 @@ from finger_pin.description.loading import ScenarioLike
 from finger_pin.exceptions import InputError
 from finger_pin.learning.task import Task
 from finger_pin.learning.worlds import Worlds, read_actions, read_render_mode
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.coerce import FingerLike
 
 
 class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
@@ -88,7 +88,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
                     self._randoms[i] = np_random(seeds[i])[0]
         # The others are not measured again: that would age what their sensors delay.
         begun = np.flatnonzero(mask)
-        self._worlds.begin(begun.tolist(), self._randoms)
+        self._worlds.reset(begun.tolist(), self._randoms)
         if len(begun):
             self._seen[begun] = self._worlds.observe(begun, judged=False)[0]
         self._ended[mask] = False
@@ -108,7 +108,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         commands, worlds = read_actions(actions, *self._limits), self._worlds
         begun = self._ended.copy()
         at_start = np.flatnonzero(begun)
-        worlds.begin(at_start.tolist(), self._randoms)
+        worlds.reset(at_start.tolist(), self._randoms)
         worlds.act(commands, np.flatnonzero(~begun).tolist())
         self._seen, signals = worlds.observe(self._all)
         rewards, done = self.task.judge(signals, self.num_envs)
@@ -136,5 +136,5 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     def _drawn(self, begun: NDArray[np.int64]) -> dict[str, Any]:
         found: dict[str, Any] = {}
         for i in begun.tolist():
-            found = self._add_info(found, {"drawn": self._worlds.each[i].drawn}, i)
+            found = self._add_info(found, {"drawn": self._worlds.each[i].sampled}, i)
         return found

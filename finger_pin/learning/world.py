@@ -10,27 +10,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import Bindings, sampled_control
+from finger_pin.control.closed_loop import ClosedLoop, sampled_control
+from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.batch import RESTING
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.routing import Array
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.learning.action import Action
-from finger_pin.learning.instant import instant, known_variables
 from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
+from finger_pin.learning.snapshot import known_variables, snapshot
 from finger_pin.learning.task import Task
+from finger_pin.mechanism.coerce import FingerLike, fitted, is_other_hand, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, is_other_hand, own_finger
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import record
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.typing import Array
 from finger_pin.views.viewer.video import draw_picture
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class World:
 
     def __init__(
         self,
-        family: Family,
+        family: ParametrisedScenario,
         task: Task,
         randomisation: Randomisation,
         finger: Finger | None,
@@ -65,7 +65,7 @@ class World:
     ) -> None:
         """Build the scenario, unless another world's loop serves; use `of` or `twin`."""
         self.task, self._family, self._randomisation, self._given = task, family, randomisation, finger
-        self.drawn: dict[str, Any] = {}
+        self.sampled: dict[str, Any] = {}
         self.context: dict[str, Array] = {}
         self.sensors: dict[str, Sensor] = {}
         self._nominal: tuple[Finger, PassiveCoupling] | None = None
@@ -82,18 +82,18 @@ class World:
             InputError: Naming the key or variable that is wrong.
         """
         given = load_scenario(scenario)
-        own = own_finger(finger, given)
-        scenario = described_by(given, own)
+        own = resolve_finger(finger, given)
+        scenario = with_finger(given, own)
         if scenario.simulation.method not in TABLEAUS:
             raise InputError("simulation.method", f"must be one of {', '.join(TABLEAUS)}", scenario.simulation.method)
         randomisation = Randomisation(task)
         for key in randomisation.keys if is_other_hand(own, scenario) else ():
             if key.startswith("hand."):
                 raise InputError("randomise", "does not act: the hand that was given is not the scenario's", key)
-        family = Family(scenario, randomisation.keys)
+        family = ParametrisedScenario(scenario, randomisation.keys)
         for values in randomisation.ends():
             # What cannot be drawn is said now, not at the hundredth reset.
-            family.at(values)
+            family.with_values(values)
         world = cls(family, task, randomisation, own)
         known = known_variables(world.origin)
         for name in task.variables:
@@ -119,7 +119,7 @@ class World:
             if self._nominal is not None:
                 finger = fitted(self._nominal[0], self._family.scenario, scenario)
                 if finger.layout.names != self._nominal[0].layout.names:
-                    raise InputError("randomise", "must keep what the state consists of", self.drawn)
+                    raise InputError("randomise", "must keep what the state consists of", self.sampled)
             origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled(self._bindings)
         self._scenario, self.origin = scenario, origin
         finger, family = self.origin.finger, self._family.scenario
@@ -159,16 +159,16 @@ class World:
         """Whether the episode is truncated: its time is over, or the motion cannot go on."""
         return bool(self.reason) or self._step >= self.task.steps
 
-    def begin(self, random: np.random.Generator) -> None:
+    def reset(self, random: np.random.Generator) -> None:
         """Begin an episode.
 
         Raises:
             InputError: If what is drawn is not allowed.
         """
         self._random, self.reason, self._step, self.now = random, "", 0, 0.0
-        self.drawn = self._randomisation.draw(random)
+        self.sampled = self._randomisation.sample_context(random)
         if self._randomisation.keys:
-            self._build(self._family.at([self.drawn[key] for key in self._randomisation.keys]))
+            self._build(self._family.with_values([self.sampled[key] for key in self._randomisation.keys]))
         self._begun = self._start()
         if self.rebuilt:
             self.stepper = self._stepper_at(self._begun, self._bindings)
@@ -176,11 +176,11 @@ class World:
             self.stepper.restart(self._begun, time=0.0)
         task = self.task
         self.context = self._context()
-        self.drawn |= self.context
+        self.sampled |= self.context
         self.sensors = {
-            name: self._randomisation.sensor(name, sensor, self.drawn) for name, sensor in task.sensors.items()
+            name: self._randomisation.sensor(name, sensor, self.sampled) for name, sensor in task.sensors.items()
         }
-        self.action.begin(self._randomisation.delay(self.drawn, task.delay))
+        self.action.reset(self._randomisation.delay(self.sampled, task.delay))
 
     def _context(self) -> dict[str, Array]:
         """Return the task's draws for an episode, by name."""
@@ -203,7 +203,7 @@ class World:
         loop, task = self.origin, self.task
         if task.start == "reference":
             return loop.initial_state()
-        around, joints = loop.finger.surroundings, len(loop.finger.routing.joints)
+        around, joints = loop.finger.scene, len(loop.finger.routing.joints)
         for _ in range(_TRIES):
             if callable(task.start):
                 position = np.asarray(task.start(self._random), dtype=float)
@@ -230,7 +230,7 @@ class World:
         self._step += 1
         return self._next_end()
 
-    def reach(self, end: float, status: int) -> float:
+    def finish_piece(self, end: float, status: int) -> float:
         """Note the status with which a stepper ended a piece; return the end of the next, s, or `RESTING`."""
         self.now = end
         if status:
@@ -255,7 +255,7 @@ class World:
         held = self.action.replayed() if self.action.compiled is None else None
         trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, held=held)
         times = np.arange(round(end * sample_rate) + 1) / sample_rate
-        motions = SampledMotion(self.loop, trajectory, times)
+        motions = SampledTrajectory(self.loop, trajectory, times)
         found = record(self._scenario, motions, self._scenario.simulation.method)
         found.attrs["own"] = "policy"
         return found
@@ -263,7 +263,7 @@ class World:
     def picture(self) -> NDArray[np.uint8]:
         """Return a picture of the present posture, from a point with all postures in view, of bytes."""
         method = self._scenario.simulation.method
-        motions = instant(self.loop, self.stepper.time, self.stepper.x)
+        motions = snapshot(self.loop, self.stepper.time, self.stepper.x)
         found = record(self._scenario, motions, method, list(known_variables(self.origin)))
         return draw_picture(found, self._stage)
 

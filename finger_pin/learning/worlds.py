@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from finger_pin.core.stepping.batch import RESTING, Together
 from finger_pin.description.loading import ScenarioLike
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import all_finite
 from finger_pin.exceptions import InputError
-from finger_pin.learning.instant import Present, SideBySide, known_variables
 from finger_pin.learning.sensors import measurements
+from finger_pin.learning.snapshot import BatchedLoop, BatchedSnapshot, known_variables
 from finger_pin.learning.task import Task
 from finger_pin.learning.world import World
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.coerce import FingerLike
+from finger_pin.typing import Array
 
 _Places = NDArray[np.int64]
 
@@ -40,14 +40,14 @@ class Worlds:
         first = World.of(scenario, task, finger)
         self.task, self.each = task, [first, *(first.twin() for _ in range(count - 1))]
         loops, actions = [world.origin for world in self.each], [world.action for world in self.each]
-        self._now = SideBySide.of(loops, actions, task.variables, apart=first.rebuilt)
-        self._present = Present(self._now)
+        self._now = BatchedLoop.of(loops, actions, task.variables, apart=first.rebuilt)
+        self._present = BatchedSnapshot(self._now)
         self._name_variables()
         self._measurements = measurements(task.sensors, count, task.period)
         self._context: dict[str, Array] = {}
         self._randoms = [np.random.default_rng(0)] * count
         self._steppers = Together([world.stepper for world in self.each])
-        self.begin(range(count), self._randoms)
+        self.reset(range(count), self._randoms)
 
     def _name_variables(self) -> None:
         known = known_variables(self._now)
@@ -72,7 +72,7 @@ class Worlds:
         seen = self.observe(np.arange(1), judged=False)[0]
         return Box(-np.inf, np.inf, seen.shape[1:], np.float32), Box(low.astype(np.float32), high.astype(np.float32))
 
-    def begin(self, places: Sequence[int], randoms: Sequence[np.random.Generator]) -> None:
+    def reset(self, places: Sequence[int], randoms: Sequence[np.random.Generator]) -> None:
         """Begin episodes in some worlds.
 
         Args:
@@ -85,9 +85,9 @@ class Worlds:
         self._randoms = list(randoms)
         for i in places:
             world = self.each[i]
-            world.begin(randoms[i])
+            world.reset(randoms[i])
             for name, measurement in self._measurements.items():
-                measurement.begin(i, world.sensors[name])
+                measurement.reset(i, world.sensors[name])
             for name, value in world.context.items():
                 if name not in self._context:
                     self._context[name] = np.zeros((len(self.each), *value.shape))
@@ -109,7 +109,7 @@ class Worlds:
             statuses = self._steppers.advance(ends)
             for i in places:
                 if ends[i] != RESTING:
-                    ends[i] = each[i].reach(ends[i], statuses[i])
+                    ends[i] = each[i].finish_piece(ends[i], statuses[i])
 
     def observe(self, places: _Places, *, judged: bool = True) -> tuple[NDArray[np.float32], dict[str, Array]]:
         """Return the observations in some worlds, shape (k, o), and the true signals in all by name, shapes (w, ...).

@@ -16,15 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand
-from finger_pin.laws.elastic_tendon import ELASTIC_TENDON
 from finger_pin.laws.gearbox import GEARBOX
 from finger_pin.laws.motor import MOTOR
-from finger_pin.mechanism.energies import Energy
-from finger_pin.mechanism.hysteresis import OF_TENDONS, hysteresis_rows
-from finger_pin.mechanism.rows import Rows
+from finger_pin.laws.spring import ELASTIC_TENDON
+from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
+from finger_pin.mechanism.rows import Energy, Rows
+from finger_pin.typing import Array
 
 _STRETCH = Energy("elastic_tendons", "tendons on spools")
 _DAMPING = Energy("elastic_damping", "tendons stretching")

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import FingerDescription
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
-from finger_pin.mechanism.routes import Route, Routes
 from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
 from finger_pin.mechanism.tendons import BRISTLES, LOSSES, SLACK, SOURCES, Tendons
 from finger_pin.mechanism.tree import table_of
+from finger_pin.typing import Array
 
 #: The tables, in the order of evaluation.
 CORDS, CANALS, BRANCHES = "tendon_cords", "tendon_canals", "tendon_branches"
@@ -42,7 +42,7 @@ class _Canal:
 
     name: str
     tendon: int
-    route: Route
+    route: TendonPath
     one_way: bool
     crossed: frozenset[str]
     sources: dict[tuple[str, str], float]
@@ -62,7 +62,7 @@ class Canals:
     def __init__(
         self,
         description: FingerDescription,
-        routes: Routes | None,
+        routes: TendonPaths | None,
         tendons: Tendons,
         rows: Sequence[Rows],
         pulled: Mapping[str, Array],
@@ -105,7 +105,7 @@ class Canals:
                 self.tables.append(known[group])
                 self._press(canals, known, {"driven_tendons", *pulled})
 
-    def _trunk(self, name: str, routes: Routes, tendons: Tendons) -> _Canal:
+    def _trunk(self, name: str, routes: TendonPaths, tendons: Tendons) -> _Canal:
         """Return the canal of a tendon of the tree before its first pulley."""
         tree, tendon = self._tree, self._tree.tendons[name]
         sources: dict[tuple[str, str], float] = {}
@@ -136,7 +136,7 @@ class Canals:
         for number, ((divisor, legs), (_, crossed)) in enumerate(parts, start=1):
             if legs:
                 sources = {key: weight / divisor for key, weight in (trunk.sources | friction).items()}
-                route = Route(np.zeros(len(self._joints)), legs)
+                route = TendonPath(np.zeros(len(self._joints)), legs)
                 found.append(_Canal(f"{trunk.name}.{number}", trunk.tendon, route, trunk.one_way, crossed, sources))
         return found
 

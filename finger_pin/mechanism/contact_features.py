@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.gaps import prism_parameters
 from finger_pin.mechanism.solids import Solid
+from finger_pin.typing import Array
 
 # Fillets are this share of a body's least half-width, but at most so large, m.
 _SHARE, _LARGEST = 0.1, 1e-3

@@ -7,17 +7,16 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from finger_pin.description.routing import Array
 from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.contact_features import ContactPart, contacts_of
-from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.gaps import PRISM
-from finger_pin.mechanism.pieces import Leg, Piece, Place, path_kinematics
+from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.solids import Solid
+from finger_pin.typing import Array
 
 #: How deep bodies may be in each other at the start, m.
 DEEPEST_START = 1e-3
@@ -41,7 +40,7 @@ def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozens
     """
     names: list[str] = []
     numbers: list[tuple[float, ...]] = []
-    paths: list[tuple[Leg, ...]] = []
+    paths: list[tuple[PathTerm, ...]] = []
     for one, other in itertools.combinations(solids, 2):
         apart = one.group == other.group and frozenset((one.name, other.name)) not in within
         if apart or (one.led and other.led) or one.never_meets(other):
@@ -51,17 +50,17 @@ def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozens
             piece = _piece(a, part, w, prism)
             names.append(f"{a.name}-{w.name}" + (f".{index}" if len(found) > 1 else ""))
             numbers.append(law_numbers(a.surface, w.surface))
-            paths += [(Leg(piece, column),) for column in range(CONTACT.arms)]
+            paths += [(PathTerm(piece, column),) for column in range(CONTACT.arms)]
     parameters = np.array(numbers).reshape(-1, len(CONTACT.parameters)).T
     arm = np.zeros((len(paths), width))
     return Rows("contacts", CONTACT, tuple(names), parameters, arm, paths=tuple(paths), powers=_LOSSES)
 
 
-def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> Piece:
+def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> PathElement:
     """Return the gap between a part of one solid and all of another."""
     first, second = (a.place.act(end) for end in part.ends)
     half = 0.5 * float(np.linalg.norm(second - first))
-    return Piece(
+    return PathElement(
         PRISM,
         np.array([part.radius, part.disc, part.along, *prism]),
         (Place(a.joint, first), Place(a.joint, second)),

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.energies import BASE, GUIDED, Energies
-from finger_pin.mechanism.rows import RowSignals
+from finger_pin.mechanism.rows import BASE, GUIDED, Energies, RowSignals
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Touching:
+class ContactPoints:
     """Contacts in space, base frame; zero for open ones. Shapes (..., c, 3).
 
     Attributes:
@@ -52,7 +51,7 @@ class Evaluation:
     base_power: Array | None = None
     guided_power: Array | None = None
     booked: Array | None = None
-    touching: Touching | None = None
+    touching: ContactPoints | None = None
 
     def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Return the energies that the rows store, J, and their powers, W, by name; shapes (...,)."""

@@ -10,26 +10,24 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.exchange.foreign_model import on_model
-from finger_pin.mechanism.exchange.urdf import build_rigid_body
-from finger_pin.mechanism.excursions import Excursions
-from finger_pin.mechanism.finger_parts import Parts
+from finger_pin.mechanism.finger_parts import Parts, state_layout
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.kinematics import Motion
+from finger_pin.mechanism.from_pinocchio import on_model
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.routes import Routes
+from finger_pin.mechanism.rigid_body import Motion, RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
-from finger_pin.mechanism.state import Layout, State
-from finger_pin.mechanism.surroundings import Surroundings, same_but_for_path
+from finger_pin.mechanism.scene import Scene, same_but_for_path
+from finger_pin.mechanism.state import State
+from finger_pin.mechanism.tendon_paths import Excursions, TendonPaths
 from finger_pin.mechanism.tree import build_tree, tree_rows
+from finger_pin.mechanism.urdf import build_rigid_body
+from finger_pin.typing import Array
 
 
 class Finger:
@@ -49,9 +47,9 @@ class Finger:
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
         pulled: Weights with which drives and passive tendons' hysteresis pull the strands, by table, shape (s, k).
-        made_of: The rigid body, the rows and the objects that it was given.
+        constructor_args: The rigid body, the rows and the objects that it was given.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
-        surroundings: Objects and contacts; None without any.
+        scene: Objects and contacts; None without any.
     """
 
     def __init__(
@@ -76,8 +74,8 @@ class Finger:
                 size, or an object the name of a joint.
         """
         self.description = description = describe(description)
-        self.made_of = rigid_body, tuple(rows), objects
-        self.paths: Routes | None = None
+        self.constructor_args = rigid_body, tuple(rows), objects
+        self.paths: TendonPaths | None = None
         if description.tree is None:
             self.rigid_body = rigid_body or build_rigid_body(description)
         else:
@@ -114,10 +112,10 @@ class Finger:
             objects = {**tree.objects, **(objects or {})}
         if objects is None and (description.touches_itself or (hand is not None and hand.fingers_touch)):
             objects = {}
-        around = None if objects is None else Surroundings.of(objects, description, mechanism, placed)
-        self.surroundings = around
+        around = None if objects is None else Scene.of(objects, description, mechanism, placed)
+        self.scene = around
         self.mechanism = mechanism if around is None else around.around(mechanism)
-        self.layout = Layout.of(self.tendons, self.actuators, last, around, before, canals.tables)
+        self.layout = state_layout(self.tendons, self.actuators, last, around, before, canals.tables)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -159,13 +157,13 @@ class Finger:
 
     def changed(self, description: FingerDescription, objects: Mapping[str, Object] | None) -> Finger:
         """Return the finger that another description and other objects make, with the body and rows that were given."""
-        (rigid_body, rows, known), around = self.made_of, self.surroundings
+        (rigid_body, rows, known), around = self.constructor_args, self.scene
         led = objects is known or (around is not None and around.same_but_for_paths(objects))
         if led and same_but_for_path(self.description, description):
             # The mechanism does not know where its palm and objects are led.
             finger = copy.copy(self)
-            finger.description, finger.made_of = description, (rigid_body, rows, objects)
-            finger.surroundings = around and around.with_objects(objects or {})
+            finger.description, finger.constructor_args = description, (rigid_body, rows, objects)
+            finger.scene = around and around.with_objects(objects or {})
             return finger
         finger = Finger(description, rigid_body, rows, objects)
         finger.visuals = self.visuals
@@ -191,7 +189,6 @@ class Finger:
         """
         x = np.zeros(self.layout.size)
         state, middle = self.layout.unpack(x), self.tendons.rest_position
-        assert state.motor_position is not None and state.motor_velocity is not None
         state.position[:] = position
         state.velocity[:] = 0.0 if velocity is None else velocity
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
@@ -200,9 +197,8 @@ class Finger:
             state.motor_position[:] = angle(state.position, tension, taken)
             moved = (state.velocity @ self.coupling_at(state.position).T)[: self.routing.actuated]
             state.motor_velocity[:] = angle(state.velocity, None, moved) - angle(state.velocity, None, 0.0 * moved)
-        if self.surroundings is not None:
-            assert state.object_pose is not None and state.object_velocity is not None
-            state.object_pose[:], state.object_velocity[:] = self.surroundings.start()
+        if self.scene is not None:
+            state.object_pose[:], state.object_velocity[:] = self.scene.start()
         return x
 
     def packed(self, state: State | ArrayLike, name: str) -> Array:
@@ -257,7 +253,7 @@ class Finger:
             inputs: u, shape (a,) or (m, a): tensions f^a, N; of a motor in position drive its voltage, V.
             fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
                 default.
-            base: Motion of a hand's palm, the numbers of `laws.palm`, shape (27,) or (m, 27); at rest by default.
+            base: Motion of a hand's palm, the numbers of `base_motion`, shape (27,) or (m, 27); at rest by default.
         """
         return self.signals(x, inputs, fingertip_force, self.mechanism.evaluate(x, inputs, fingertip_force, base))
 

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from finger_pin.description.caching import Remembered
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array, Routing
+import numpy as np
+
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.routing import Routing
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.canals import Canals
-from finger_pin.mechanism.joint_friction import JointFriction
-from finger_pin.mechanism.joint_springs import JointSprings
-from finger_pin.mechanism.routes import Routes
-from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.stroke_limiter import StrokeLimiter
+from finger_pin.mechanism.joints import JointFriction, JointSprings, StrokeLimiter
+from finger_pin.mechanism.rows import Rows, further_states
+from finger_pin.mechanism.scene import Scene
+from finger_pin.mechanism.state import BLOCKS, Layout
+from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths
-
-# Most changes of numbers leave most parts, and most tables, as they were.
-_KNOWN: Remembered[Any] = Remembered(1024)
+from finger_pin.typing import Array
 
 
 class Parts(NamedTuple):
@@ -35,23 +35,14 @@ class Parts(NamedTuple):
     @classmethod
     def of(cls, description: FingerDescription) -> Parts:
         """Return the parts of a description."""
-        routing, motors = Routing.from_description(description), description.actuators
-        friction, limits, each = description.joint_friction, description.stroke_limiter, description.joints.values()
+        routing = Routing.from_description(description)
         return cls(
             routing,
-            _KNOWN.of(
-                (routing, description.tree, description.tendon_friction, description.passive_tendon),
-                lambda: Tendons.from_description(description),
-            ),
-            _KNOWN.of(
-                (routing, *motors, None, *motors.values()), lambda: Actuators.from_description(description, routing)
-            ),
-            _KNOWN.of(
-                (routing, description.tree, friction),
-                lambda: JointFriction.from_description(description, routing.loads),
-            ),
-            _KNOWN.of((limits, *each), lambda: StrokeLimiter.from_description(description)),
-            _KNOWN.of(("springs", *each), lambda: JointSprings.from_description(description)),
+            _tendons(description, routing),
+            _actuators(description, routing),
+            _joint_friction(description, routing),
+            _stroke_limiter(description),
+            _springs(description),
         )
 
     @property
@@ -65,32 +56,25 @@ class Parts(NamedTuple):
 
     def drives(self, description: FingerDescription, rows: Sequence[Rows]) -> tuple[Rows, ...]:
         """Return the tables that pull tendons: elastic ones, sources with an end, and those among further tables."""
-        sources = _KNOWN.of(
-            (self.tendons, self.width, *description.tendons.values()),
-            lambda: self.tendons.sources(description, self.width),
-        )
+        sources = _sources(self.tendons, description, self.width)
         elastic = _made(self.actuators.tendon_rows, self.width)
         return (*elastic, *sources, *(table for table in rows if table.pulls))
 
     def tables(
         self,
         description: FingerDescription,
-        paths: Routes | None,
+        paths: TendonPaths | None,
         of_tree: tuple[Rows, ...],
         drives: tuple[Rows, ...],
         pulled: dict[str, Array],
     ) -> tuple[list[Rows], Canals]:
         """Return the tables of rows in the order of evaluation, as wide as there are coordinates, and the canals."""
-        joints, actuated, width = self.routing.joints, self.routing.actuated, self.width
+        joints, width = self.routing.joints, self.width
         pulling: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.names))
         if paths:
             pulling = [along_paths(description, paths, table) for table in pulling]
         canals = Canals(description, paths, self.tendons, [*of_tree, *pulling], pulled, width)
-        friction, wired = self.joint_friction, tuple(canals.loads)
-        pins = _KNOWN.of(
-            (friction, *drives, width, *wired, *(each.tobytes() for each in canals.loads.values())),
-            lambda: friction.rows(joints, pulled, actuated, width, canals.loads),
-        )
+        pins = _pins(self, drives, pulled, canals.loads)
         return [
             *of_tree,
             *pulling,
@@ -102,6 +86,101 @@ class Parts(NamedTuple):
         ], canals
 
 
+# Most changes of numbers leave most parts, and most tables, as they were.
+@memoised(lambda make, *given: (make.__self__, make.__name__, *given), most=1024)
 def _made(make: Any, *given: Any) -> Any:
     """Return a method's result for a part and values, anew only if either differs."""
-    return _KNOWN.of((make.__self__, make.__name__, *given), lambda: make(*given))
+    return make(*given)
+
+
+@memoised(lambda finger, routing: (routing, finger.tree, finger.tendon_friction, finger.passive_tendon))
+def _tendons(finger: FingerDescription, routing: Routing) -> Tendons:
+    return Tendons.from_description(finger)
+
+
+@memoised(lambda finger, routing: (routing, *finger.actuators, None, *finger.actuators.values()))
+def _actuators(finger: FingerDescription, routing: Routing) -> Actuators:
+    return Actuators.from_description(finger, routing)
+
+
+@memoised(lambda finger, routing: (routing, finger.tree, finger.joint_friction))
+def _joint_friction(finger: FingerDescription, routing: Routing) -> JointFriction:
+    return JointFriction.from_description(finger, routing.loads)
+
+
+@memoised(lambda finger: (finger.stroke_limiter, *finger.joints.values()))
+def _stroke_limiter(finger: FingerDescription) -> StrokeLimiter:
+    return StrokeLimiter.from_description(finger)
+
+
+@memoised(lambda finger: tuple(finger.joints.values()))
+def _springs(finger: FingerDescription) -> JointSprings:
+    return JointSprings.from_description(finger)
+
+
+@memoised(lambda tendons, finger, width: (tendons, width, *finger.tendons.values()))
+def _sources(tendons: Tendons, finger: FingerDescription, width: int) -> list[Rows]:
+    return tendons.sources(finger, width)
+
+
+def _wired(parts: Parts, drives: tuple[Rows, ...], _: object, loads: Mapping[str, Array]) -> tuple[object, ...]:
+    return (parts.joint_friction, *drives, parts.width, *loads, *(each.tobytes() for each in loads.values()))
+
+
+@memoised(_wired)
+def _pins(parts: Parts, drives: tuple[Rows, ...], pulled: dict[str, Array], loads: Mapping[str, Array]) -> Rows:
+    routing = parts.routing
+    return parts.joint_friction.rows(routing.joints, pulled, routing.actuated, parts.width, loads)
+
+
+def state_layout(
+    tendons: Tendons,
+    motors: Actuators,
+    rows: Sequence[Rows] = (),
+    scene: Scene | None = None,
+    of_tree: Sequence[Rows] = (),
+    canals: Sequence[Rows] = (),
+) -> Layout:
+    """Return the layout of tendons, motors, extra rows, drives among them, and a scene."""
+    routing = tendons.routing
+    drives, further = (further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
+
+    def each(names: Sequence[str], parts: str) -> list[str]:
+        return [f"{name}.{part}" for name in names for part in parts.split()]
+
+    free, world, touching = ((), (), ()) if scene is None else (tuple(scene.free), scene.world, scene.contacts.names)
+    labels = {
+        "position": routing.joints,
+        "object_pose": each(free, "x y z qx qy qz qw"),
+        "world_position": world,
+        "passive_position": routing.passive_names,
+        "motor_position": motors.names,
+        "velocity": routing.joints,
+        "object_velocity": each(free, "vx vy vz wx wy wz"),
+        "world_velocity": world,
+        "passive_velocity": routing.passive_names,
+        "motor_velocity": motors.names,
+        "contact_bend": each(touching, "1 2"),
+        "actuator_state": [name for table in of_tree if table.states for name in table.names],
+        "elastic_stiction": (*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
+        "drives": [name for name, _ in drives],
+        "tendon_stiction": routing.tendons,
+        "canal_stiction": [name for table in canals if table.states for name in table.names],
+        "joint_stiction": routing.joints,
+        "gearbox_stiction": motors.names,
+        "further": [name for name, _ in further],
+    }
+    # A lumped mass that rings has the velocity that goes with 1 % of its position.
+    ringing = np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)
+    scaled = {
+        "passive_velocity": np.maximum(BLOCKS["passive_velocity"].scale, 1e-5 * ringing).tolist(),
+        "drives": [scale for _, scale in drives],
+        "further": [scale for _, scale in further],
+    }
+    return _same(Layout.of(labels, scaled))
+
+
+# Of the same names and sizes much follows, once for all fingers.
+@memoised(lambda layout: (layout,))
+def _same(layout: Layout) -> Layout:
+    return layout

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.rows import RowSignals, combined
 from finger_pin.mechanism.state import State
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)

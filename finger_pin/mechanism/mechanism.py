@@ -21,15 +21,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.energies import Energies
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.joined_bodies import join_bodies
-from finger_pin.mechanism.pieces import PathKinematics, Paths, moved, path_kinematics
+from finger_pin.mechanism.path_elements import PathKinematics, Paths, moved, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import Rows, RowSignals
+from finger_pin.mechanism.rows import Energies, Rows, RowSignals
+from finger_pin.mechanism.urdf import join_bodies
+from finger_pin.typing import Array
 
-#: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `laws.palm`.
+#: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `base_motion`.
 GUIDES = 27
 
 
@@ -156,7 +155,7 @@ class Mechanism:
             x: Shape (size,) or (m, size).
             command: Inputs u, shape (channels,) or (m, channels).
             force: At the tips, shape (3,) or (m, 3) for one, (t, 3) or (m, t, 3) for several, N, base frame.
-            base: Motion of the base, the numbers of `laws.palm`, shape (12 or more,) or (m, 12 or more), at rest by
+            base: Motion of the base, the numbers of `base_motion`, shape (12 or more,) or (m, 12 or more), at rest by
                 default; after `GUIDES` of them the accelerations of what is moved along paths, zero by default.
         """
         q, v, z = self.split(x)

@@ -5,22 +5,59 @@ from __future__ import annotations
 import copy
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.kinematics import Kinematics
+from finger_pin.typing import Array
 
 # The two halves of a free body; a quaternion of the spherical one has four numbers.
 FREE_JOINTS = ("JointModelTranslation", "JointModelSpherical")
 
 
-class Form:
+class Topology:
     """The identity of all bodies that differ in inertias and gravity alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """Positions and velocities of the rigid body; leading dimensions such as time are kept.
+
+    Attributes:
+        tip: p, fingertip position, shape (..., 3), m; of several shape (..., t, 3).
+        tip_velocity: p', m/s, of the same shape.
+        jacobian: J of (6), shape (..., 3, n); of several (..., t, 3, n).
+        directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
+        kinetic_energy: Shape (...,), J.
+        potential_energy: Of gravity, shape (...,), J.
+    """
+
+    tip: Array
+    tip_velocity: Array
+    jacobian: Array
+    directions: Array
+    kinetic_energy: Array
+    potential_energy: Array
+
+
+class Motion(NamedTuple):
+    """Place of the fingertip and energies of the rigid body; leading dimensions are kept.
+
+    Attributes:
+        tip: p, shape (..., 3), m; of several shape (..., t, 3).
+        kinetic_energy: Shape (...,), J.
+        potential_energy: Of gravity, shape (...,), J.
+        objects: Both energies of free objects around it; None without surroundings.
+    """
+
+    tip: Array
+    kinetic_energy: Array
+    potential_energy: Array
+    objects: tuple[Array, Array] | None = None
 
 
 class RigidBody:
@@ -68,7 +105,7 @@ class RigidBody:
         for row, tip in enumerate(self.tips):
             self.supports[row, [each - 1 for each in model.supports[model.frames[tip].parentJoint] if each]] = 1.0
         self.joints: tuple[str, ...] = tuple(model.names[1:])
-        self.form, self._own = Form(), threading.local()
+        self.form, self._own = Topology(), threading.local()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
         self.carriers: list[int] = [0]
         for index in range(1, model.njoints):
@@ -215,7 +252,7 @@ class RigidBody:
             v: Shape (n,).
             a: Shape (n,).
             base: Velocity of the base and its acceleration less gravity in its own axes, angular parts first, as in
-                `laws.palm`; shape (12,) or more.
+                `base_motion`; shape (12,) or more.
 
         Returns:
             Moment and force on the base about its origin, in its axes, shape (6,), and torques, shape (n,).
@@ -253,8 +290,8 @@ class RigidBody:
     def kinematics(self, q: Array, v: Array, base: Array | None = None) -> Kinematics:
         """Return kinematics and energies at positions and velocities, for shapes (..., n).
 
-        With a base that moves, (..., 15) or more numbers of `laws.palm`, energies are those of the motion in the world,
-        where the base has no height; all else is as seen from the base.
+        With a base that moves, (..., 15) or more numbers of `base_motion`, energies are those of the motion in the
+        world, where the base has no height; all else is as seen from the base.
         """
         if q.ndim > 1:
             bases = [None] * len(q) if base is None else base

@@ -8,19 +8,69 @@ evaluated.
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
-from finger_pin.mechanism.energies import LOST, SUPPLIED, Energy, energy
-from finger_pin.mechanism.pieces import Leg
+from finger_pin.mechanism.path_elements import PathTerm
+from finger_pin.typing import Array
+
+STORED, SUPPLIED, LOST = "stored", "supplied", "lost"
+
+
+class Energy(NamedTuple):
+    """An energy, J, that is stored, or a power, W, that is supplied or lost; tables may share one.
+
+    Attributes:
+        name: In a result it follows ``energy_`` or ``power_``.
+        label: A few words for people.
+        kind: `STORED`, `SUPPLIED` or `LOST`; a table of rows takes it from its law.
+    """
+
+    name: str
+    label: str
+    kind: str = STORED
+
+
+def energy(given: Energy | str) -> Energy:
+    """Return an energy; one that is given by its name has that for a label, too."""
+    return Energy(given, given.replace("_", " ")) if isinstance(given, str) else given
+
+
+#: The powers that a moving base supplies, and what moves objects along paths.
+BASE, GUIDED = Energy("palm", "motion of the palm", SUPPLIED), Energy("objects", "motion of objects", SUPPLIED)
+
+
+@dataclass(frozen=True, eq=False)
+class Energies:
+    """The energies and powers of all rows, each once.
+
+    Attributes:
+        stored: Energies.
+        powers: Powers, supplied and lost.
+    """
+
+    stored: tuple[Energy, ...]
+    powers: tuple[Energy, ...]
+
+    @classmethod
+    def of(cls, rows: Sequence[Rows], moved: bool = False, guided: bool = False) -> Energies:
+        """Collect those of tables, and those of moved coordinates and of a base that moves."""
+        base = ((GUIDED,) if guided else ()) + ((BASE,) if moved else ())
+        return cls(_once(table.stored for table in rows), (*_once(p for table in rows for p in table.powers), *base))
+
+
+def _once(energies: Iterable[Energy]) -> tuple[Energy, ...]:
+    found: dict[str, Energy] = {}
+    for each in energies:
+        found.setdefault(each.name, each)
+    return tuple(found.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +117,7 @@ class Rows:
     pins: NDArray[np.int64] = None  # type: ignore[assignment]
     bends: Array = None  # type: ignore[assignment]
     curvature_offset: Array = None  # type: ignore[assignment]
-    paths: tuple[tuple[Leg, ...], ...] = ()
+    paths: tuple[tuple[PathTerm, ...], ...] = ()
     stored: Energy = None  # type: ignore[assignment]
     powers: tuple[Energy, ...] = ()
     unit: str = ""

@@ -8,15 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
-from finger_pin.description.palm import Palm
-from finger_pin.description.parameters import FingerDescription, Link
-from finger_pin.description.routing import Array
+from finger_pin.description.parameters import Link
+from finger_pin.description.placement import Palm
 from finger_pin.description.surface import Surface
 from finger_pin.description.tree import Tree
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.routes import Placed, rotation
+from finger_pin.mechanism.tendon_paths import Placed, rotation
+from finger_pin.typing import Array
 
 # A link's own z axis runs along it, which is the x axis of its joint.
 _SLIGHT = 1e-9
@@ -30,7 +31,6 @@ _WORLD_JOINTS = (
     pin.JointModelPY,
     pin.JointModelPZ,
 )
-_EXTENDED: Remembered[RigidBody] = Remembered()
 _ALONG_LINK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
@@ -190,11 +190,10 @@ def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm 
     world: tuple[float, ...] = ()
     if palm is not None and any(each.frame == "world" for each in objects.values()):
         world = tuple(palm.on_path(name.split()[1]).greatest for name in WORLD)
-    form = _EXTENDED.of((body.form, *moved, world), lambda: _extended(body, moved, world))
-    heavy = tuple((objects[name].mass, objects[name].inertia) for name in moved)
-    return _EXTENDED.of((form, body, heavy), lambda: _weighing(form, body, [objects[name] for name in moved]))
+    return _weighing(_extended(body, moved, world), body, [objects[name] for name in moved])
 
 
+@memoised(lambda form, body, moved: (form, body, *((each.mass, each.inertia) for each in moved)))
 def _weighing(form: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
     """Return an extended body with the inertias of the body itself, and those of objects that move."""
     # Of what is led any inertia will do, if it is too little to count.
@@ -208,6 +207,7 @@ def _weighing(form: RigidBody, body: RigidBody, moved: Sequence[Object]) -> Rigi
     return form.weighing(inertias, body.model.gravity.linear)
 
 
+@memoised(lambda body, moved, world: (body.form, *moved, world))
 def _extended(body: RigidBody, moved: Sequence[str], world: Sequence[float]) -> RigidBody:
     """Return a rigid body with joints of objects that move, and of the world, which goes no farther than it does, m."""
     model, place = pin.Model(body.model), pin.SE3.Identity()

@@ -13,72 +13,110 @@ tendons that these pull, and of branches behind pulleys, that of the other tendo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finger_pin.description.caching import Remembered
-from finger_pin.mechanism.rows import Rows, further_states
-
-if TYPE_CHECKING:
-    from finger_pin.mechanism.actuators import Actuators
-    from finger_pin.mechanism.surroundings import Surroundings
-    from finger_pin.mechanism.tendons import Tendons
-
-Array = NDArray[np.float64]
-_KNOWN: Remembered[Layout] = Remembered()
+from finger_pin.typing import Array
 
 
-@dataclass(frozen=True, eq=False)
+class Block(NamedTuple):
+    """A kind of numbers of the state.
+
+    Attributes:
+        unit: Of its numbers.
+        scale: Typical magnitudes for absolute tolerances; of several, which take turns, one for each number.
+        variable: The variable of a result that has it, from which a start may be read; empty where tables have it.
+        long_name: Of that variable.
+        dimension: Of that variable, besides time.
+        equation: Of the paper.
+    """
+
+    unit: str
+    scale: tuple[float, ...] = (1.0,)
+    variable: str = ""
+    long_name: str = ""
+    dimension: str = ""
+    equation: str = ""
+
+
+def _of(*entries: Any) -> dict[str, Block]:
+    return {"block": Block(*entries)}
+
+
+# A block that is left out.
+_ZEROS: Any = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class State:
-    """The state by name; every array may have leading dimensions, such as time.
+    """The state by name, in the order of the packed vector; blocks may be left out for zeros.
+
+    Every array may have leading dimensions, such as time. This is the one list of all blocks: packing, tolerances,
+    starts and the variables of results read it.
 
     Attributes:
         position: theta, shape (..., n), rad.
-        passive_position: p_5, shape (..., p), m.
-        velocity: theta', shape (..., n), rad/s.
-        passive_velocity: p_5', shape (..., p), m/s.
-        tendon_stiction: F^s of the tendons, shape (..., t), N.
-        joint_stiction: F^s of the joints, shape (..., n), N m.
-        further: States of rows of one's own, shape (..., f); zero if left out, as what follows.
-        motor_position: theta_m, shape (..., m), rad.
-        motor_velocity: theta_m', shape (..., m), rad/s.
-        gearbox_stiction: F^s of the gearboxes, shape (..., m), N m.
         object_pose: Position, m, base frame, and unit quaternion x, y, z, w of every free object, shape (..., 7 f).
-        object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
         world_position: Of the world that a palm sees: less its roll, pitch, yaw, rad, x, y and z, m, shape (..., 6);
             (..., 0) where nothing stands there.
-        world_velocity: Its rate, rad/s and m/s.
+        passive_position: p_5, shape (..., p), m.
+        motor_position: theta_m, shape (..., m), rad.
+        velocity: theta', shape (..., n), rad/s.
+        object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
+        world_velocity: Rate of `world_position`, rad/s and m/s.
+        passive_velocity: p_5', shape (..., p), m/s.
+        motor_velocity: theta_m', shape (..., m), rad/s.
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
-        elastic_stiction: F^s that tendons hold against their stretch, halves of passive ones first, shape (..., h), N.
-        drives: States of drives of one's own, shape (..., d); they follow what tendons hold.
         actuator_state: States of a tree's actuators that have some, shape (..., k).
+        elastic_stiction: F^s that tendons hold against their stretch, halves of passive ones first, shape (..., h), N.
+        drives: States of a user's drives, shape (..., d).
+        tendon_stiction: F^s of the tendons, shape (..., t), N.
         canal_stiction: F^s of a tree's tendons that no drive pulls, and of branches behind pulleys, shape (..., c), N.
+        joint_stiction: F^s of the joints, shape (..., n), N m.
+        gearbox_stiction: F^s of the gearboxes, shape (..., m), N m.
+        further: States of a user's other rows, shape (..., f).
     """
 
-    position: Array
-    passive_position: Array
-    velocity: Array
-    passive_velocity: Array
-    tendon_stiction: Array
-    joint_stiction: Array
-    further: Array | None = None
-    motor_position: Array | None = None
-    motor_velocity: Array | None = None
-    gearbox_stiction: Array | None = None
-    object_pose: Array | None = None
-    object_velocity: Array | None = None
-    world_position: Array | None = None
-    world_velocity: Array | None = None
-    contact_bend: Array | None = None
-    elastic_stiction: Array | None = None
-    drives: Array | None = None
-    actuator_state: Array | None = None
-    canal_stiction: Array | None = None
+    position: Array = field(default=_ZEROS, metadata=_of("rad", (1.0,), "joint_position", "joint angle", "joint"))
+    # An object moves by centimetres where a joint turns by a radian.
+    object_pose: Array = field(default=_ZEROS, metadata=_of("m, 1", (*3 * (1e-2,), *4 * (1.0,))))
+    world_position: Array = field(default=_ZEROS, metadata=_of("rad, m", (*3 * (1.0,), *3 * (1e-2,))))
+    passive_position: Array = field(
+        default=_ZEROS,
+        metadata=_of("m", (1e-3,), "passive_position", "position of the lumped mass", "passive_tendon", "13"),
+    )
+    motor_position: Array = field(
+        default=_ZEROS, metadata=_of("rad", (1.0,), "motor_position", "angle of the spool", "motor")
+    )
+    velocity: Array = field(default=_ZEROS, metadata=_of("rad/s", (10.0,), "joint_velocity", "joint velocity", "joint"))
+    object_velocity: Array = field(default=_ZEROS, metadata=_of("m/s, rad/s", (*3 * (0.1,), *3 * (10.0,))))
+    world_velocity: Array = field(default=_ZEROS, metadata=_of("rad/s, m/s", (*3 * (10.0,), *3 * (0.1,))))
+    passive_velocity: Array = field(
+        default=_ZEROS,
+        metadata=_of("m/s", (0.1,), "passive_velocity", "velocity of the lumped mass", "passive_tendon", "13"),
+    )
+    motor_velocity: Array = field(
+        default=_ZEROS, metadata=_of("rad/s", (10.0,), "motor_velocity", "velocity of the spool", "motor")
+    )
+    contact_bend: Array = field(default=_ZEROS, metadata=_of("m", (1e-5,)))
+    actuator_state: Array = field(default=_ZEROS, metadata=_of("1"))
+    elastic_stiction: Array = field(default=_ZEROS, metadata=_of("N"))
+    drives: Array = field(default=_ZEROS, metadata=_of("1"))
+    tendon_stiction: Array = field(
+        default=_ZEROS, metadata=_of("N", (1.0,), "tendon_stiction", "tendon stiction force", "tendon", "9a")
+    )
+    canal_stiction: Array = field(default=_ZEROS, metadata=_of("N"))
+    joint_stiction: Array = field(
+        default=_ZEROS, metadata=_of("N m", (1e-2,), "joint_stiction", "joint stiction torque", "joint", "9a")
+    )
+    gearbox_stiction: Array = field(
+        default=_ZEROS, metadata=_of("N m", (1e-2,), "gearbox_stiction", "its stiction torque", "motor", "9a")
+    )
+    further: Array = field(default=_ZEROS, metadata=_of("1"))
 
     @property
     def q(self) -> Array:
@@ -91,112 +129,40 @@ class State:
         return self.velocity
 
 
+#: Every block of the state, in the order of the packed vector.
+BLOCKS: dict[str, Block] = {each.name: each.metadata["block"] for each in fields(State)}
+# Blocks whose numbers have the names of the user's rows.
+_NAMED = ("drives", "further")
+
+
 @dataclass(frozen=True)
 class Layout:
     """Sizes and order of the packed state.
 
     Attributes:
-        joints: Names of the joints.
-        tendons: Names of the tendons, the passive ones last.
-        passive: Number of passive tendons.
-        further: Name and scale of every state of further rows, which follow.
-        ringing: Angular frequencies of the lumped masses on their two halves, one for each passive tendon, rad/s.
-        motors: Names of the motors.
-        objects: Names of the free objects.
-        world: Names of the joints of the world that a palm sees.
-        contacts: Names of the contacts.
-        held: Names of the halves of passive tendons, and then of the tendons on spools, with hysteresis.
-        drives: Name and scale of every state of drives of one's own.
-        actuators: Names of a tree's actuators with states.
-        canals: Names of the canals of a tree, with branches.
+        labels: Of every block, in order, the names of its numbers.
+        scaled: Blocks with other scales than their own: the block, and a scale for each number.
     """
 
-    joints: tuple[str, ...]
-    tendons: tuple[str, ...]
-    passive: int
-    further: tuple[tuple[str, float], ...] = ()
-    ringing: tuple[float, ...] = ()
-    motors: tuple[str, ...] = ()
-    objects: tuple[str, ...] = ()
-    world: tuple[str, ...] = ()
-    contacts: tuple[str, ...] = ()
-    held: tuple[str, ...] = ()
-    drives: tuple[tuple[str, float], ...] = ()
-    actuators: tuple[str, ...] = ()
-    canals: tuple[str, ...] = ()
+    labels: tuple[tuple[str, ...], ...]
+    scaled: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     @classmethod
-    def of(
-        cls,
-        tendons: Tendons,
-        motors: Actuators,
-        rows: Sequence[Rows] = (),
-        around: Surroundings | None = None,
-        of_tree: Sequence[Rows] = (),
-        canals: Sequence[Rows] = (),
-    ) -> Layout:
-        """Return the layout of tendons, motors, further rows, drives among them, and a finger's surroundings."""
-        routing = tendons.routing
-        drives, further = (
-            further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False)
+    def of(cls, labels: Mapping[str, Sequence[str]], scaled: Mapping[str, Sequence[float]] | None = None) -> Layout:
+        """Return the layout of some blocks' names; blocks that are left out are empty."""
+        return cls(
+            tuple(tuple(labels.get(name, ())) for name in BLOCKS),
+            tuple((name, tuple(map(float, scales))) for name, scales in (scaled or {}).items()),
         )
-        ringing = np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)
-        found = cls(
-            joints=routing.joints,
-            tendons=routing.tendons,
-            passive=routing.passive,
-            further=further,
-            ringing=tuple(ringing.tolist()),
-            motors=motors.names,
-            objects=() if around is None else tuple(around.free),
-            world=() if around is None else around.world,
-            contacts=() if around is None else around.contacts.names,
-            held=(*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
-            drives=drives,
-            actuators=tuple(name for table in of_tree if table.states for name in table.names),
-            canals=tuple(name for table in canals if table.states for name in table.names),
-        )
-        # Of the same names and sizes much follows, once for all fingers.
-        return _KNOWN.of((found,), lambda: found)
 
-    @cached_property
-    def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:
-        """Names and the scale of every block, in order."""
-        passive = self.tendons[len(self.tendons) - self.passive :]
-        poses, rates, bends = (
-            tuple(f"{name}.{part}" for name in names for part in parts.split())
-            for names, parts in (
-                (self.objects, "x y z qx qy qz qw"),
-                (self.objects, "vx vy vz wx wy wz"),
-                (self.contacts, "1 2"),
-            )
-        )
-        return {
-            "position": (self.joints, 1.0),
-            "object_pose": (poses, 1.0),
-            "world_position": (self.world, 1.0),
-            "passive_position": (passive, 1e-3),
-            "motor_position": (self.motors, 1.0),
-            "velocity": (self.joints, 10.0),
-            "object_velocity": (rates, 10.0),
-            "world_velocity": (self.world, 10.0),
-            "passive_velocity": (passive, 0.1),
-            "motor_velocity": (self.motors, 10.0),
-            "contact_bend": (bends, 1e-5),
-            "actuator_state": (self.actuators, 1.0),
-            "elastic_stiction": (self.held, 1.0),
-            "drives": (tuple(name for name, _ in self.drives), 1.0),
-            "tendon_stiction": (self.tendons, 1.0),
-            "canal_stiction": (self.canals, 1.0),
-            "joint_stiction": (self.joints, 1e-2),
-            "gearbox_stiction": (self.motors, 1e-2),
-            "further": (tuple(name for name, _ in self.further), 1.0),
-        }
+    def names_of(self, block: str) -> tuple[str, ...]:
+        """Return the names of a block's numbers."""
+        return self.labels[tuple(BLOCKS).index(block)]
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """Sizes of the blocks, in order."""
-        return tuple(len(names) for names, _ in self._blocks.values())
+        return tuple(map(len, self.labels))
 
     @cached_property
     def size(self) -> int:
@@ -207,7 +173,7 @@ class Layout:
     def _parts(self) -> dict[str, slice]:
         ends = np.cumsum(self.sizes)
         parts = (slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True))
-        return dict(zip(self._blocks, parts, strict=True))
+        return dict(zip(BLOCKS, parts, strict=True))
 
     @cached_property
     def _filled(self) -> list[tuple[str, slice]]:
@@ -216,17 +182,16 @@ class Layout:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """A name for every number of the packed state."""
-        prefixes = dict.fromkeys(("position", "velocity"), "joint_")
         return tuple(
-            name if kind in ("further", "drives") else f"{prefixes.get(kind, '')}{kind}[{name}]"
-            for kind, (names, _) in self._blocks.items()
+            name if kind in _NAMED else f"{block.variable or kind}[{name}]"
+            for (kind, block), names in zip(BLOCKS.items(), self.labels, strict=True)
             for name in names
         )
 
     def pack(self, state: State) -> Array:
         """Return the packed vector, shape (..., size)."""
         lead, blocks = state.position.shape[:-1], []
-        for kind, size in zip(self._blocks, self.sizes, strict=True):
+        for kind, size in zip(BLOCKS, self.sizes, strict=True):
             given = getattr(state, kind)
             blocks.append(np.zeros((*lead, size)) if given is None else given)
         return np.concatenate(blocks, axis=-1)
@@ -257,17 +222,8 @@ class Layout:
 
     @cached_property
     def _scales(self) -> Array:
-        scales = np.repeat([scale for _, scale in self._blocks.values()], self.sizes)
-        for kind, states in (("further", self.further), ("drives", self.drives)):
-            scales[self._parts[kind]] = [scale for _, scale in states]
-        if self.ringing:
-            passive = self._parts["passive_velocity"]
-            scales[passive] = np.maximum(scales[passive], 1e-5 * np.array(self.ringing))
-        if self.objects:
-            # An object moves by centimetres where a joint turns by a radian.
-            poses, rates = (self._parts[kind] for kind in ("object_pose", "object_velocity"))
-            scales[poses].reshape(-1, 7)[:, :3] = 1e-2
-            scales[rates].reshape(-1, 6)[:, :3] = 0.1
-        scales[self._parts["world_position"]][3:] = 1e-2
-        scales[self._parts["world_velocity"]][3:] = 0.1
+        blocks = zip(BLOCKS.values(), self.sizes, strict=True)
+        scales = np.concatenate([np.resize(block.scale, size) for block, size in blocks])
+        for kind, own in self.scaled:
+            scales[self._parts[kind]] = own
         return scales

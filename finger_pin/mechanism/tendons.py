@@ -7,17 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.caching import Remembered
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
-from finger_pin.laws.passive_tendon import TENDON_HALF
-from finger_pin.mechanism.energies import Energy
-from finger_pin.mechanism.hysteresis import OF_TENDONS, hysteresis_rows
-from finger_pin.mechanism.joint_friction import bristles
-from finger_pin.mechanism.rows import Rows, pulled
+from finger_pin.laws.spring import TENDON_HALF
+from finger_pin.mechanism.joints import OF_TENDONS, bristles, hysteresis_rows
+from finger_pin.mechanism.rows import Energy, Rows, pulled
+from finger_pin.typing import Array
 
 #: What ideal sources of force supply.
 SOURCES = Energy("actuators", "actuators")
@@ -32,7 +31,6 @@ BRISTLES = Energy("tendon_bristles", "tendon bristles")
 _HALVES = ("proximal", "distal")
 # What the law calls otherwise.
 _NAMES = {"ratio": "stiction_ratio"}
-_WIRED: Remembered[list[Rows]] = Remembered()
 _STRETCHING = Energy("passive_hysteresis", "passive tendons stretching")
 
 
@@ -158,7 +156,7 @@ class Tendons:
         if self.held:
             return self._rows(drives, motors)
         # How they are wired, other numbers of friction leave alone.
-        tables = _WIRED.of((self.routing, *(each.form for each in drives), motors), lambda: self._rows(drives, motors))
+        tables = self._wired(drives, motors)
         friction = self._friction
         halves, *_, driven, passive = tables
         taken, actuated = driven.parameters[-1:], self.routing.actuated
@@ -168,6 +166,10 @@ class Tendons:
             driven.numbered(np.concatenate([friction[:, :actuated], taken])),
             passive.numbered(friction[:, actuated:]),
         ]
+
+    @memoised(lambda self, drives, motors: (self.routing, *(each.form for each in drives), motors))
+    def _wired(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
+        return self._rows(drives, motors)
 
     @property
     def _friction(self) -> Array:

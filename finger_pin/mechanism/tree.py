@@ -11,24 +11,22 @@ import numpy as np
 import pinocchio as pin
 from numpy.polynomial import Polynomial
 
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import Coupling, TreeActuator
 from finger_pin.exceptions import InputError
 from finger_pin.laws.actuator import ACTUATOR, ACTUATOR_WITH_STATE
 from finger_pin.laws.bristle import PIN_FRICTION
-from finger_pin.laws.dead_band import DEAD_BAND_SPRING
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
-from finger_pin.laws.spring import CONSTANT_FORCE, JOINT_SPRING
-from finger_pin.mechanism.energies import Energy
-from finger_pin.mechanism.pieces import Leg, Piece, Place
+from finger_pin.laws.spring import CONSTANT_FORCE, DEAD_BAND_SPRING, JOINT_SPRING
+from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.routes import Placed, Route, Routes, rotation
-from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
+from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, rotation
 from finger_pin.mechanism.tendons import SOURCES
+from finger_pin.typing import Array
 
 #: The tables of actuators without and with a state.
 STATELESS, STATEFUL = "actuator", "actuator_with_state"
@@ -56,7 +54,7 @@ _EXCHANGED = {
 }
 
 
-def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
+def build_tree(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
     """Return the rigid body of a tree, with the description's gravity, and its tendons.
 
     Raises:
@@ -96,10 +94,10 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
             raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
     rigid_body = RigidBody(model, _TIP)
     middles = {name: 0.5 * sum(each.range) for name, each in description.joints.items()}
-    return rigid_body, Routes.of(tree, rigid_body, placed, middles)
+    return rigid_body, TendonPaths.of(tree, rigid_body, placed, middles)
 
 
-def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> Rows:
+def along_paths(description: FingerDescription, routes: TendonPaths, table: Rows) -> Rows:
     """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter."""
     assert description.tree is not None
     if table.group != "driven_tendons" and not table.pulls:
@@ -116,13 +114,15 @@ def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> 
     return replace(table, arm=arm, measure=arm, offset=offset, paths=tuple(paths))
 
 
-def tree_rows(description: FingerDescription, routes: Routes, width: int) -> list[Rows]:
+def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -> list[Rows]:
     """Return the rows of a tree but for friction of loaded tendons, as wide as there are coordinates."""
     tree = description.tree
     assert tree is not None
-    joints = {name: Route(row, ()) for name, row in zip(tree.joints, np.eye(len(tree.joints)), strict=True)}
+    joints = {name: TendonPath(row, ()) for name, row in zip(tree.joints, np.eye(len(tree.joints)), strict=True)}
 
-    def table(group: str, law: Law, along: dict[str, Route], numbers: Sequence[Sequence[float]], **more: Any) -> Rows:
+    def table(
+        group: str, law: Law, along: dict[str, TendonPath], numbers: Sequence[Sequence[float]], **more: Any
+    ) -> Rows:
         arm = np.zeros((len(along), width))
         arm[:, : len(joints)] = [route.coefficients for route in along.values()]
         paths = tuple(route.legs for route in along.values())
@@ -151,17 +151,17 @@ def tree_rows(description: FingerDescription, routes: Routes, width: int) -> lis
     return tables
 
 
-_Described = tuple[str, Law, dict[str, Route], Sequence[Sequence[float]]]
+_Described = tuple[str, Law, dict[str, TendonPath], Sequence[Sequence[float]]]
 
 
-def _tendons(tree: Tree, routes: Routes) -> list[_Described]:
+def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     """Return springs, ranges, and the dry friction of tendons that no load presses."""
     tendons = tree.tendons
     sprung = {name: each for name, each in tendons.items() if each.stiffness or each.damping}
     limited = {name: each for name, each in tendons.items() if each.range is not None}
     rubbing = {name: each for name, each in tendons.items() if each.friction and name not in tree.rubbing}
 
-    def along(names: Iterable[str]) -> dict[str, Route]:
+    def along(names: Iterable[str]) -> dict[str, TendonPath]:
         return {name: routes.routes[name] for name in names}
 
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
@@ -175,19 +175,19 @@ def _tendons(tree: Tree, routes: Routes) -> list[_Described]:
     ]
 
 
-def _couplings(tree: Tree, routes: Routes, joints: Mapping[str, Route]) -> _Described:
+def _couplings(tree: Tree, routes: TendonPaths, joints: Mapping[str, TendonPath]) -> _Described:
     """Return the springs that hold joints to others."""
     along = {name: coupling_route(tree, routes, each, joints) for name, each in tree.couplings.items()}
     numbers = [(each.stiffness, each.offset, each.damping) for each in tree.couplings.values()]
     return "coupling", JOINT_SPRING, along, numbers
 
 
-def coupling_route(tree: Tree, routes: Routes, coupling: Coupling, joints: Mapping[str, Route]) -> Route:
+def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: Mapping[str, TendonPath]) -> TendonPath:
     """Return what a coupling holds at its offset: q less all else that it is a sum of."""
     held = joints[coupling.joint].coefficients
     if coupling.other is None:
-        return Route(held, ())
-    route = Route(held - coupling.ratio * joints[coupling.other].coefficients, ())
+        return TendonPath(held, ())
+    route = TendonPath(held - coupling.ratio * joints[coupling.other].coefficients, ())
     if not any(coupling.higher):
         return route
     # An angle is measured from its range's middle, so that it never comes to half a turn.
@@ -201,14 +201,14 @@ def coupling_route(tree: Tree, routes: Routes, coupling: Coupling, joints: Mappi
     frame = model.jointPlacements[index] * pin.SE3(upright, np.zeros(3))
     if hinge:
         moved = Place(index, upright @ np.array([math.cos(middle), -math.sin(middle), 0.0]))
-        piece = Piece(ANGLE, numbers, (moved, Place(parent, np.array(frame.translation))), parent, frame)
+        piece = PathElement(ANGLE, numbers, (moved, Place(parent, np.array(frame.translation))), parent, frame)
     else:
         still = Place(parent, np.array(frame.act(np.array([0.0, 0.0, middle]))))
-        piece = Piece(RISE, numbers, (still, Place(index, np.zeros(3))), parent, frame)
-    return replace(route, legs=(Leg(piece, arm=-1.0),))
+        piece = PathElement(RISE, numbers, (still, Place(index, np.zeros(3))), parent, frame)
+    return replace(route, legs=(PathTerm(piece, arm=-1.0),))
 
 
-def _loops(tree: Tree, routes: Routes) -> _Described:
+def _loops(tree: Tree, routes: TendonPaths) -> _Described:
     """Return the springs that hold points of bodies together, one along each axis of the base."""
     along = {}
     for name, each in tree.loops.items():
@@ -219,7 +219,7 @@ def _loops(tree: Tree, routes: Routes) -> _Described:
     return "loop", JOINT_SPRING, along, numbers
 
 
-def _weights(description: FingerDescription, routes: Routes) -> _Described:
+def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
     """Return the forces that hold up a part of bodies' weight."""
     tree, gravity = description.tree, np.array(description.gravity)
     size = float(np.linalg.norm(gravity))
@@ -235,11 +235,11 @@ def _weights(description: FingerDescription, routes: Routes) -> _Described:
     return "gravity_compensation", CONSTANT_FORCE, along, numbers
 
 
-def _rise(first: Place, second: Place, axis: Array) -> Route:
+def _rise(first: Place, second: Place, axis: Array) -> TendonPath:
     """Return the height of one point above another along an axis of the base, a unit vector."""
     numbers = np.eye(len(RISE.parameters))[1]
-    piece = Piece(RISE, numbers, (first, second), 0, pin.SE3(_upright(axis), np.zeros(3)))
-    return Route(np.zeros(1), (Leg(piece),))
+    piece = PathElement(RISE, numbers, (first, second), 0, pin.SE3(_upright(axis), np.zeros(3)))
+    return TendonPath(np.zeros(1), (PathTerm(piece),))
 
 
 def _upright(axis: Array) -> Array:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.mujoco.memory import compiled, integer, integer_in, integers, number_in, numbers, size
+from finger_pin.core.jit import njit_inline
+from finger_pin.mujoco.memory import integer, integer_in, integers, number_in, numbers, size
 
 # What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
 _NOTHING = 1e-12
 
 
-@compiled
+@njit_inline
 def write_rows(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any) -> None:
     """Write the solver's rows: of islands their copies too, of a dual one the diagonal of its matrix."""
     width, ne, nefc = size(m, at.nv), integer(d, of.ne), integer(d, of.nefc)
@@ -38,7 +39,7 @@ def write_rows(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any)
             numbers(d, of.efc_AR)[_diagonal(m, d, at, of, kinds, r, nefc)] += held - before
 
 
-@compiled
+@njit_inline
 def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -> Any:
     """Return the address of a diagonal entry of the dual solver's matrix, in its dense or its sparse form."""
     how = integer(m, at.jacobian)
@@ -51,7 +52,7 @@ def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -
     return k
 
 
-@compiled
+@njit_inline
 def row_forces(m: Any, d: Any, at: Any, of: Any, kinds: Any, width: Any, found: Any) -> None:
     """Note the forces of the solver's rows of friction, by degree of freedom and tendon."""
     ne = integer(d, of.ne)

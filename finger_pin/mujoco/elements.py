@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.mechanism.exchange.mujoco_friction import (
+from finger_pin.core.jit import njit_inline
+from finger_pin.exchange.mujoco_friction import (
     BRANCH,
     DRAG,
     FLOOR,
@@ -21,10 +22,10 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     VISCOUS,
 )
 from finger_pin.mujoco.loads import between, spring, turn_of_path
-from finger_pin.mujoco.memory import compiled, integer_in, integers, number_in, numbers
+from finger_pin.mujoco.memory import integer_in, integers, number_in, numbers
 
 
-@compiled
+@njit_inline
 def tendon(
     m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, force: Any, held: Any, along: Any, about: Any, reactions: Any
 ) -> Any:
@@ -59,7 +60,7 @@ def tendon(
     return speed, tension, pressing, most, p[OFFSET] + bend, real, imaginary
 
 
-@compiled
+@njit_inline
 def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> Any:
     """Return the angle by which a path turns besides its offset, (15) or along its points: see `turn_of_path`."""
     if tendon >= 0 and integer_in(d, of.ten_wrapnum, tendon) > 0:
@@ -72,7 +73,7 @@ def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> 
     return found, 1.0, 0.0
 
 
-@compiled
+@njit_inline
 def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -> Any:
     """Return speed, load, normal force, largest friction and turn of a slide that is a passive tendon's mass: (14c)."""
     p, objects, types = (
@@ -93,7 +94,7 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
     return speed, load, load, np.inf, bend, 1.0, 0.0
 
 
-@compiled
+@njit_inline
 def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> Any:
     """Return speed, load, normal force, largest friction and turn of a joint's pin: (17)."""
     joint = integer_in(m, at.tuple_objid, e)
@@ -107,7 +108,7 @@ def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> 
     return speed, load, load, np.inf, 0.0, 1.0, 0.0
 
 
-@compiled
+@njit_inline
 def _proximal(m: Any, d: Any, at: Any, of: Any, joint: Any) -> Any:
     """Return e_j: from the joint before to this one, or the x axis of its carrier."""
     parent, joints, count = integers(m, at.body_parentid), integers(m, at.body_jntadr), integers(m, at.body_jntnum)

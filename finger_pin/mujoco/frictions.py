@@ -9,9 +9,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, PluginFriction
+from finger_pin.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, PluginFriction
+from finger_pin.typing import Array
 
 # Kinds of joints that have one coordinate.
 _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))

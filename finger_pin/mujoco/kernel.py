@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.mechanism.exchange.mujoco_friction import (
+from finger_pin.core.jit import njit_inline, scratch
+from finger_pin.exchange.mujoco_friction import (
     BRANCH,
     DRAG,
     FORCE,
@@ -34,7 +35,6 @@ from finger_pin.mujoco.constraint_rows import row_forces, write_rows
 from finger_pin.mujoco.elements import mass, pin, tendon
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
 from finger_pin.mujoco.memory import (
-    compiled,
     flags,
     integer,
     integer_in,
@@ -42,7 +42,6 @@ from finger_pin.mujoco.memory import (
     number,
     numbers,
     numbers_at,
-    scratch,
     size,
     words,
     zeros,
@@ -71,7 +70,7 @@ _NUMERICAL = 1e-4
 _LOW = 0xFFFFFFFF
 
 
-@compiled
+@njit_inline
 def instance_of(m: Any, instance: Any, at: Any, kinds: Any) -> Any:
     """Return the actuator and the tuple of an instance; -1 without them, or without friction."""
     if integer(m, at.integrator) == kinds.discrete:
@@ -90,7 +89,7 @@ def instance_of(m: Any, instance: Any, at: Any, kinds: Any) -> Any:
     return -1, -1
 
 
-@compiled
+@njit_inline
 def signals(m: Any, instance: Any, at: Any) -> Any:
     """Return the number of signals of an instance in plugin_state; MuJoCo asks before a model has its tuples."""
     digits, k, count = flags(m, at.plugin_attr), integer_in(m, at.plugin_attradr, instance), 0
@@ -99,7 +98,7 @@ def signals(m: Any, instance: Any, at: Any) -> Any:
     return SIGNALS * count
 
 
-@compiled
+@njit_inline
 def init(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> Any:
     """Note the actuator and the tuple of an instance in a new mjData; -1 if friction is impossible."""
     actuator, which = instance_of(m, instance, at, kinds)
@@ -109,20 +108,20 @@ def init(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> Any:
     return 0
 
 
-@compiled
+@njit_inline
 def copy(to: Any, d: Any, instance: Any, of: Any) -> None:
     """Copy the notes of `init`."""
     words(to, of.plugin_data)[instance] = words(d, of.plugin_data)[instance]
 
 
-@compiled
+@njit_inline
 def reset(m: Any, state: Any, instance: Any, at: Any) -> None:
     """Forget all signals."""
     for k in range(signals(m, instance, at)):
         numbers_at(state)[k] = 0.0
 
 
-@compiled
+@njit_inline
 def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None:
     """Write the rows of all frictions, the rates of their bristles, and their signals."""
     key, width = words(d, of.plugin_data)[instance], size(m, at.nv)
@@ -177,14 +176,14 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
     write_rows(m, d, at, of, kinds, rows, dt)
 
 
-@compiled
+@njit_inline
 def _entries(m: Any, at: Any, which: Any) -> Any:
     """Return the first element of a tuple, and the one after its last."""
     first = integer_in(m, at.tuple_adr, which)
     return first, first + integer_in(m, at.tuple_size, which)
 
 
-@compiled
+@njit_inline
 def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
     """Return the addresses of the first friction's bristles, loads and signals."""
     bristles = integer_in(m, at.actuator_actadr, key & _LOW)
@@ -192,7 +191,7 @@ def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
     return bristles, loads, integer_in(m, at.plugin_stateadr, instance)
 
 
-@compiled
+@njit_inline
 def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds: Any) -> None:
     """Move bristles by (9a), and note the solver's force of each friction, and its next load."""
     key, width = words(d, of.plugin_data)[instance], size(m, at.nv)
@@ -231,7 +230,7 @@ def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds
         contact_loads(m, d, at, of, contact, kinds, places, act)
 
 
-@compiled
+@njit_inline
 def _speed(m: Any, d: Any, at: Any, of: Any, element: Any, is_joint: Any) -> Any:
     """Return the present speed of a joint, or of a tendon's length along its present arms."""
     speeds = numbers(d, of.qvel)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
-
+from finger_pin.core.jit import njit_inline, power_over
 from finger_pin.mujoco.memory import (
-    compiled,
     flags,
     integer,
     integer_in,
@@ -17,12 +15,11 @@ from finger_pin.mujoco.memory import (
     number_in,
     numbers,
     numbers_at,
-    power_over,
     size,
 )
 
 
-@compiled
+@njit_inline
 def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any) -> None:
     """Add the actuators' forces along tendons, N, and on degrees of freedom, N m or N, within their limits.
 
@@ -45,7 +42,7 @@ def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any)
             along[i] = min(max(along[i], limits[2 * i]), limits[2 * i + 1])
 
 
-@compiled
+@njit_inline
 def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
     """Return the force of a tendon's own spring and damper along it, N, negative in tension."""
     stiffness, damping = number_in(m, at.tendon_stiffness, tendon), number_in(m, at.tendon_damping, tendon)
@@ -56,7 +53,7 @@ def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
     return damped + stiffness * (max(rest[2 * tendon] - length, 0.0) + min(rest[2 * tendon + 1] - length, 0.0))
 
 
-@compiled
+@njit_inline
 def between(points: Any, first: Any, second: Any) -> Any:
     """Return the way from one of MuJoCo's points to another, m."""
     return (
@@ -66,7 +63,7 @@ def between(points: Any, first: Any, second: Any) -> Any:
     )
 
 
-@numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})
+@njit_inline
 def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
     """Return half turns, rad, and the complex number whose angle is the rest by which a spatial tendon's path turns.
 
@@ -96,7 +93,7 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
     return halves, real, imaginary
 
 
-@compiled
+@njit_inline
 def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any, found: Any) -> None:
     """Add the forces of limits and equalities along tendons, N, by the solver's last forces."""
     kind, which, force = integers(d, of.efc_type), integers(d, of.efc_id), numbers(d, of.efc_force)
@@ -110,7 +107,7 @@ def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any, found: Any) -> N
                 found[second[which[r]]] += abs(force[r])
 
 
-@compiled
+@njit_inline
 def contact_loads(m: Any, d: Any, at: Any, of: Any, contact: Any, kinds: Any, place: Any, act: Any) -> None:
     """Add the contact forces on bodies beyond joints, world frame, N: ``place`` is the index in act, or 0."""
     first = size(d, of.contact)
@@ -134,7 +131,7 @@ def contact_loads(m: Any, d: Any, at: Any, of: Any, contact: Any, kinds: Any, pl
                 body = parent[body]
 
 
-@compiled
+@njit_inline
 def _contact_force(d: Any, of: Any, contact: Any, kinds: Any, one: Any, row: Any) -> Any:
     """Return the force of a contact on its second geom, world frame, N."""
     exerted, frame = numbers(d, of.efc_force), numbers_at(one + contact.frame)

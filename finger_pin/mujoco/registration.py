@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import mujoco
-from numba import cfunc, types
 
+from finger_pin.core.jit import address_of
 from finger_pin.exceptions import InputError
-from finger_pin.laws import bristle, capstan
-from finger_pin.mechanism.exchange import mujoco_friction as table
-from finger_pin.mujoco import constraint_rows, elements, kernel, loads, memory, vector_functions, vectorised_law
+from finger_pin.exchange import mujoco_friction as table
+from finger_pin.mujoco import kernel
 from finger_pin.mujoco.layout import layout
 
 _CALLBACKS = (
@@ -36,50 +34,36 @@ class _Plugin(ctypes.Structure):
     )
 
 
-def _fingerprint() -> str:
-    """Return a hash of the files that callbacks come from: numba sees one of them, not those that it calls."""
-    functions = (vector_functions, vectorised_law, constraint_rows)
-    modules = (kernel, elements, *functions, loads, memory, table, bristle, capstan)
-    texts = (Path(str(each.__file__)).read_bytes() for each in modules)
-    return hashlib.sha256(b"".join(texts)).hexdigest()
+def _callbacks(at: Any, of: Any, contact: Any, kinds: Any) -> dict[str, int]:
+    """Return the addresses of the callbacks, of which offsets are constants."""
 
-
-def _compiled(at: Any, of: Any, contact: Any, kinds: Any, made_of: str) -> dict[str, Any]:
-    """Return the callbacks. Offsets are constants of theirs, and numba keeps compiled code by them."""
-    word, whole, nothing = types.intp, types.int32, types.void
-    options: dict[str, Any] = {"cache": True, "error_model": "numpy"}
-
-    @cfunc(whole(word, whole), **options)
     def nstate(m: Any, instance: Any) -> Any:
-        _ = made_of
         return kernel.signals(m, instance, at)
 
-    @cfunc(whole(word, word, whole), **options)
     def init(m: Any, d: Any, instance: Any) -> Any:
-        _ = made_of
         return kernel.init(m, d, instance, at, of, kinds)
 
-    @cfunc(nothing(word, word, word, whole), **options)
     def copy(to: Any, m: Any, d: Any, instance: Any) -> None:
-        _ = made_of
         kernel.copy(to, d, instance, of)
 
-    @cfunc(nothing(word, word, word, whole), **options)
     def reset(m: Any, state: Any, data: Any, instance: Any) -> None:
-        _ = made_of
         kernel.reset(m, state, instance, at)
 
-    @cfunc(nothing(word, word, whole, whole), **options)
     def compute(m: Any, d: Any, instance: Any, capability: Any) -> None:
-        _ = made_of
         kernel.compute(m, d, instance, at, of, kinds)
 
-    @cfunc(nothing(word, word, whole), **options)
     def advance(m: Any, d: Any, instance: Any) -> None:
-        _ = made_of
         kernel.advance(m, d, instance, at, of, contact, kinds)
 
-    return {each.__name__: each for each in (nstate, init, copy, reset, compute, advance)}
+    signatures: dict[Any, str] = {
+        nstate: "int32(intp, int32)",
+        init: "int32(intp, intp, int32)",
+        copy: "void(intp, intp, intp, int32)",
+        reset: "void(intp, intp, intp, int32)",
+        compute: "void(intp, intp, int32, int32)",
+        advance: "void(intp, intp, int32)",
+    }
+    return {each.__name__: address_of(made, each, announced=False) for each, made in signatures.items()}
 
 
 def _library() -> Any:
@@ -92,20 +76,19 @@ def _library() -> Any:
 
 
 @cache
-def register() -> dict[str, Any]:
-    """Give MuJoCo the plugin, once in a process, and return its callbacks.
+def register() -> None:
+    """Give MuJoCo the plugin, once in a process.
 
     Raises:
         InputError: If this version of MuJoCo cannot have it.
     """
-    callbacks = _compiled(*layout(), _fingerprint())
+    callbacks = _callbacks(*layout())
     library, plugin = _library(), _Plugin()
     library.mjp_defaultPlugin(ctypes.byref(plugin))
     plugin.name, plugin.capabilityflags = table.PLUGIN.encode(), 1
     plugin.nattribute, plugin.attributes = 1, (ctypes.c_char_p * 1)(table.COUNT.encode())
-    for name, callback in callbacks.items():
-        setattr(plugin, name, callback.address)
+    for name, address in callbacks.items():
+        setattr(plugin, name, address)
     library.mjp_registerPlugin.restype = ctypes.c_int
     if library.mjp_registerPlugin(ctypes.byref(plugin)) < 0:
         raise InputError(f"mujoco {mujoco.__version__}", "friction: MuJoCo does not take the plugin")
-    return callbacks

@@ -8,10 +8,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.mujoco_friction import FORCE, LENGTH, LEVEL, LOAD, NAME, SIGNALS, TURN
+from finger_pin.exchange.mujoco_friction import FORCE, LENGTH, LEVEL, LOAD, NAME, SIGNALS, TURN
 from finger_pin.mujoco.registration import register
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,9 @@ import math
 from types import FunctionType, ModuleType
 from typing import Any
 
-import numba
 import numpy as np
 
-from finger_pin.mujoco.memory import compiled, two_to_the
+from finger_pin.core.jit import njit_inline, two_to_the
 
 # ln 2 as a sum, of which multiples of the first part up to 2^11 are exact.
 _LN2_HIGH = 6.93147180369123816490e-01
@@ -24,7 +23,7 @@ _C2, _C3, _C4, _C5, _C6, _C7, _C8, _C9, _C10, _C11, _C12 = (1.0 / math.factorial
 _T3, _T5, _T7, _T9, _T11, _T13, _T15, _T17, _T19 = (1.0 / k for k in range(3, 20, 2))
 
 
-@numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})
+@njit_inline
 def exponential(x: Any) -> Any:
     """Return exp(x) of x <= 0 to 4e-16 of it: by 2^n and Taylor's series of the rest, at most ln 2 / 2."""
     x = _LEAST if x < _LEAST else x
@@ -39,7 +38,7 @@ def exponential(x: Any) -> Any:
     return (low + t * (middle + t * high)) * two_to_the(rounded)
 
 
-@numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})
+@njit_inline
 def angle(real: Any, imaginary: Any) -> Any:
     """Return the angle of a complex number whose imaginary part is not negative, from 0 to pi, to 1e-15.
 
@@ -63,7 +62,7 @@ _numpy: Any = ModuleType("numpy")
 _numpy.exp, _numpy.abs, _numpy.maximum = exponential, np.abs, np.maximum
 
 
-@compiled
+@njit_inline
 def _magnitude(value: Any, _side: Any) -> Any:
     """Return |x|: here no friction is held on a side."""
     return abs(value)
@@ -72,4 +71,4 @@ def _magnitude(value: Any, _side: Any) -> Any:
 def compiled_law(law: Any) -> Any:
     """Return a law of `finger_pin.laws`, compiled with this exponential in place of NumPy's."""
     known = {"np": _numpy, "magnitude": _magnitude}
-    return compiled(FunctionType(law.__code__, known, law.__name__, law.__defaults__))
+    return njit_inline(FunctionType(law.__code__, known, law.__name__, law.__defaults__))

@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from finger_pin.laws.bristle import friction_coefficient, friction_level
-from finger_pin.laws.capstan import capstan_coefficient
-from finger_pin.mechanism.exchange.mujoco_friction import (
+from finger_pin.core.jit import njit_inline
+from finger_pin.exchange.mujoco_friction import (
     COULOMB,
     DRAG,
     EXPONENT,
@@ -24,7 +23,8 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     STRIBECK,
     VISCOUS,
 )
-from finger_pin.mujoco.memory import compiled
+from finger_pin.laws.bristle import friction_coefficient, friction_level
+from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mujoco.vector_functions import angle, compiled_law, exponential
 
 #: How many frictions a block has, and how many numbers it is.
@@ -41,14 +41,14 @@ _coefficient, _capstan, _least = (
 )
 
 
-@compiled
+@njit_inline
 def bent(x: Any, count: Any) -> None:
     """Add the angles of complex numbers to the turns of as many lanes as are said: none, or `WIDTH`."""
     for i in range(count):
         x[WIDTH * BENDS + i] += angle(x[WIDTH * REAL + i], x[WIDTH * IMAGINARY + i])
 
 
-@compiled
+@njit_inline
 def exerted(x: Any, dt: Any) -> None:
     """Find the level of each lane by (9b), (16), and its part of a row: F - x, c + b, and the most that it exerts."""
     for i in range(WIDTH):
@@ -77,14 +77,14 @@ def exerted(x: Any, dt: Any) -> None:
         x[WIDTH * LIMITS + i] = abs(ratio) * min(limit, x[WIDTH * MOST + i])
 
 
-@compiled
+@njit_inline
 def slid(force: Any, moved: Any, level: Any) -> Any:
     """Return F^s by (9a) after a way s0 v dt at this speed and level, exactly, and the share of it that is left."""
     steady, decay = math.copysign(level, moved), exponential(-abs(moved) / level)
     return steady + (force - steady) * decay, decay
 
 
-@compiled
+@njit_inline
 def moved_on(x: Any, count: Any) -> None:
     """Move bristles on by (9a): F^s, then levels, then ways s0 v dt, as many as are said, a multiple of `WIDTH`."""
     for i in range(count):

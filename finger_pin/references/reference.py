@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import JointReference
 from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
 from finger_pin.exceptions import InputError
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
 
 _STILL = JointReference()
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]

@@ -9,26 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
+from finger_pin.description.caching import memoised
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
-from finger_pin.laws.harmonic import harmonic, harmonic_rate
-from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
+from finger_pin.laws.inputs import harmonic, harmonic_rate, quintic, quintic_curvature, quintic_rate
 from finger_pin.references.sample_fitting import thinned
+from finger_pin.typing import Array
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 Flags = NDArray[np.bool_]
 _ORDER = 6
-_KNOWN: Remembered[Signal] = Remembered()
 # A signal that varies by less, of its size, is constant but for rounding.
 _ROUNDING = 1e-9
 
@@ -55,10 +53,14 @@ class Signal:
             settings: Of each signal.
             tolerance: Of their range, what dense samples may be missed by (`sample_fitting`).
         """
-        make = partial(cls._from_settings, settings, tolerance)
         # Samples may be many, and would be kept.
         sampled = any(each.kind == "samples" for each in settings)
-        return make() if sampled else _KNOWN.of(tuple(settings), make)
+        return (cls._from_settings if sampled else cls._remembered)(settings, tolerance)
+
+    @classmethod
+    @memoised(lambda cls, settings, tolerance: tuple(settings))
+    def _remembered(cls, settings: Sequence[SignalSettings], tolerance: float) -> Signal:
+        return cls._from_settings(settings, tolerance)
 
     @classmethod
     def _from_settings(cls, settings: Sequence[SignalSettings], tolerance: float) -> Signal:

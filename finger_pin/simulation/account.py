@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.stepping.textbook import Trajectory
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.kinematics import Motion
+from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.simulation.energy import Flows, energies, powers
+from finger_pin.typing import Array
 
 # Three-point Gauss quadrature on [0, 1]. All nodes are inside the step: a controller that is sampled changes its
 # tensions at the ends of steps, where a node would see those of the next one.

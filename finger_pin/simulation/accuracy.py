@@ -10,15 +10,15 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping.textbook import Stop, Trajectory
-from finger_pin.description.routing import Array
+from finger_pin.core.stepping.trajectory import Stop, Trajectory
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import LEAST_ATOL_SCALE, LEAST_RTOL
 from finger_pin.laws.contact import CONTACT
-from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.surroundings import POSE, VELOCITY
+from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
+from finger_pin.mechanism.scene import POSE, VELOCITY
 from finger_pin.simulation.energy import entries
+from finger_pin.typing import Array
 
 #: Steps between two looks at a compiled simulation.
 CHUNK = 128
@@ -255,9 +255,9 @@ def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
         finger: The finger.
         tolerance: Of the joints' angles, rad: a tenth of that, m, at what they carry.
     """
-    if finger.surroundings is None:
+    if finger.scene is None:
         return ""
-    contacts, known = finger.surroundings.contacts, 0.1 * tolerance
+    contacts, known = finger.scene.contacts, 0.1 * tolerance
     stiffness, exponent = (contacts.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent"))
     depth = stiffness ** (-1.0 / exponent)
     # Bounces may all fall between samples: what is closer than can be told has touched.

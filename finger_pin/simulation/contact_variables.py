@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.laws.law import Touch
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.scene import POSE, VELOCITY
 from finger_pin.mechanism.state import State
-from finger_pin.mechanism.surroundings import POSE, VELOCITY
-from finger_pin.simulation.motions import SampledMotion
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.typing import Array
 
 # Dimensions, unit and name.
 Variables = dict[str, tuple[tuple[str, ...], str, str]]
@@ -27,7 +27,7 @@ _CONTACT, _SPACE = ("time", "contact"), ("time", "contact", "axis")
 
 def contact_variables(finger: Finger) -> Variables:
     """Return the variables of contacts and free objects; none without surroundings."""
-    around = finger.surroundings
+    around = finger.scene
     if around is None:
         return {}
     table: Variables = {
@@ -56,14 +56,13 @@ def contact_variables(finger: Finger) -> Variables:
     return table
 
 
-def contact_value(name: str, finger: Finger, of: SampledMotion) -> Array:
+def contact_value(name: str, finger: Finger, of: SampledTrajectory) -> Array:
     """Return the values of one of these variables."""
     if name.startswith("object_"):
         return _of_object(name, of.state)
     if name == "contact_bend":
-        assert of.state.contact_bend is not None
         return _split(of.state.contact_bend, 2)
-    around, evaluation = finger.surroundings, of.finger.mechanism
+    around, evaluation = finger.scene, of.finger.mechanism
     assert around is not None
     found, arms = evaluation.rows[around.contacts.group], CONTACT.arms
     if name in ("contact_force", "contact_point", "contact_normal"):
@@ -81,7 +80,6 @@ def contact_value(name: str, finger: Finger, of: SampledMotion) -> Array:
 
 def _of_object(name: str, state: State) -> Array:
     """Return place, turn, or rates of the free objects."""
-    assert state.object_pose is not None and state.object_velocity is not None
     pose, velocity = _split(state.object_pose, POSE), _split(state.object_velocity, VELOCITY)
     if name == "object_position":
         return pose[..., :3]
@@ -92,7 +90,7 @@ def _of_object(name: str, state: State) -> Array:
 
 def contact_coordinates(finger: Finger) -> dict[str, Any]:
     """Return the coordinates of these variables."""
-    around = finger.surroundings
+    around = finger.scene
     if around is None:
         return {}
     found = {
@@ -111,7 +109,7 @@ def last_touching(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
     Raises:
         InputError: If the result has other contacts or objects.
     """
-    around = finger.surroundings
+    around = finger.scene
     if around is None:
         return {}
     parts = {"contact_bend": ("contact_bend",)} | (_OBJECTS if around.free else {})

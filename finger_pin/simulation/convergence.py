@@ -11,18 +11,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.control.proportional import Controller
+from finger_pin.control.interface import Controller
 from finger_pin.control.user_controllers import Samples
-from finger_pin.core.stepping.textbook import Stop
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
-from finger_pin.mechanism.finger_like import FingerLike, own_finger
+from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
 from finger_pin.simulation.initial_state import own_parts
 from finger_pin.simulation.simulate import simulate
+from finger_pin.typing import Array
 
 FACTOR, LIMIT = 100.0, 1e-3
 
@@ -157,7 +157,7 @@ def check_convergence(
         raise InputError("limit", "must be above 0 and finite", limit)
     if result is not None and result.attrs["scenario"] != to_toml(scenario):
         raise InputError("result", "is of another scenario")
-    finger = own_finger(finger, scenario)
+    finger = resolve_finger(finger, scenario)
     own = own_parts(controller, reference, fingertip_force, initial, finger)
     if result is not None and result.attrs.get("own", "") != own:
         raise InputError("result", f"had {result.attrs.get('own') or 'nothing'} of its own: give the same here")

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.energies import SUPPLIED, Energies, Energy
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.kinematics import Kinematics, Motion
+from finger_pin.mechanism.rigid_body import Kinematics, Motion
+from finger_pin.mechanism.rows import SUPPLIED, Energies, Energy
+from finger_pin.typing import Array
 
 FINGERTIP = Energy("fingertip", "fingertip force", SUPPLIED)
 _KINETIC, _GRAVITY = Energy("kinetic", "kinetic"), Energy("gravity", "gravity")
@@ -76,7 +76,7 @@ def flows(energies: Energies) -> tuple[Energy, ...]:
 def stores(finger: Finger) -> tuple[Energy, ...]:
     """Return the entries of a finger's stored energies."""
     rotors = (_ROTORS,) if finger.actuators.names else ()
-    objects = () if finger.surroundings is None else _OBJECTS
+    objects = () if finger.scene is None else _OBJECTS
     return (_KINETIC, _GRAVITY, *finger.mechanism.energies.stored, *rotors, *objects)
 
 

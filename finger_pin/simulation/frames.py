@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME
+from finger_pin.typing import Array
 
 
 def in_world(result: xr.Dataset) -> xr.Dataset:

@@ -8,26 +8,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.canals import BRANCHES, CANALS
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.state import State
+from finger_pin.mechanism.state import BLOCKS, State
 from finger_pin.mechanism.tree import STATEFUL
 from finger_pin.simulation.contact_variables import last_touching
-
-_PARTS = {
-    "position": "joint_position",
-    "velocity": "joint_velocity",
-    "passive_position": "passive_position",
-    "passive_velocity": "passive_velocity",
-    "tendon_stiction": "tendon_stiction",
-    "joint_stiction": "joint_stiction",
-    "motor_position": "motor_position",
-    "motor_velocity": "motor_velocity",
-    "gearbox_stiction": "gearbox_stiction",
-}
+from finger_pin.typing import Array
 
 
 def own_parts(
@@ -76,7 +64,7 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
             raise InputError("initial", f"is a result of another finger: its {dimension}s must be {', '.join(names)}")
     last, parts = initial.isel(time=-1), {}
     sizes = vars(finger.layout.unpack(np.zeros(finger.layout.size)))
-    for part, name in _PARTS.items():
+    for part, name in ((part, block.variable) for part, block in BLOCKS.items() if block.variable):
         if name in last:
             parts[part] = np.atleast_1d(last[name].values)
         elif sizes[part].size:
@@ -145,7 +133,6 @@ def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:
     if not finger.actuators.names:
         return
     speed, actuators = finger.layout.unpack(x).motor_velocity, finger.actuators
-    assert speed is not None
     constant, resistance, supply, limit = actuators.motor[:4]
     most = (supply + resistance * limit) / constant
     for motor, own, greatest in zip(actuators.names, speed, most, strict=True):

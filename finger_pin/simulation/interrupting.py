@@ -10,7 +10,7 @@ from typing import Self, TypeVar
 
 import xarray as xr
 
-from finger_pin.core.stepping.textbook import Stop
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.exceptions import Interrupted
 from finger_pin.simulation.run_arrays import RunArrays
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import xarray as xr
 
-from finger_pin.description.routing import Array
 from finger_pin.files import replacing, write_table
+from finger_pin.typing import Array
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:

@@ -11,30 +11,32 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import Bindings
+from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.stepper import TABLEAUS
-from finger_pin.core.stepping.textbook import Stop, Trajectory
+from finger_pin.core.stepping.trajectory import Stop, Trajectory
 from finger_pin.core.threads import in_threads
-from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.routing import Array
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, own_finger
+from finger_pin.simulation.accuracy import with_tighter
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import attributes_of, record, recorded, refuse_unknown
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.running import run
-from finger_pin.simulation.sensitivity import add_slopes, changed, nearby, on_steps_of
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates, variables
+from finger_pin.typing import Array
 
 #: What a run records unless it is told otherwise.
 RECORDED = ("joint_position", "tendon_tension")
-_TIGHT = 1e-8
+# Derivatives are those of runs at so much smaller tolerances: they err more than what they are of.
+_FINER = 10.0
 
 
 def prepare(
@@ -61,8 +63,8 @@ def prepare(
         InputError: If there is no such key or variable.
     """
     described = load_scenario(scenario)
-    own = own_finger(finger, described)
-    return Prepared(Family(described_by(described, own), tuple(parameters)), tuple(record), own)
+    own = resolve_finger(finger, described)
+    return Prepared(ParametrisedScenario(with_finger(described, own), tuple(parameters)), tuple(record), own)
 
 
 class Prepared:
@@ -76,7 +78,7 @@ class Prepared:
 
     def __init__(
         self,
-        family: Family,
+        family: ParametrisedScenario,
         record: tuple[str, ...],
         finger: Finger | None = None,
         bindings: list[Bindings] | None = None,
@@ -112,7 +114,7 @@ class Prepared:
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        return self.family.scenario if values is None else self.family.at(values)
+        return self.family.scenario if values is None else self.family.with_values(values)
 
     def run(
         self,
@@ -146,17 +148,11 @@ class Prepared:
         self, values: Sequence[Any] | None, initial: ArrayLike | xr.Dataset | None, stop: Stop, sensitivities: bool
     ) -> RunArrays:
         scenario = self.scenario(values)
-        setup, trajectory, found = self._made(scenario, initial, stop)
+        setup, _, found = self._made(scenario, initial, stop)
         if not sensitivities:
             if setup.bindings:
                 self._bindings.append(setup.bindings)
             return found
-        if not trajectory.islands:
-            # It will be repeated on its steps: the derivative of what was computed, errors and all.
-            _, chosen, _ = self._made(_tight(scenario), initial, stop)
-            setup = self._setup(_tight(scenario), initial)
-            trajectory = on_steps_of(chosen, setup)
-            found = self._recorded(setup, trajectory)
         given = self.values if values is None else values
         for key, value in zip(self.parameters, given, strict=True):
             if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
@@ -168,10 +164,13 @@ class Prepared:
         others, changes = changed(
             numbers, sizes, lambda moved: self._setup(self.scenario(moved), initial, self._free_bindings())
         )
-        near = nearby(setup, trajectory, others, changes)
-        runs = in_threads(lambda pair: self._recorded(*pair), list(zip(others, near, strict=True)))
-        self._bindings += [each.bindings for each in (setup, *others) if each.bindings]
-        return add_slopes(found, numbers, runs, changes)
+        finer, chosen, _ = self._made(with_tighter(scenario, _FINER), initial, stop)
+        # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
+        setups = [self._setup(scenario, initial, self._free_bindings()), *others]
+        repeated = list(zip(setups, nearby(chosen, setups), strict=True))
+        base, *runs = in_threads(lambda pair: self._recorded(*pair), repeated)
+        self._bindings += [each.bindings for each in (setup, finer, *setups) if each.bindings]
+        return add_slopes(found, base, numbers, runs, changes)
 
     def _free_bindings(self) -> Bindings:
         """Return bindings of an earlier run that no other run uses, if there are any."""
@@ -186,7 +185,7 @@ class Prepared:
         return Setup.of(scenario, self._loop(scenario, initial), bindings=bindings)
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
-        motions = SampledMotion(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
+        motions = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
         names = coordinates(setup.scenario, setup.loop, motions.times)
         attributes = attributes_of(setup.scenario, trajectory, setup.method)
         return RunArrays(recorded(motions, self.record), names, attributes)
@@ -198,7 +197,7 @@ class Prepared:
         setup = self._setup(scenario, initial, self._free_bindings())
         trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:
-            motions = SampledMotion(setup.loop, trajectory, scenario.sample_times(), self.record)
+            motions = SampledTrajectory(setup.loop, trajectory, scenario.sample_times(), self.record)
             reached, partial = float(trajectory.breakpoints[-1]), record(scenario, motions, setup.method, self.record)
             if trajectory.failure:
                 raise IntegrationError(reached, *setup.failure(trajectory), partial)
@@ -231,9 +230,3 @@ class Prepared:
         finger = fitted(self._finger, self.family.scenario, scenario)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
         return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
-
-
-def _tight(scenario: Scenario) -> Scenario:
-    """Return a scenario whose tolerances are tight."""
-    own = scenario.simulation
-    return scenario.updated(simulation={"rtol": min(own.rtol, _TIGHT), "atol_scale": min(own.atol_scale, _TIGHT)})

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.energies import Energy
-from finger_pin.simulation.motions import SampledMotion
+from finger_pin.mechanism.rows import Energy
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.typing import Array
 
 #: Frames of variables with components; the base's, a palm's if there is one, is that of all but the palm's own.
 BASE_FRAME, WORLD_FRAME = "base", "world"
@@ -27,7 +27,7 @@ class Quantity(NamedTuple):
     """
 
     dims: tuple[str, ...]
-    value: Callable[[SampledMotion], Array]
+    value: Callable[[SampledTrajectory], Array]
     units: str
     long_name: str
     equation: str = ""

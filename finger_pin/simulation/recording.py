@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.core.stepping.textbook import Trajectory
-from finger_pin.description.embedded import embedded
+from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.description.loading import to_toml
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.scene_metadata import scene_metadata
 from finger_pin.description.simulation_settings import SimulationSettings
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.quantity import BASE_FRAME
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
+from finger_pin.typing import Array
 
 _PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
 
@@ -31,7 +31,7 @@ _PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
 Recorded = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
 
 
-def recorded(motions: SampledMotion, names: Sequence[str] | None = None, entry: str = "record") -> Recorded:
+def recorded(motions: SampledTrajectory, names: Sequence[str] | None = None, entry: str = "record") -> Recorded:
     """Return variables of a motion, by default all, from only the signals that they need.
 
     Args:
@@ -44,7 +44,7 @@ def recorded(motions: SampledMotion, names: Sequence[str] | None = None, entry: 
     """
     table = variables(motions.loop)
     refuse_unknown(entry, names or (), table)
-    if names is None and motions.control.shortfall is None:
+    if names is None and motions.control.torque_deficit is None:
         del table[SHORTFALL]
     chosen = table if names is None else {name: table[name] for name in names}
     # A motion at the edge of what numbers hold has energies beyond it: that is told apart from this.
@@ -63,7 +63,11 @@ def refuse_unknown(entry: str, names: Iterable[str], known: Iterable[str]) -> No
 
 
 def record(
-    scenario: Scenario, motions: SampledMotion, method: str, names: Sequence[str] | None = None, text: str | None = None
+    scenario: Scenario,
+    motions: SampledTrajectory,
+    method: str,
+    names: Sequence[str] | None = None,
+    text: str | None = None,
 ) -> xr.Dataset:
     """Return a motion as a Dataset.
 
@@ -75,7 +79,7 @@ def record(
         text: The scenario's TOML; written anew unless it is given.
     """
     found = recorded(motions, names)
-    texts = {"scenario": to_toml(scenario) if text is None else text, **embedded(scenario)}
+    texts = {"scenario": to_toml(scenario) if text is None else text, **scene_metadata(scenario)}
     attributes = {**attributes_of(scenario, motions.trajectory, method), **texts}
     return xr.Dataset(found, coordinates(scenario, motions.loop, motions.times), attributes)
 

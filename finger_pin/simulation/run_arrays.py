@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.routing import Array
 from finger_pin.simulation.recording import Recorded
+from finger_pin.typing import Array
 
 
 @dataclass(eq=False)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -13,10 +12,10 @@ import xarray as xr
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.stepping.textbook import Stop, Trajectory
-from finger_pin.description.caching import Remembered
+from finger_pin.core.stepping.trajectory import Stop, Trajectory
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import to_toml
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import (
     AccuracyWarning,
@@ -25,13 +24,12 @@ from finger_pin.exceptions import (
     MicroDampingWarning,
     SelfLockingWarning,
 )
+from finger_pin.references.reference import LoopReference
 from finger_pin.simulation.accuracy import CHUNK, close_account, estimate_error, open_account, ringing, too_stiff
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import check_memory, finite_part, record
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
-
-_MARGINS: Remembered[float] = Remembered()
-_DRIVEN: Remembered[str] = Remembered()
+from finger_pin.typing import Array
 
 
 def run(
@@ -56,7 +54,7 @@ def run(
     """
     loop = loop or ClosedLoop.from_scenario(scenario)
     check_memory(scenario.simulation, loop.finger)
-    driving = _DRIVEN.of((scenario.finger,), lambda: micro_damping_advice(scenario.finger))
+    driving = _driving(scenario.finger)
     if driving:
         warnings.warn(driving, MicroDampingWarning, stacklevel=5)
     setup = Setup.of(scenario, loop, own, control_period)
@@ -75,7 +73,7 @@ def run(
     text = to_toml(scenario)
 
     def recorded(found: Trajectory) -> xr.Dataset:
-        return record(scenario, SampledMotion(loop, found, scenario.sample_times()), setup.method, text=text)
+        return record(scenario, SampledTrajectory(loop, found, scenario.sample_times()), setup.method, text=text)
 
     watched = progress is not None or observe is not None
     first = setup.integrate(watch if watched else None, stop, chunk=CHUNK if observe is None else CHUNK_OBSERVED)
@@ -128,4 +126,14 @@ def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
         return None
     if not loop.finger.routing.force_closure().holds:
         return None
-    return _MARGINS.of((scenario,), partial(quick_margin, scenario, loop.reference))
+    return _quick_margin(scenario, loop.reference)
+
+
+@memoised(lambda scenario, reference: (scenario,))
+def _quick_margin(scenario: Scenario, reference: LoopReference) -> float:
+    return quick_margin(scenario, reference)
+
+
+@memoised(lambda finger: (finger,))
+def _driving(finger: FingerDescription) -> str:
+    return micro_damping_advice(finger)

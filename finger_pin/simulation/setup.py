@@ -7,17 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import Bindings, compiled_control, sampled_control
-from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled_control
+from finger_pin.control.interface import LoopController
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
-from finger_pin.core.control import Control
+from finger_pin.core.compiled_fingers import Bindings
+from finger_pin.core.inputs import InputTable
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.interpolant_collision import meetings
+from finger_pin.core.stepping.repetition import Steps
+from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.stepping.textbook import Stop, Trajectory, Watch, integrate
-from finger_pin.description.routing import Array
+from finger_pin.core.stepping.trajectory import Stop, Trajectory, Watch
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError
@@ -33,9 +34,6 @@ _ADVICE_RUNAWAY = "a smaller controller.gain, heavier links, or a start within t
 _CONTINUOUS = "Radau"
 #: Steps between two looks at a compiled simulation that is observed.
 CHUNK_OBSERVED = 4
-
-#: Ends of the steps of every island, s.
-Steps = Sequence[Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +56,7 @@ class Setup:
     answers: LoopController
     sampled: SampledController | None
     bindings: Bindings | None = None
-    control: Control | None = None
+    control: InputTable | None = None
 
     @classmethod
     def of(
@@ -88,10 +86,10 @@ class Setup:
             # Before the controller is sampled: then it must not be asked for a start.
             loop = replace(loop, start=loop.initial_state())
             check_motors(loop.finger, loop.initial_state())
-        if loop.finger.surroundings is not None:
-            loop.finger.surroundings.check(loop.finger.layout.unpack(loop.initial_state()))
+        if loop.finger.scene is not None:
+            loop.finger.scene.check(loop.finger.layout.unpack(loop.initial_state()))
         sampling = sampling_settings(scenario, control_period)
-        if sampling is None and (loop.controller.measures or loop.controller.sensors):
+        if sampling is None and (loop.controller.needs_sensors or loop.controller.sensors):
             raise InputError("control_period", "is missing: a controller that reads sensors is sampled")
         positioned = bool(np.any(loop.finger.actuators.holds))
         if positioned and method not in TABLEAUS:
@@ -125,7 +123,7 @@ class Setup:
         *,
         scenario: Scenario | None = None,
         chunk: int = CHUNK,
-        steps: Steps | None = None,
+        steps: Sequence[Steps] | None = None,
     ) -> Trajectory:
         """Integrate, at the tolerances of another scenario if given.
 
@@ -134,8 +132,8 @@ class Setup:
             stop: Asked now and then.
             scenario: Like this one, with tolerances of its own.
             chunk: Steps between two calls.
-            steps: To be taken whatever their errors: what comes out is then as smooth a function of start and
-                parameters as the equations are.
+            steps: Of every island, to be taken whatever their errors: what comes out is then as smooth a function of
+                start and parameters as the equations are.
         """
         settings = (scenario or self.scenario).simulation
         if self.method in TABLEAUS:
@@ -155,7 +153,12 @@ class Setup:
         )
 
     def _compiled(
-        self, settings: SimulationSettings, watch: Watch | None, stop: Stop | None, chunk: int, steps: Steps | None
+        self,
+        settings: SimulationSettings,
+        watch: Watch | None,
+        stop: Stop | None,
+        chunk: int,
+        steps: Sequence[Steps] | None,
     ) -> Trajectory:
         """Integrate by a method of the compiled core."""
         loop = self.loop
@@ -164,18 +167,13 @@ class Setup:
             stepper.drive(loop.drives.compiled)
         knots = loop.knots(settings.rtol)
         if steps is not None:
-            # Numbers that join what moved apart, or part it, leave the steps of all to each.
-            own = steps if len(steps) == len(stepper.parts) else [np.concatenate(steps)] * len(stepper.parts)
-            stepper.repeat([np.union1d(ends, knots) for ends in own])
-            if self.bindings:
-                # It goes on repeating: no other run can have it.
-                self.bindings.stepper = None
+            stepper.repeat(steps)
         return integrate_compiled(
             stepper,
             settings.duration,
             loop.finger.layout.names,
             held=self.sampled,
-            knots=None if steps is not None else knots,
+            knots=knots,
             watch=watch,
             chunk=chunk,
             together=chunk == CHUNK_OBSERVED,

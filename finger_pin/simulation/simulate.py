@@ -9,11 +9,11 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.control.proportional import Controller
+from finger_pin.control.interface import Controller
 from finger_pin.control.user_controllers import Samples
-from finger_pin.core.stepping.textbook import Stop
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.mechanism.finger_like import FingerLike, own_finger
+from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
@@ -58,7 +58,7 @@ def simulate(
         control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
             without either it is continuous. Compiled methods only.
         progress: Called with the simulated time, s, now and then; in a notebook there is a bar by default.
-        observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
+        observe: Called with the simulated time, s, and all signals every few steps.
         stop: Asked now and then; when it returns true the simulation ends there.
 
     Returns:
@@ -83,7 +83,7 @@ def simulate(
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
     scenario = load_scenario(scenario)
-    given = own_finger(finger, scenario)
+    given = resolve_finger(finger, scenario)
     loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, given)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))

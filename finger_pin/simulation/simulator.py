@@ -11,24 +11,24 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.control.compiled import Bindings, core_signal
-from finger_pin.control.moved_objects import Guides
+from finger_pin.control.palm import PrescribedObjects
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.control import held_control
+from finger_pin.core.compiled_fingers import Bindings
+from finger_pin.core.inputs import core_signal, held_control
 from finger_pin.core.stepping.batch import Together
 from finger_pin.core.stepping.stepper import TABLEAUS
-from finger_pin.description.family import Family
-from finger_pin.description.routing import Array
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import check_motors, numbers
 from finger_pin.simulation.step_log import StepLog
+from finger_pin.typing import Array
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 
@@ -74,7 +74,7 @@ class Simulator:
             if not 0.0 < value <= 0.1:
                 raise InputError(name, "must be above 0 and at most 0.1", value)
         self._settings: dict[str, Any] = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
-        self._family: Family | None = None
+        self._family: ParametrisedScenario | None = None
         self._bindings = Bindings()
         self._build(as_finger(finger))
         self._posture = 0.5 * (self.finger.stroke_limiter.lower + self.finger.stroke_limiter.upper)
@@ -91,7 +91,7 @@ class Simulator:
         """Build the stepper of a finger; `_begin` gives it a state."""
         self.finger, mechanism = finger, finger.mechanism
         control = held_control(mechanism.channels, mechanism.coordinates)
-        self._guides = Guides.of(finger, 0.0, self._settings["rtol"])
+        self._guides = PrescribedObjects.of(finger, 0.0, self._settings["rtol"])
         if self._guides is not None:
             control = control._replace(guide=core_signal(self._guides.signal))
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
@@ -106,8 +106,8 @@ class Simulator:
         finger, x = self.finger, self.finger.rest_state(position)
         if self._guides is not None:
             x = self._guides.place(finger, x)
-        if finger.surroundings is not None:
-            finger.surroundings.check(finger.layout.unpack(x))
+        if finger.scene is not None:
+            finger.scene.check(finger.layout.unpack(x))
         return x
 
     def _begin(self, x: Array, time: float) -> None:
@@ -153,8 +153,10 @@ class Simulator:
             InputError: Naming the entry that is wrong, or if the finger had another state; nothing has changed then.
         """
         if self._family is None or self._family.keys != tuple(values):
-            self._family = Family.of_finger(self.finger.description, tuple(values))
-        changed = self.finger.changed(self._family.at([*values.values()]).finger, self.finger.made_of[2])
+            self._family = ParametrisedScenario.of_finger(self.finger.description, tuple(values))
+        changed = self.finger.changed(
+            self._family.with_values([*values.values()]).finger, self.finger.constructor_args[2]
+        )
         if changed.layout.names != self.finger.layout.names:
             raise InputError("values", "make a finger with another state: make another simulator of it")
         x, time = self.x, self.time

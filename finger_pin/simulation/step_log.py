@@ -18,7 +18,6 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, IntegrationError
@@ -26,8 +25,9 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, SignalReference
 from finger_pin.references.signal import Signal
 from finger_pin.simulation.accuracy import left_open, open_account
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import check_memory, record
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.typing import Array
 
 # A sample this close to the end of a step, s, is taken there.
 _SAME = 1e-9
@@ -108,7 +108,7 @@ class StepLog:
         times = knots[0] + scenario.sample_times()
         near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]
         times = np.where(np.abs(near - times) < _SAME, near, times)
-        result = record(scenario, SampledMotion(loop, trajectory, times), str(settings["method"]))
+        result = record(scenario, SampledTrajectory(loop, trajectory, times), str(settings["method"]))
         result.attrs["own"] = "loop"
         if trajectory.failure:
             reached = float(trajectory.breakpoints[-1])

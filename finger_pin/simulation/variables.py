@@ -10,14 +10,14 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.energies import LOST
-from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.rows import LOST, Rows
+from finger_pin.mechanism.state import BLOCKS
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.energy import flows, stores
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME, Quantity
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.typing import Array
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR, _TIME = ("time", "motor"), ("time",)
@@ -29,8 +29,8 @@ RESIDUAL = "energy_residual"
 def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return all variables that a result of a loop can have, by name."""
     table = {
-        "joint_position": Quantity(_JOINT, lambda of: of.state.position, "rad", "joint angle"),
-        "joint_velocity": Quantity(_JOINT, lambda of: of.state.velocity, "rad/s", "joint velocity"),
+        "joint_position": _of_state("position"),
+        "joint_velocity": _of_state("velocity"),
         "joint_acceleration": Quantity(_JOINT, lambda of: of.finger.acceleration, "rad/s2", "joint acceleration", "18"),
         "joint_reference": Quantity(_JOINT, lambda of: of.reference.position, "rad", "desired joint angle", "20"),
         "tracking_error": Quantity(
@@ -50,7 +50,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         ),
         "tendon_velocity": Quantity(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
         "tendon_friction": Quantity(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
-        "tendon_stiction": Quantity(_TENDON, lambda of: of.state.tendon_stiction, "N", "tendon stiction force", "9a"),
+        "tendon_stiction": _of_state("tendon_stiction"),
         "tendon_normal_force": Quantity(
             _TENDON, lambda of: of.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
         ),
@@ -63,7 +63,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         "joint_torque_command": Quantity(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
         "joint_torque": Quantity(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
         "joint_friction": Quantity(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
-        "joint_stiction": Quantity(_JOINT, lambda of: of.state.joint_stiction, "N m", "joint stiction torque", "9a"),
+        "joint_stiction": _of_state("joint_stiction"),
         "joint_reaction": Quantity(_JOINT, lambda of: of.finger.joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": Quantity(_JOINT, lambda of: of.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
         "fingertip_force": Quantity(tip, _fingertip_force, "N", "force on the fingertip", "6"),
@@ -78,6 +78,17 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         if frame := _frame(name, each):
             table[name] = each._replace(frame=frame)
     return table
+
+
+def _of_state(block: str, single: bool = False) -> Quantity:
+    """Return the variable of a block of the state, of a single number without a dimension of its own."""
+    of = BLOCKS[block]
+
+    def value(motion: SampledTrajectory) -> Array:
+        found: Array = getattr(motion.state, block)
+        return found[:, 0] if single else found
+
+    return Quantity(_TIME if single else ("time", of.dimension), value, of.unit, of.long_name, of.equation)
 
 
 def _frame(name: str, variable: Quantity) -> str:
@@ -95,17 +106,17 @@ def _more(loop: ClosedLoop) -> dict[str, Quantity]:
     return table | _of_further(loop.finger.further) | _of_account(loop)
 
 
-def _contact(name: str, of: SampledMotion) -> Array:
+def _contact(name: str, of: SampledTrajectory) -> Array:
     return contact_value(name, of.loop.finger, of)
 
 
-def _fingertip_force(of: SampledMotion) -> Array:
+def _fingertip_force(of: SampledTrajectory) -> Array:
     force = of.loop.force(of.times)
     return np.broadcast_to(force, (len(of.times), *of.loop.fingertip_force.shape))
 
 
-def _shortfall(of: SampledMotion) -> Array:
-    missing = of.control.shortfall
+def _shortfall(of: SampledTrajectory) -> Array:
+    missing = of.control.torque_deficit
     return np.zeros_like(of.state.position) if missing is None else missing
 
 
@@ -114,7 +125,7 @@ def _of_palm(loop: ClosedLoop) -> dict[str, Quantity]:
         return {}
     path = loop.palm
 
-    def turned(of: SampledMotion) -> Array:
+    def turned(of: SampledTrajectory) -> Array:
         return np.array([pin.Quaternion(each).coeffs() for each in path.place(of.times)[1]])
 
     text = "rotation of the palm to the world, x, y, z, w"
@@ -136,23 +147,18 @@ def _of_motors(loop: ClosedLoop) -> dict[str, Quantity]:
     if not loop.finger.actuators.names:
         return {}
 
-    def moved(of: SampledMotion, name: str) -> Array:
-        return np.asarray(getattr(of.state, name))
-
-    def driven(of: SampledMotion, name: str) -> Array:
+    def driven(of: SampledTrajectory, name: str) -> Array:
         return np.asarray(getattr(of.finger.motors, name))
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
-    table = {
-        name: Quantity(_MOTOR, partial(moved if inner == name else driven, name=inner), units, long_name, equation)
+    table = {name: _of_state(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction")}
+    table |= {
+        name: Quantity(_MOTOR, partial(driven, name=inner), units, long_name, equation)
         for name, inner, units, long_name, equation in (
-            ("motor_position", "motor_position", "rad", "angle of the spool", ""),
-            ("motor_velocity", "motor_velocity", "rad/s", "velocity of the spool", ""),
             ("motor_current", "current", "A", "current", ""),
             ("motor_voltage", "voltage", "V", "voltage", ""),
             ("motor_torque", "torque", "N m", "torque of the motor, at the spool", ""),
             ("gearbox_friction", "friction", "N m", "friction torque of the gearbox", "9c"),
-            ("gearbox_stiction", "gearbox_stiction", "N m", "its stiction torque", "9a"),
             ("gearbox_load", "load", "N m", "torque that the gears carry", ""),
         )
     }
@@ -170,24 +176,19 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
     def shaped(values: Array) -> Array:
         return values[:, 0] if single else values
 
-    def proximal(of: SampledMotion) -> Array:
+    def proximal(of: SampledTrajectory) -> Array:
         return shaped(of.finger.tendons.strands[..., actuated::2])
 
     return {
         "passive_tension_proximal": Quantity(dims, proximal, "N", "tension of the proximal half", "12"),
-        "passive_position": Quantity(
-            dims, lambda of: shaped(of.state.passive_position), "m", "position of the lumped mass", "13"
-        ),
-        "passive_velocity": Quantity(
-            dims, lambda of: shaped(of.state.passive_velocity), "m/s", "velocity of the lumped mass", "13"
-        ),
+        **{name: _of_state(name, single) for name in ("passive_position", "passive_velocity")},
     }
 
 
 def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return the readings of a sampled controller's sensors, each held until the next sample."""
 
-    def held(of: SampledMotion, name: str) -> Array:
+    def held(of: SampledTrajectory, name: str) -> Array:
         return of.loop.controller.measured(name, of.times)
 
     return {
@@ -204,21 +205,21 @@ def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
 def _of_further(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
     """Return the signals of rows of a user's own, by table."""
 
-    def seen(of: SampledMotion, group: str, name: str) -> Array:
+    def seen(of: SampledTrajectory, group: str, name: str) -> Array:
         found = of.finger.mechanism.rows[group]
         return np.asarray(getattr(found.row, name))
 
-    def exerted(of: SampledMotion, group: str) -> Array:
+    def exerted(of: SampledTrajectory, group: str) -> Array:
         return of.finger.mechanism.rows[group].force
 
-    def shown(of: SampledMotion, group: str, index: int) -> Array:
+    def shown(of: SampledTrajectory, group: str, index: int) -> Array:
         return of.finger.mechanism.rows[group].signals[index]
 
     found: dict[str, Quantity] = {}
     for table in tables:
         group = table.group
         units = {"length": table.unit, "speed": f"{table.unit}/s", "force": "N m" if table.unit == "rad" else "N"}
-        values: dict[str, Callable[[SampledMotion], Array]] = {"force": partial(exerted, group=group)}
+        values: dict[str, Callable[[SampledTrajectory], Array]] = {"force": partial(exerted, group=group)}
         values |= {name: partial(seen, group=group, name=name) for name in ("length", "speed")}
         values |= {name: partial(shown, group=group, index=i) for i, name in enumerate(table.law.signals)}
         if np.any(table.channels >= 0):
@@ -232,13 +233,13 @@ def _of_further(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
 
 
 def _of_account(loop: ClosedLoop) -> dict[str, Quantity]:
-    def stored(of: SampledMotion, name: str) -> Array:
+    def stored(of: SampledTrajectory, name: str) -> Array:
         return of.stored[name]
 
-    def power(of: SampledMotion, name: str) -> Array:
+    def power(of: SampledTrajectory, name: str) -> Array:
         return of.powers[name]
 
-    def work(of: SampledMotion, name: str) -> Array:
+    def work(of: SampledTrajectory, name: str) -> Array:
         return of.account.works[name]
 
     table = {}

@@ -3,15 +3,15 @@
 From the question to the answer: ``keys`` of a scenario; ``designs`` (and the ``parsing`` of a command line) or the
 ``problem`` of a ``search``; ``metrics``; ``records`` of runs, and the ``fingerprint`` that they are found by; the
 ``executor`` in threads or elsewhere; the ``store`` that keeps them; the ``dataset`` of all. ``sweeping`` and
-``optimising`` put these together. ``batch`` returns whole runs instead of metrics. ``comparison`` and ``conclusions``
-are studies of their own.
+``optimising`` put these together. ``batch`` returns whole runs instead of metrics.
 """
 
 from finger_pin.studies.designs import Grid, LatinHypercube, PointList, Range
-from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric, Run
+from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric
 from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
 from finger_pin.studies.problem import Variable, radii
 from finger_pin.studies.records import ExecutorError
+from finger_pin.studies.response import Run
 from finger_pin.studies.sweeping import sweep
 
 __all__ = [

@@ -13,14 +13,14 @@ import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import Bindings
-from finger_pin.core.stepping.textbook import Stop
-from finger_pin.description.family import Family
+from finger_pin.core.compiled_fingers import Bindings
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
+from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.prepared import Prepared
@@ -73,7 +73,7 @@ def simulate_many(
     if not runs:
         raise InputError("scenarios", "at least one is needed")
     runs = _sharing(runs)
-    finger = own_finger(finger, runs[0])
+    finger = resolve_finger(finger, runs[0])
     _check_alike(runs)
     _check_kept(runs, variables or (), finger)
     bindings: list[Bindings] = []
@@ -125,7 +125,7 @@ def _run(
 
 
 def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...], bindings: list[Bindings]) -> Prepared:
-    family = Family(described_by(scenario, finger), ())
+    family = ParametrisedScenario(with_finger(scenario, finger), ())
     try:
         return Prepared(family, keep, finger, bindings)
     except InputError:

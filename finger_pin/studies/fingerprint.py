@@ -68,7 +68,7 @@ def finger_digest(finger: Finger) -> str:
     Raises:
         UnknownDependency: If a law depends on something that has no digest.
     """
-    body, rows, objects = finger.made_of
+    body, rows, objects = finger.constructor_args
     model = None if body is None else body.model.saveToString()
     described = {name: each.model_dump_json() for name, each in (objects or {}).items()}
     return code_digest((finger.description.model_dump_json(), model, tuple(rows), described))

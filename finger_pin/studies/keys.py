@@ -10,14 +10,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from finger_pin.description.family import Family, split
 from finger_pin.description.loading import ScenarioLike, load_scenario
+from finger_pin.description.parametrised_scenario import ParametrisedScenario, split
 from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import find_field, suggestion
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, own_finger
 
 #: What a key may be given: a number, or a name such as that of a method, or yes or no.
 Value = float | str | bool
@@ -46,8 +46,8 @@ class BaseScenario:
             InputError: Naming the entry that is wrong.
         """
         scenario = load_scenario(given, overrides)
-        own = own_finger(finger, scenario)
-        return cls(described_by(scenario, own), own)
+        own = resolve_finger(finger, scenario)
+        return cls(with_finger(scenario, own), own)
 
     def at(self, point: Point) -> Scenario:
         """Return the scenario with other numbers or names at some keys.
@@ -57,7 +57,7 @@ class BaseScenario:
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        return Family(self.scenario, tuple(point)).at(list(point.values()))
+        return ParametrisedScenario(self.scenario, tuple(point)).with_values(list(point.values()))
 
     def finger_at(self, scenario: Scenario) -> Finger | None:
         """Return the replacement of the finger of a point's scenario, or None."""

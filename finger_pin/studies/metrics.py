@@ -8,56 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property
 
 import cloudpickle
 import numpy as np
 import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
-from finger_pin.core.stepping.textbook import Stop
-from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism import joint_friction, tendons
-from finger_pin.mechanism.energies import LOST
+from finger_pin.mechanism import joints, tendons
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import described_by
+from finger_pin.mechanism.rows import LOST
 from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.energy import entries
-from finger_pin.simulation.simulate import simulate
-from finger_pin.studies.executor import quiet
-from finger_pin.studies.response import fingertip_hysteresis, grip_margin, rows, settling_time, winding_temperature
+from finger_pin.studies.response import Run, fingertip_hysteresis, grip_margin, rows, settling_time, winding_temperature
+from finger_pin.typing import Array
 
 #: Greatest tension for the metric of the fingertip force, N.
 FORCE_TENSION = 20.0
-
-
-class Run:
-    """A scenario and its simulation, run on first use.
-
-    Attributes:
-        scenario: The scenario; of a finger of one's own it has the description.
-    """
-
-    def __init__(self, scenario: ScenarioLike, stop: Stop | None = None, finger: Finger | None = None) -> None:
-        """Store a scenario, a `Stop` of its simulation, and a replacement of its finger."""
-        self.scenario, self._stop, self._finger = described_by(load_scenario(scenario), finger), stop, finger
-
-    def parts(self) -> dict[str, tuple[Scenario, Finger]]:
-        """Return scenario and finger of every finger of a hand, or of the only one, by name."""
-        parts = self.scenario.parts()
-        own = self._finger if len(parts) == 1 else None
-        return {name: (part, own or Finger(part.finger)) for name, part in parts.items()}
-
-    @cached_property
-    def result(self) -> xr.Dataset:
-        """The Dataset of `simulate`."""
-        # Studies look at many designs, and at the margin by its metric; they have a bar of their own.
-        with quiet():
-            return simulate(self.scenario, finger=self._finger, progress=lambda time: None, stop=self._stop)
 
 
 @dataclass(frozen=True)
@@ -134,7 +103,7 @@ def losses_tendons(run: Run) -> float:
 
 def losses_joints(run: Run) -> float:
     """Return the energy lost to the friction of the joints, J."""
-    return sum(_final(run.result, each.name) for each in joint_friction.LOSSES)
+    return sum(_final(run.result, each.name) for each in joints.LOSSES)
 
 
 def slack_time(run: Run) -> float:

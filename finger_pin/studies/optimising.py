@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.core.stepping.textbook import Stop
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, to_toml
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_table, write_text
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
@@ -38,6 +37,7 @@ from finger_pin.studies.problem import (
 from finger_pin.studies.records import Progress, evaluate
 from finger_pin.studies.search import HOPELESS, Search, nondominated
 from finger_pin.studies.store import DONE, RunRecord, Store, describe_study, open_store, write
+from finger_pin.typing import Array
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]
 DEFAULT_OBJECTIVES = ("tracking_rms", "tension_peak")

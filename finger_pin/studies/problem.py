@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.parameters import Tendon
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger_like import FingerLike, description_of
+from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.studies.designs import Range
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric, resolve_metrics
 from finger_pin.studies.parsing import parse_range
+from finger_pin.typing import Array
 
 #: Least winding radius that a search of radii tries, m: a thinner pulley bends a tendon too sharply.
 LEAST_RADIUS = 3e-3

@@ -10,13 +10,14 @@ from functools import partial
 
 import joblib
 
-from finger_pin.core.stepping.textbook import Stop
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import to_toml
 from finger_pin.exceptions import FingerPinError
 from finger_pin.studies.executor import FailedTask, compile_for, run_tasks
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, finger_digest, source_digest, versions
 from finger_pin.studies.keys import BaseScenario, Point
-from finger_pin.studies.metrics import Metric, Run
+from finger_pin.studies.metrics import Metric
+from finger_pin.studies.response import Run
 from finger_pin.studies.store import DONE, FAILED, RunRecord, Store
 
 #: Called with the numbers of finished, failed and all runs.

@@ -1,18 +1,21 @@
-"""Metrics of a finger's response: hysteresis, settling, heat in windings, and the margin of a grip."""
+"""A run to be measured, and metrics of its response: hysteresis, settling, heat in windings, margin of a grip."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.routing import Array
+from finger_pin.core.stepping.trajectory import Stop
+from finger_pin.description.loading import ScenarioLike, load_scenario
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import with_finger
 from finger_pin.mechanism.finger import Finger
-
-if TYPE_CHECKING:
-    from finger_pin.studies.metrics import Run
+from finger_pin.simulation.simulate import simulate
+from finger_pin.studies.executor import quiet
+from finger_pin.typing import Array
 
 #: Parts of its travel in which the ways of a fingertip are compared.
 HYSTERESIS_BINS = 20
@@ -20,6 +23,31 @@ HYSTERESIS_BINS = 20
 SETTLED = 0.02
 #: Share of a run, at its end, that a grip is judged by.
 GRIP_TIME = 0.1
+
+
+class Run:
+    """A scenario and its simulation, which is done when a metric first asks for it.
+
+    Attributes:
+        scenario: The scenario; of a finger of one's own it has the description.
+    """
+
+    def __init__(self, scenario: ScenarioLike, stop: Stop | None = None, finger: Finger | None = None) -> None:
+        """Keep a scenario, the function that stops its simulation, and a finger that replaces its own."""
+        self.scenario, self._stop, self._finger = with_finger(load_scenario(scenario), finger), stop, finger
+
+    def parts(self) -> dict[str, tuple[Scenario, Finger]]:
+        """Return scenario and finger of every finger of a hand, or of the only one, by name."""
+        parts = self.scenario.parts()
+        own = self._finger if len(parts) == 1 else None
+        return {name: (part, own or Finger(part.finger)) for name, part in parts.items()}
+
+    @cached_property
+    def result(self) -> xr.Dataset:
+        """The Dataset of `simulate`."""
+        # Studies look at many designs, and at the margin by its metric; they have a bar of their own.
+        with quiet():
+            return simulate(self.scenario, finger=self._finger, progress=lambda time: None, stop=self._stop)
 
 
 def rows(result: xr.Dataset, name: str, dimension: str) -> Array:

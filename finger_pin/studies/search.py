@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
 
 # How far out a design is that cannot be run at all: farther than any that breaks a bound within reason.
 HOPELESS = 1e6

@@ -10,9 +10,9 @@ from typing import Any
 
 import xarray as xr
 
-from finger_pin.core.stepping.textbook import Stop
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked

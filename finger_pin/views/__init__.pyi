@@ -1,7 +1,6 @@
 from . import plots as plots
 from . import viewer as viewer
 from .summary import summarize as summarize
-from .viewer import LiveView as LiveView
 from .viewer import draw as draw
 from .viewer import view as view
 from .viewer import view_forces as view_forces

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.embedded import described
-from finger_pin.description.routing import Array
+from finger_pin.description.scene_metadata import read_scene
 from finger_pin.mechanism.canals import BRANCHES, CANALS
-from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
+from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.tree import STATEFUL, STATELESS
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.recording import is_tracking
+from finger_pin.typing import Array
 
 _SETTLING = 1.0
 _LONG = 2.0
@@ -30,7 +30,7 @@ def summarize(result: xr.Dataset) -> str:
         result: Dataset of `simulate`, or the partial one that its exception carries.
     """
     head = [*_head(result), *_own(result), *_warnings(result)]
-    tree = described(result.attrs).finger.tree
+    tree = read_scene(result.attrs).finger.tree
     tracks = tree is None and is_tracking(result)
     motion = [_tracking(result)] if tracks else [_joints(result), *_actuators(result)]
     pulled = [_tension(result)] if result.sizes["tendon"] else []
@@ -161,7 +161,7 @@ def slack_time(result: xr.Dataset) -> dict[str, float]:
     """Return the time for which every tendon on a spool has hung slack, s; by tendon, from the samples."""
     tension = result["spool_tension"]
     time = np.asarray(result["time"])
-    pulled = described(result.attrs).finger.actuators.values()
+    pulled = read_scene(result.attrs).finger.actuators.values()
     steps = np.gradient(time) if len(time) > 1 else np.zeros(len(time))
     return {
         name: float(np.sum(steps * (np.asarray(tension.sel(tendon=name)) <= 0.0)))

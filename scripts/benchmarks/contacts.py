@@ -41,4 +41,4 @@ def _crowded(name: str, quick: bool) -> dict[str, float]:
         # Where ten balls go is not determined, which is said.
         warnings.simplefilter("ignore", AccuracyWarning)
         times = processor_time({"integration": ready.integrate, "whole": lambda: fp.simulate(scenario)}, 3)
-    return {"duration": scenario.simulation.duration, "contacts": len(ready.loop.finger.layout.contacts), **times}
+    return {"duration": scenario.simulation.duration, "contacts": len(ready.loop.finger.scene.contacts.names), **times}

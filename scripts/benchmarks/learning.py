@@ -14,7 +14,7 @@ import finger_pin as fp
 from benchmarks.runs import rms
 from benchmarks.store import Store
 from benchmarks.timing import interleaved
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 _PERIOD, _WORLDS, _ROUNDS = 0.02, 8, 7
 # Errors are of so many episodes of so many steps: under tensions alone a finger has little stiffness, small differences

@@ -21,9 +21,9 @@ from benchmarks.runs import Job, Point, compiled, point, rms, truth
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked
 from finger_pin.control.proportional import ProportionalController
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.exchange.mjcf import to_mjcf
+from finger_pin.exchange.mjcf import to_mjcf
 from finger_pin.references.reference import SignalReference
+from finger_pin.typing import Array
 
 _PERIOD = 1e-3
 # Whether one spring replaces the lumped mass, and the integrator; with the mass "implicitfast" does as "Euler" does.

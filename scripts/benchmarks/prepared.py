@@ -13,9 +13,9 @@ import numpy as np
 
 import finger_pin as fp
 from benchmarks.store import Store, say
-from finger_pin.control.compiled import Bindings
-from finger_pin.description.routing import Array
+from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.simulation.setup import Setup
+from finger_pin.typing import Array
 
 SCENARIOS = ("fig6", "stick_slip", "servo", "press", "hand")
 #: What the prepared runs record.

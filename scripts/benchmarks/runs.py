@@ -11,15 +11,14 @@ import numpy as np
 
 import finger_pin as fp
 from benchmarks.timing import clocked
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import compiled_control
-from finger_pin.core.jit import Unit, bound_at, call_at
+from finger_pin.control.closed_loop import ClosedLoop, compiled_control
+from finger_pin.core.jit import CompiledFunction, call_at, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.stepping.textbook import integrate
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
+from finger_pin.typing import Array
 
 TEXTBOOK = ("BDF", "LSODA", "Radau")
 SUNDIALS = "CVODE, compiled"
@@ -120,9 +119,9 @@ def has_sundials() -> bool:
     return importlib.util.find_spec("sksundae") is not None
 
 
-@Unit
+@CompiledFunction
 def _evaluate(address: int, time: float) -> int:
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     return call_at(model.evaluate, address, time)
 
 

@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 from matplotlib.figure import Figure
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 
 class Verdict(StrEnum):

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from scipy.special import ellipj, ellipk
 
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import FingerDescription
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulator import Simulator
+from finger_pin.typing import Array
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, new_figure, styled
 from validation.check import Check, Comparison, Picture, Section, compare
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.description.objects import Object
-from finger_pin.description.palm import PathSignal
-from finger_pin.description.routing import Array
+from finger_pin.description.placement import PathSignal
 from finger_pin.mechanism.solids import object_solid
+from finger_pin.typing import Array
 
 G = 9.81
 #: Touches that are not as deep, m, and misses that are as near, are left out: they are within the tolerances.

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import load_finger
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.exchange.urdf import build_rigid_body, to_urdf
+from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
+from finger_pin.typing import Array
 from validation.check import Check, Comparison, Section, compare, skipped
 
 TITLE = "Forward kinematics"

@@ -14,8 +14,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
-from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
+from finger_pin.typing import Array
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
 from validation.check import Check, Picture, Section, compare
 

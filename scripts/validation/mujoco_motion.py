@@ -12,12 +12,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.description.loading import load_scenario
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.exchange.mjcf import to_mjcf
+from finger_pin.exchange.mjcf import to_mjcf
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.simulate import simulate
+from finger_pin.typing import Array
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import GREY, new_figure, styled
 from validation.check import Check, Picture, Section, compare, skipped

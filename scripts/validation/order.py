@@ -9,13 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import compiled_control
+from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.stepping import rosenbrock
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.loading import load_scenario
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
+from finger_pin.typing import Array
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import new_figure, styled
 from validation.check import Check, Picture, Section, compare

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import load_finger
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
 from validation.check import Check, Comparison, Section, compare
 
 TITLE = "Rigid body"

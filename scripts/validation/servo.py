@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 import finger_pin as fp
 from finger_pin.description.actuators import PositionLoop
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, new_figure, styled
 from validation.check import Check, Picture, Section, compare
 

@@ -9,9 +9,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.description.loading import load_scenario
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
+from finger_pin.typing import Array
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
 from validation.check import Check, Comparison, Picture, Section, compare
 

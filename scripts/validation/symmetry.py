@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import load_finger
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulator import Simulator
+from finger_pin.typing import Array
 from validation.check import Comparison, Section, compare
 
 TITLE = "Mirror and units"

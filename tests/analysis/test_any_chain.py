@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from paper.plot_workspace import plot_workspace
 
 import finger_pin as fp
 from finger_pin.analysis import (
@@ -18,7 +19,7 @@ from finger_pin.analysis import (
     tension_for_force,
 )
 from finger_pin.analysis.transmission import transmission_efficiency, transmission_in_motion
-from finger_pin.description.embedded import embedded
+from finger_pin.description.scene_metadata import scene_metadata
 from finger_pin.views import plots
 from finger_pin.views.viewer.animation import animation_page, posture_page
 
@@ -101,7 +102,7 @@ def still(finger, samples=3):
     return xr.Dataset(
         {**at_joints, **at_tendons, **angles, "fingertip_force": (("time", "axis"), np.zeros((samples, 3)))},
         {**places, "tendon": list(finger.routing.tendons)},
-        embedded(bending(finger.description)),
+        scene_metadata(bending(finger.description)),
     )
 
 
@@ -116,7 +117,7 @@ def test_every_figure_and_page_of_any_finger_can_be_drawn(joints, data):
     force = 0.01 * polytope.vertices[0]
     result = still(finger)
     figures = [
-        plots.plot_workspace(finger),
+        plot_workspace(finger),
         plots.plot_force_polytope(finger, position, LIMIT),
         plots.plot_radius_sensitivity(finger, position, force),
         plots.plot_critical_friction(description),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.routed import RoutedController
+from finger_pin.control.proportional import RoutedController
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import ClosureWarning

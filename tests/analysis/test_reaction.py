@@ -5,13 +5,14 @@ import csv
 import numpy as np
 import pinocchio as pin
 import pytest
+from paper.plot_reaction import plot_reaction
+from paper.reaction import reaction
 
 import finger_pin as fp
 from finger_pin.analysis import fingertip_loads, joint_reactions, pin_wrench
-from finger_pin.commands.application import run as run_command
+from finger_pin.commands.application import run_function
 from finger_pin.mechanism.geometry import Groove, TendonGeometry
 from finger_pin.simulation.simulate import simulate
-from finger_pin.views.plots.reaction import plot_reaction
 
 FORCE = np.array([0.4, -0.7, 0.5])
 MASS, LENGTH, CENTRE, INERTIA, WEIGHT = 0.02, 0.05, 0.03, 6e-6, 9.81
@@ -181,7 +182,7 @@ def test_the_figure_draws_the_reactions_and_their_differences(along_fig6):
 
 def test_the_command_writes_a_row_per_joint_and_force_and_a_figure(tmp_path, capsys):
     settings = ["--set", "simulation.duration=0.02", "--forces", "1", "--output", str(tmp_path)]
-    assert run_command("reaction", settings) == 0
+    assert run_function(reaction, settings) == 0
     assert {each.name for each in tmp_path.iterdir()} == {"reaction.csv", "reaction.png"}
     with open(tmp_path / "reaction.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -195,8 +196,8 @@ def test_the_command_writes_a_row_per_joint_and_force_and_a_figure(tmp_path, cap
 
 def test_the_command_tells_wrong_input_in_one_line_and_writes_nothing(tmp_path, capsys):
     target = tmp_path / "out"
-    assert run_command("reaction", ["fig7", "--output", str(target)]) == 2
-    assert run_command("reaction", ["--set", "controller.gian=2", "--output", str(target)]) == 2
+    assert run_function(reaction, ["fig7", "--output", str(target)]) == 2
+    assert run_function(reaction, ["--set", "controller.gian=2", "--output", str(target)]) == 2
     error = capsys.readouterr().err.splitlines()
     assert len(error) == 2 and "fig6" in error[0] and "controller.gain" in error[1]
     assert not target.exists()
@@ -207,5 +208,5 @@ def test_a_folder_that_cannot_be_made_is_told_after_the_first_motion(tmp_path, c
     made = []
     monkeypatch.setattr("finger_pin.simulation.simulate.simulate", lambda given: made.append(given) or simulate(given))
     settings = ["--set", "simulation.duration=0.02", "--output", str(tmp_path / "file" / "out")]
-    assert run_command("reaction", settings) == 1
+    assert run_function(reaction, settings) == 1
     assert "cannot be written" in capsys.readouterr().err and len(made) == 1

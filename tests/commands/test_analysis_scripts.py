@@ -1,11 +1,11 @@
 """The scripts of the design questions and of the conclusions: what they write, and one clear line where they refuse."""
 
 import csv
+import importlib
 
 import pytest
 
 import finger_pin as fp
-from finger_pin.commands import application
 from finger_pin.views.locking_text import summarize_locking
 
 SCRIPTS = ("conclusions", "self_locking", "force_capability")
@@ -17,7 +17,7 @@ def run(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def run(name, *arguments):
-        code = application.run(name, [str(each) for each in arguments])
+        code = importlib.import_module(name).main([str(each) for each in arguments])
         printed = capsys.readouterr()
         return code, printed.out, printed.err.splitlines()
 

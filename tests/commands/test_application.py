@@ -98,7 +98,7 @@ def test_every_public_name_can_be_had_and_nothing_is_imported_that_is_not_asked_
     assert fp.plots.plot_fig6 is fp.plot_fig6 and fp.views.view is fp.view
     code = (
         "import sys, finger_pin; print({'numpy', 'pydantic', 'matplotlib', 'numba'} & set(sys.modules))\n"
-        "import finger_pin.views.viewer, finger_pin.mechanism.exchange.mjcf\n"
+        "import finger_pin.views.viewer, finger_pin.exchange.mjcf\n"
         "print({'meshcat', 'IPython', 'zmq', 'tornado', 'mujoco'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -76,10 +76,10 @@ def shown(tmp_path_factory):
         patch.setattr(reading, "resources", SimpleNamespace(files=lambda package: shipped))
         forget_what_ships()
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
-        patch.setattr("finger_pin.views.viewer.viewing.Viewing.wait", lambda viewing: viewing.close())
+        patch.setattr("finger_pin.views.viewer.viewing.PageHandle.wait", lambda viewing: viewing.close())
         patch.setattr("finger_pin.views.plots.saving.save_figure", not_painted)
         # The comparison of controllers leaves out the start.
-        patch.setattr("finger_pin.studies.comparison.SETTLED", 0.0)
+        patch.setattr("paper.comparison.SETTLED", 0.0)
         meshcat = importlib.import_module("meshcat")
         silent = SimpleNamespace(send=lambda command: None)
         patch.setattr(meshcat, "Visualizer", partial(meshcat.Visualizer, window=silent))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 import finger_pin as fp
-from finger_pin.control.direction import direction
+from finger_pin.control.tendon_feedforward import direction
 from finger_pin.references.reference import ReferenceSignals
 
 WISH = 4.0

@@ -74,9 +74,9 @@ def test_tension_limits_are_kept_and_what_they_cost_is_said():
     found = loop(limit, {"controller.fingertip_force.z.offset": -20.0})
     x = found.finger.rest_state(found.reference.at(0.0).position)
     control = found.evaluate(0.0, x).control
-    assert control.tension.max() <= 9.0 + 1e-9 and np.abs(control.shortfall).max() > 1e-2
+    assert control.tension.max() <= 9.0 + 1e-9 and np.abs(control.torque_deficit).max() > 1e-2
     coupling = found.finger.routing.coupling
-    assert coupling.T @ control.tension == pytest.approx(control.torque - control.shortfall, abs=1e-6)
+    assert coupling.T @ control.tension == pytest.approx(control.torque - control.torque_deficit, abs=1e-6)
 
 
 @pytest.mark.parametrize(

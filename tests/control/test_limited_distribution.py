@@ -5,7 +5,7 @@ import pytest
 import scipy.optimize
 
 import finger_pin as fp
-from finger_pin.control.limited_distribution import LimitedDistribution
+from finger_pin.control.distribution import LimitedDistribution
 from finger_pin.description.routing import Routing
 
 
@@ -25,7 +25,7 @@ def test_with_one_internal_direction_and_no_limit_in_the_way_it_is_the_closed_fo
     limited = LimitedDistribution(routing, np.full(5, 1e4)).plan(wanted, minimum)
     paper = fp.control.PseudoInverse.from_routing(routing).plan(wanted, minimum)
     np.testing.assert_allclose(limited.tension, paper.tension, atol=1e-6)
-    np.testing.assert_array_equal(limited.shortfall, 0.0)
+    np.testing.assert_array_equal(limited.torque_deficit, 0.0)
 
 
 def test_with_several_internal_directions_it_needs_the_least_tension_of_all(redundant):
@@ -62,14 +62,14 @@ def test_it_falls_short_exactly_where_no_tensions_within_the_limits_exert_the_to
     wanted = torques(150, 2, 0.03, 3)
     plan = LimitedDistribution(redundant, maximum).plan(wanted, minimum)
     matrix, counts = redundant.coupling.T, [0, 0]
-    for torque, tension, shortfall in zip(wanted, plan.tension, plan.shortfall, strict=True):
+    for torque, tension, torque_deficit in zip(wanted, plan.tension, plan.torque_deficit, strict=True):
         feasible = scipy.optimize.linprog(
             np.zeros(5), A_eq=1e3 * matrix, b_eq=1e3 * torque, bounds=[(1.0, 6.0)] * 5
         ).success
         counts[feasible] += 1
         assert np.all(tension >= 1.0) and np.all(tension <= 6.0)
-        np.testing.assert_allclose(matrix @ tension, torque - shortfall, atol=1e-8)
-        assert feasible == (np.linalg.norm(shortfall) < 1e-7)
+        np.testing.assert_allclose(matrix @ tension, torque - torque_deficit, atol=1e-8)
+        assert feasible == (np.linalg.norm(torque_deficit) < 1e-7)
     assert min(counts) > 20
 
 
@@ -77,9 +77,9 @@ def test_where_it_falls_short_it_exerts_the_nearest_torque(redundant):
     """Conditions of optimality: no tension that may still change would bring the torque nearer."""
     minimum, maximum = np.full(5, 1.0), np.array([6.0, 5.0, 4.0, 7.0, 6.0])
     plan = LimitedDistribution(redundant, maximum).plan(torques(100, 2, 0.2, 4), minimum)
-    short = np.linalg.norm(plan.shortfall, axis=1) > 1e-6
+    short = np.linalg.norm(plan.torque_deficit, axis=1) > 1e-6
     assert short.sum() > 50
-    gain = plan.shortfall[short] @ redundant.coupling.T
+    gain = plan.torque_deficit[short] @ redundant.coupling.T
     tension, scale = plan.tension[short], np.linalg.norm(gain, axis=1, keepdims=True)
     np.testing.assert_array_less((gain / scale)[tension < maximum - 1e-6], 1e-6)
     np.testing.assert_array_less(-(gain / scale)[tension > minimum + 1e-6], 1e-6)
@@ -110,9 +110,9 @@ def test_a_simulation_keeps_to_the_limits_and_records_what_is_missing():
     }
     result = fp.simulate(fp.load_scenario("fig6", overrides))
     assert float(result.tendon_command.max()) <= limit
-    shortfall = result.torque_shortfall
-    assert shortfall.dims == ("time", "joint") and shortfall.attrs["units"] == "N m"
-    assert float(abs(shortfall).max()) > 1e-3
+    torque_deficit = result.torque_shortfall
+    assert torque_deficit.dims == ("time", "joint") and torque_deficit.attrs["units"] == "N m"
+    assert float(abs(torque_deficit).max()) > 1e-3
     planned = result.tendon_command.values @ fp.Finger(fp.load_finger("ub")).coupling
-    np.testing.assert_allclose(planned, (result.joint_torque_command - shortfall).values, atol=1e-8)
+    np.testing.assert_allclose(planned, (result.joint_torque_command - torque_deficit).values, atol=1e-8)
     assert "torque_shortfall" not in fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))

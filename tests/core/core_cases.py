@@ -7,13 +7,12 @@ import numpy as np
 import pinocchio as pin
 
 import finger_pin as fp
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import compiled_control
+from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
-from finger_pin.core.control import held_control
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call, call_at
+from finger_pin.core.inputs import held_control
+from finger_pin.core.jit import CompiledFunction, Matrix, StructType, Vector, call, call_at, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -165,13 +164,13 @@ class Condensed(NamedTuple):
     columns: Matrix
 
 
-CONDENSED = Kind(Condensed)
+CONDENSED = StructType(Condensed)
 
 
-@Unit
+@CompiledFunction
 def _condensed(address, _number):
-    condensed = bound_at(address, CONDENSED)
-    model, x, r = bound_at(condensed.model, MODEL), condensed.x, condensed.r
+    condensed = unpack(address, CONDENSED)
+    model, x, r = unpack(condensed.model, MODEL), condensed.x, condensed.r
     for c in range(x.size):
         model.state[c] = x[c]
     call_at(model.evaluate, condensed.model, condensed.time)
@@ -247,7 +246,10 @@ class Case:
 
     def states(self, rng, count):
         """Random states beyond the ranges and between slack and tight, slow and fast."""
-        finger, tendons = self.loop.finger, len(self.layout.tendons)
+        finger, vector = self.loop.finger, self.layout.unpack(np.zeros(self.layout.size))
+        tendons, passive, motors = (
+            len(each) for each in (vector.tendon_stiction, vector.passive_position, vector.motor_position)
+        )
         lower, upper = finger.stroke_limiter.lower, finger.stroke_limiter.upper
 
         def spread(size, low, high):
@@ -256,14 +258,14 @@ class Case:
         q = rng.uniform(lower - 0.15 * (upper - lower), upper + 0.15 * (upper - lower), (count, len(lower)))
         state = State(
             position=q,
-            passive_position=finger.tendons.rest_position(q) + spread(self.layout.passive, -5.0, -3.0),
+            passive_position=finger.tendons.rest_position(q) + spread(passive, -5.0, -3.0),
             velocity=spread(len(lower), -2.0, 1.0),
-            passive_velocity=spread(self.layout.passive, -4.0, -1.0),
+            passive_velocity=spread(passive, -4.0, -1.0),
             tendon_stiction=spread(tendons, -2.0, 0.8),
             joint_stiction=spread(len(lower), -5.0, -2.0),
-            motor_position=finger.actuators.angle(q) + spread(len(self.layout.motors), -3.0, -1.0),
-            motor_velocity=spread(len(self.layout.motors), -2.0, 1.0),
-            gearbox_stiction=spread(len(self.layout.motors), -4.0, -2.0),
+            motor_position=finger.actuators.angle(q) + spread(motors, -3.0, -1.0),
+            motor_velocity=spread(motors, -2.0, 1.0),
+            gearbox_stiction=spread(motors, -4.0, -2.0),
         )
         return self.layout.pack(state)
 

@@ -9,7 +9,7 @@ from law_cases import every_law, random_parameters
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.gaps import PRISM, prism_parameters
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.pieces import Leg, Piece, Place
+from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.spans import ANGLE, RISE, SPHERE, STRAIGHT
@@ -67,7 +67,9 @@ def random_path(rng, joints):
         shape, ends = (ANGLE, RISE)[int(more.integers(0, 2))], more.integers(0, joints + 1, 3)
         points = Place(int(ends[0]), more.normal(size=3)), Place(int(ends[1]), more.normal(size=3))
         numbers = np.append(more.normal(size=3), np.zeros(len(shape.parameters) - 3))
-        legs.append(Leg(Piece(shape, numbers, points, int(ends[2]), random_placement(more)), arm=more.normal()))
+        legs.append(
+            PathTerm(PathElement(shape, numbers, points, int(ends[2]), random_placement(more)), arm=more.normal())
+        )
     for _ in range(rng.integers(1, 4)):
         follows = last is not None and rng.random() < 0.7
         first = last if follows else Place(int(rng.integers(0, joints + 1)), rng.normal(size=3))
@@ -78,10 +80,10 @@ def random_path(rng, joints):
             numbers = (0.3, 0.0, 0.0, 0.0, ELSEWHERE, 0.0)
             side = (Place(int(more.integers(0, joints + 1)), 2.0 * more.normal(size=3)),)
         frame = int(rng.integers(0, joints + 1))
-        piece = Piece(shape, np.array(numbers), (first, last, *side), frame, random_placement(rng))
+        piece = PathElement(shape, np.array(numbers), (first, last, *side), frame, random_placement(rng))
         measure = None if rng.random() < 0.5 else rng.normal()
         bends = bool(more.random() < 0.8)
-        legs.append(Leg(piece, arm=rng.normal(), measure=measure, follows=follows, bends=bends))
+        legs.append(PathTerm(piece, arm=rng.normal(), measure=measure, follows=follows, bends=bends))
     return tuple(legs)
 
 
@@ -93,8 +95,8 @@ def random_contacts(rng, joints, width):
         holder, frame = int(rng.integers(0, joints + 1)), int(rng.integers(0, joints + 1))
         ends = Place(holder, rng.normal(size=3)), Place(holder, rng.normal(size=3))
         numbers = np.array([0.3, 0.0, 1.0, *prism_parameters("sphere", [rng.uniform(2.0, 6.0)])])
-        piece = Piece(PRISM, numbers, ends, frame, random_placement(rng))
-        paths += [(Leg(piece, column),) for column in range(3)]
+        piece = PathElement(PRISM, numbers, ends, frame, random_placement(rng))
+        paths += [(PathTerm(piece, column),) for column in range(3)]
     # Stiffness, damping, exponent; static and kinetic friction; stiffness and lag of bristles, Stribeck speed, floor.
     least = [1.0, 0.0, 1.0, 0.8, 0.3, 1.0, 0.1, 0.5, 0.1]
     most = [2.0, 0.1, 1.5, 1.0, 0.7, 3.0, 1.0, 2.0, 0.2]
@@ -151,7 +153,7 @@ def with_other_numbers(mechanism, rng):
     for tip in mechanism.body.tips:
         model.frames[tip].placement = random_placement(rng)
     body = RigidBody(model, [model.frames[tip].name for tip in mechanism.body.tips])
-    moved: dict[int, Piece] = {}
+    moved: dict[int, PathElement] = {}
 
     def elsewhere(leg):
         piece = leg.piece

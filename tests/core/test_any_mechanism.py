@@ -10,10 +10,10 @@ from random_mechanisms import kinds_of, random_mechanism, random_states, with_ot
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_finger import CompiledMechanism
-from finger_pin.core.control import held_control
+from finger_pin.core.inputs import held_control
+from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.stepping.textbook import integrate
-from finger_pin.description.family import Family
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.mechanism.mechanism import Mechanism
 
 #: Sixth-order central differences: where to look, in steps, and weights.
@@ -209,9 +209,11 @@ def test_a_finger_whose_parameters_were_changed_evaluates_alike_in_both(name):
     groups = ("tendon_friction", "joint_friction", "passive_tendon", "stroke_limiter")
     numbers = [(group, each) for group in groups for each, held in table[group].items() if isinstance(held, float)]
     keys = [f"finger.{group}.{each}" for group, each in numbers if each != "stribeck_exponent" and rng.random() < 0.5]
-    family = Family(scenario, [*keys, "finger.joints.distal.link.length", "finger.joints.medial.link.mass"])
+    family = ParametrisedScenario(
+        scenario, [*keys, "finger.joints.distal.link.length", "finger.joints.medial.link.mass"]
+    )
     before = ClosedLoop.from_scenario(scenario).finger
-    changed = family.at([value * rng.uniform(1.0, 1.2) + 1e-9 for value in family.values])
+    changed = family.with_values([value * rng.uniform(1.0, 1.2) + 1e-9 for value in family.values])
     mechanism = ClosedLoop.from_scenario(changed).finger.mechanism
     x, command = random_states(mechanism, rng, 6), rng.uniform(0.0, 3.0, mechanism.channels)
     found = CompiledMechanism(mechanism).evaluate(x, command)

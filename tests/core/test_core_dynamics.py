@@ -9,7 +9,7 @@ from core_cases import BODIES, LOOPS, relative
 
 import finger_pin as fp
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.control import held_control
+from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import Rows
@@ -83,7 +83,7 @@ def test_every_signal_is_the_readable_one_at_one_state_and_at_many(cases, name):
 def on_body(bodies, name):
     """A finger with random states and commands around rest, in front of and beyond the ranges of its joints."""
     finger, rng = bodies[name], np.random.default_rng(5)
-    postures = rng.uniform(-1.2, 1.2, (STATES, len(finger.layout.joints)))
+    postures = rng.uniform(-1.2, 1.2, (STATES, len(finger.routing.joints)))
     x = np.array([finger.rest_state(q) for q in postures])
     x += rng.normal(size=x.shape) * 0.1 * finger.layout.scales()
     return finger, x, rng.uniform(0.0, 5.0, (STATES, finger.routing.actuated)), rng.normal(size=3)

@@ -7,8 +7,8 @@ import pytest
 from core_cases import LOOPS, Case
 from numpy.linalg import norm
 
-from finger_pin.control.proportional import ControlSignals
-from finger_pin.core.control import HELD
+from finger_pin.control.interface import ControlSignals
+from finger_pin.core.inputs import HELD
 
 #: Sixth-order central differences: where to look, in steps, and weights.
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.proportional import ControlSignals, ProportionalController
+from finger_pin.control.interface import ControlSignals
+from finger_pin.control.proportional import ProportionalController
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.exceptions import IntegrationError, Interrupted
 

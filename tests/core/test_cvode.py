@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.core.stepping.textbook import integrate
+from finger_pin.core.stepping.solve_ivp import integrate
 
 TIGHT = {"simulation.duration": 0.2, "simulation.rtol": 1e-8, "simulation.atol_scale": 1e-8}
 

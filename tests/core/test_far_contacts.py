@@ -6,8 +6,8 @@ from core_cases import condensed
 from test_contact_motion import G, plane, scene
 
 from finger_pin.core.collision.broad_phase import wake_all
-from finger_pin.core.control import held_control
 from finger_pin.core.evaluation.law_code import FORCE
+from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_contact_motion import scene
 
-from finger_pin.core.control import held_control
+from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
 

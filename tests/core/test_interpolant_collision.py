@@ -8,7 +8,7 @@ from test_contact_motion import G, scene
 
 from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.stepping.interpolant_collision import meetings
-from finger_pin.core.stepping.textbook import integrate
+from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.description.objects import Object
 
 SPRING = {"stiffness": 1e4, "damping": 0.0, "friction": 0.0}

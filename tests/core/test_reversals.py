@@ -17,7 +17,7 @@ def test_steps_that_end_at_reversals_move_in_between_as_exactly_as_at_their_ends
         return Setup.of(scenario.updated(simulation=settings)).integrate()
 
     loose, tight = motion(TOLERANCE), motion(1e-10)
-    ends = np.concatenate([[0.0], loose.ends[0]])
+    ends = np.concatenate([[0.0], loose.steps[0].ends])
     within = ends[:-1] + np.outer([0.25, 0.5, 0.75], np.diff(ends))
     errors = [np.abs(loose.interpolate(at) - tight.interpolate(at))[:, :4] for at in (ends, within.ravel())]
     assert errors[1].max() < 2.0 * errors[0].max()

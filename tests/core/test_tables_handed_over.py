@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound, bound_at
+from finger_pin.core.jit import CompiledFunction, Indices, Layers, Matrix, StructType, Vector, pack, unpack
 
 
 class Inner(NamedTuple):
@@ -22,13 +22,13 @@ class Outer(NamedTuple):
     layers: Layers
 
 
-KIND = Kind(Outer)
+KIND = StructType(Outer)
 
 
-@Unit
+@CompiledFunction
 def weigh(address, _number):
     """Sum every field with a weight of its own, by its shape; change the vector in place."""
-    value = bound_at(address, KIND)
+    value = unpack(address, KIND)
     total = value.factor * value.inner.count + (100.0 if value.inner.flag else 200.0)
     for i in range(value.indices.size):
         total += 1e3 * (i + 1) * value.indices[i]
@@ -54,7 +54,7 @@ def outer():
 
 
 def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
-    block = bound(outer, KIND)
+    block = pack(outer, KIND)
     total = weigh(block.address)
     table = sum((3 * i + 7 * j) * outer.inner.table[i, j] for i in range(2) for j in range(3))
     assert 0.5 * total == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + (1 + 2) * 4
@@ -75,5 +75,5 @@ def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
     ids=["strided", "single precision", "fewer dimensions", "integer"],
 )
 def test_what_would_be_misread_is_not_bound(outer, change):
-    with pytest.raises(TypeError, match="cannot be bound"):
-        bound(outer._replace(**change), KIND)
+    with pytest.raises(TypeError, match="cannot be packed"):
+        pack(outer._replace(**change), KIND)

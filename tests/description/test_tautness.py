@@ -143,7 +143,7 @@ def test_tensions_never_fall_below_the_minimum_whatever_torque_is_asked_for(flex
     for torque in np.random.default_rng(2).normal(0.0, 0.1, (50, 2)):
         plan = controller.distribution.plan(torque, controller.minimum)
         assert plan.tension.min() >= 0.2
-        np.testing.assert_allclose(plan.tension @ [[6e-3, 0.0], [2e-3, 5e-3]], torque - plan.shortfall, atol=1e-9)
+        np.testing.assert_allclose(plan.tension @ [[6e-3, 0.0], [2e-3, 5e-3]], torque - plan.torque_deficit, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 
 from finger_pin.description.loading import list_fingers, load_finger
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.urdf import build_rigid_body, to_urdf
+from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
 
 ROOT = Path(__file__).resolve().parents[2]
 

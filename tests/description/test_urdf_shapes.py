@@ -10,8 +10,8 @@ from urdf_cases import FINGERS, links_of, read_by_pinocchio
 from validation.kinematics import read_by_yourdfpy
 
 from finger_pin.description.loading import load_finger
-from finger_pin.mechanism.exchange.urdf import to_urdf
 from finger_pin.mechanism.shapes import MATERIALS
+from finger_pin.mechanism.urdf import to_urdf
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -9,8 +9,8 @@ from finger_pin.analysis import steady_state
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.laws.capstan import DRIVEN_TENDON, capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import GEARBOX
-from finger_pin.laws.hysteresis import HYSTERESIS
 from finger_pin.laws.law import Row
+from finger_pin.laws.spring import HYSTERESIS
 
 
 def settled(law, p, speed, load=lambda t: 0.0, command=0.0, curvature=0.0, end=1.0, state=0.0):

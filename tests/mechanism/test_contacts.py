@@ -8,9 +8,9 @@ import finger_pin as fp
 from finger_pin.description.objects import Object
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.contacts import check_start, contact_rows
-from finger_pin.mechanism.exchange.urdf import build_rigid_body
-from finger_pin.mechanism.pieces import path_kinematics
+from finger_pin.mechanism.path_elements import path_kinematics
 from finger_pin.mechanism.solids import add_free_objects, finger_solids, object_solids
+from finger_pin.mechanism.urdf import build_rigid_body
 
 TABLE = Object(shape="half_space", position=(0.0, 0.0, -0.1))
 #: Within reach of every link.

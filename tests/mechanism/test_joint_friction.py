@@ -7,7 +7,7 @@ import pytest
 from exerted import pin_forces
 
 import finger_pin as fp
-from finger_pin.mechanism.joint_friction import JointFriction
+from finger_pin.mechanism.joints import JointFriction
 
 COULOMB, STICTION, STIFFNESS, VISCOUS, STRIBECK, FLOOR = 2.5e-4, 3.5e-4, 5.0, 1e-3, 0.1, 1e-7
 

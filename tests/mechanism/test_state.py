@@ -4,16 +4,31 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.mechanism.state import Layout, State
+from finger_pin.mechanism.state import BLOCKS, Layout, State
+
+
+def layout_of(joints, tendons, passive, motors=(), objects=(), contacts=(), world=(), **more):
+    """Return a layout by the names of its parts."""
+    poses, rates = ([f"{name}.{k}" for name in objects for k in range(size)] for size in (7, 6))
+    slack = tendons[len(tendons) - passive :]
+    of_motors = dict.fromkeys(("motor_position", "motor_velocity", "gearbox_stiction"), motors)
+    of_joints = dict.fromkeys(("position", "velocity", "joint_stiction"), joints)
+    free = {"object_pose": poses, "object_velocity": rates, "world_position": world, "world_velocity": world}
+    bends = [f"{name}.{k}" for name in contacts for k in range(2)]
+    masses = dict.fromkeys(("passive_position", "passive_velocity"), slack)
+    return Layout.of(
+        {**of_joints, **of_motors, **free, **masses, "tendon_stiction": tendons, "contact_bend": bends, **more}
+    )
+
 
 LAYOUTS = {
-    "paper": Layout(("a", "b", "c", "d"), ("T1", "T2", "T3", "T4", "T5"), 1),
-    "no passive tendon": Layout(("a", "b"), ("T1", "T2", "T3"), 0),
-    "three passive tendons": Layout(("a",), ("T1", "T2", "P1", "P2", "P3"), 3),
-    "two motors": Layout(("a", "b"), ("T1", "T2", "P1"), 1, motors=("M1", "M2")),
-    "objects": Layout(("a", "b"), ("T1", "P1"), 1, objects=("ball", "box"), contacts=("a-ball", "b-ball", "ball-box")),
-    "a tree": Layout(("a", "b"), ("T1",), 0, actuators=("servo",), canals=("T2", "T2.1")),
-    "a world": Layout(("a",), ("T1", "T2"), 0, world=("roll", "pitch", "yaw", "x", "y", "z"), contacts=("a-table",)),
+    "paper": layout_of("abcd", ("T1", "T2", "T3", "T4", "T5"), 1),
+    "no passive tendon": layout_of("ab", ("T1", "T2", "T3"), 0),
+    "three passive tendons": layout_of("a", ("T1", "T2", "P1", "P2", "P3"), 3),
+    "two motors": layout_of("ab", ("T1", "T2", "P1"), 1, motors=("M1", "M2")),
+    "objects": layout_of("ab", ("T1", "P1"), 1, objects=("ball", "box"), contacts=("a-ball", "b-ball", "ball-box")),
+    "a tree": layout_of("ab", ("T1",), 0, actuator_state=["servo"], canal_stiction=["T2", "T2.1"]),
+    "a world": layout_of("a", ("T1", "T2"), 0, world=("roll", "pitch", "yaw", "x", "y", "z"), contacts=("a-table",)),
 }
 
 
@@ -25,7 +40,9 @@ def layout(request):
 def test_the_paper_s_finger_has_nineteen_numbers_in_the_order_of_the_model():
     layout = LAYOUTS["paper"]
     assert layout.size == 19
-    state = State(*(np.full(size, float(index)) for index, size in enumerate((4, 1, 4, 1, 5, 4))))
+    kinds = ("position", "passive_position", "velocity", "passive_velocity", "tendon_stiction", "joint_stiction")
+    sizes = dict(zip(kinds, (4, 1, 4, 1, 5, 4), strict=True))
+    state = State(**{kind: np.full(size, float(index)) for index, (kind, size) in enumerate(sizes.items())})
     np.testing.assert_array_equal(layout.pack(state), [0.0] * 4 + [1.0] + [2.0] * 4 + [3.0] + [4.0] * 5 + [5.0] * 4)
 
 
@@ -34,36 +51,29 @@ def test_unpacking_inverts_packing_and_keeps_leading_dimensions(layout, lead):
     x = np.random.default_rng(1).normal(size=(*lead, layout.size))
     state = layout.unpack(x)
     np.testing.assert_array_equal(layout.pack(state), x)
-    n, t, p, m = len(layout.joints), len(layout.tendons), layout.passive, len(layout.motors)
-    f, w, c = len(layout.objects), len(layout.world), len(layout.contacts)
-    sizes = (n, p, n, p, t, n, 0, m, m, m, 7 * f, 6 * f, w, w, 2 * c, len(layout.held), 0)
-    sizes += (len(layout.actuators), len(layout.canals))
-    for name, size in zip(State.__annotations__, sizes, strict=True):
-        assert getattr(state, name).shape == (*lead, size), name
+    for name in BLOCKS:
+        assert getattr(state, name).shape == (*lead, len(layout.names_of(name))), name
 
 
-def test_sizes_add_up_to_three_per_joint_and_motor_one_per_tendon_two_per_passive_tendon_and_contact(layout):
-    alone = 3 * (len(layout.joints) + len(layout.motors)) + len(layout.tendons) + 2 * layout.passive
-    alone += len(layout.actuators) + len(layout.canals)
-    assert layout.size == alone + 13 * len(layout.objects) + 2 * len(layout.world) + 2 * len(layout.contacts)
-    assert sum(layout.sizes) == layout.size
+def test_sizes_add_up(layout):
+    assert layout.size == sum(layout.sizes) == sum(len(layout.names_of(name)) for name in BLOCKS)
 
 
 def test_every_number_has_its_own_name_at_its_place(layout):
     assert len(layout.names) == layout.size == len(set(layout.names))
     numbered = layout.unpack(np.arange(layout.size))
-    passive = layout.tendons[len(layout.tendons) - layout.passive :]
-    for field, items in (
-        ("position", [f"joint_position[{name}]" for name in layout.joints]),
-        ("velocity", [f"joint_velocity[{name}]" for name in layout.joints]),
-        ("passive_position", [f"passive_position[{name}]" for name in passive]),
-        ("passive_velocity", [f"passive_velocity[{name}]" for name in passive]),
-        ("tendon_stiction", [f"tendon_stiction[{name}]" for name in layout.tendons]),
-        ("joint_stiction", [f"joint_stiction[{name}]" for name in layout.joints]),
-        ("motor_position", [f"motor_position[{name}]" for name in layout.motors]),
-        ("motor_velocity", [f"motor_velocity[{name}]" for name in layout.motors]),
-        ("gearbox_stiction", [f"gearbox_stiction[{name}]" for name in layout.motors]),
+    for field, prefix in (
+        ("position", "joint_position"),
+        ("velocity", "joint_velocity"),
+        ("passive_position", "passive_position"),
+        ("passive_velocity", "passive_velocity"),
+        ("tendon_stiction", "tendon_stiction"),
+        ("joint_stiction", "joint_stiction"),
+        ("motor_position", "motor_position"),
+        ("motor_velocity", "motor_velocity"),
+        ("gearbox_stiction", "gearbox_stiction"),
     ):
+        items = [f"{prefix}[{name}]" for name in layout.names_of(field)]
         assert [layout.names[index] for index in getattr(numbered, field)] == items
 
 
@@ -74,7 +84,7 @@ def test_absolute_tolerances_have_one_positive_scale_per_number_by_kind(layout):
         # A pose has metres and a quaternion, or angles.
         assert len(set(values)) <= (2 if kind.startswith(("object", "world")) else 1)
     assert scales.velocity[0] > scales.position[0]
-    if layout.passive:
+    if layout.names_of("passive_position"):
         assert scales.passive_position[0] < scales.position[0]
 
 
@@ -89,5 +99,5 @@ def test_shipped_fingers_have_the_layout_of_their_description(name, size):
     description = fp.load_finger(name)
     layout = fp.Finger(description).layout
     assert layout.size == size
-    assert layout.joints == tuple(description.joints)
-    assert layout.tendons == tuple(description.tendons)
+    assert layout.names_of("position") == tuple(description.joints)
+    assert layout.names_of("tendon_stiction") == tuple(description.tendons)

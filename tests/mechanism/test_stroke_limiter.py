@@ -7,7 +7,7 @@ import pytest
 from exerted import exert
 
 from finger_pin.laws.limiter import limiter_energy, limiter_loss, limiter_torque, penetration
-from finger_pin.mechanism.stroke_limiter import StrokeLimiter
+from finger_pin.mechanism.joints import StrokeLimiter
 
 K, C = 50.0, 0.5
 

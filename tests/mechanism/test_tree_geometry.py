@@ -77,7 +77,7 @@ def test_what_falls_out_of_a_hand_leaves_the_view():
     scene, still = Scene(description), np.zeros((2, len(description.joints)))
     falling = still.copy()
     falling[1, list(description.joints).index("OBJTz")] = -20.0
-    seen = [np.array(scene.header("", each, 1.0, live=False)["inView"]) for each in (still, falling)]
+    seen = [np.array(scene.header("", each, 1.0)["inView"]) for each in (still, falling)]
     assert np.ptp(seen[1], axis=0) == pytest.approx(np.ptp(seen[0], axis=0), abs=0.02)
 
 
@@ -91,4 +91,4 @@ def test_a_hinge_is_looked_at_along_its_axis_with_what_weighs_below_on_a_grid_of
     scene = Scene(fp.from_mujoco(mujoco.MjModel.from_xml_string(text.format(*numbers))))
     np.testing.assert_allclose(scene.view() @ axis, [0.0, -1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(scene.view()[2], np.eye(3)[up], atol=1e-12)
-    assert scene.header("", np.zeros((1, 1)), 1.0, live=False)["grid"] == 0.01
+    assert scene.header("", np.zeros((1, 1)), 1.0)["grid"] == 0.01

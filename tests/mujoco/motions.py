@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 import finger_pin as fp
-from finger_pin.description.exercise import exercise
+from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
 
 
@@ -15,7 +15,7 @@ def ours(spec, duration):
     hand = fp.from_mujoco(spec)
     if any(joint.limited for joint in hand.joints.values()):
         still |= {"finger.stroke_limiter.stiffness": 1e-9}
-    scenario = read_scenario(exercise(hand), still)
+    scenario = read_scenario(demo_motion(hand), still)
     return scenario, fp.simulate(scenario)
 
 

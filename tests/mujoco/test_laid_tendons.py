@@ -35,7 +35,7 @@ def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path, mcp,
     described = fp.from_mujoco(tmp_path / "bare.xml", tendons=tmp_path / "laid.toml")
     assert list(described.tendons) == ["extensor", "flexor"] and not described.tree.actuators
     spec = mujoco.MjSpec.from_string(BARE)
-    fp.mujoco.lay_tendons(spec, tmp_path / "laid.toml")
+    fp.mujoco.add_tendons(spec, tmp_path / "laid.toml")
     fp.mujoco.add_friction(spec, tendons={"*": {"coulomb": 0.12}}, joints={"*": {}})
     model = spec.compile()
     data, hand = mujoco.MjData(model), fp.Hand(described)
@@ -56,7 +56,7 @@ def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path, mcp,
 
 def test_they_move_alike_there_and_here_with_friction_around_joints_and_along_a_path():
     spec = mujoco.MjSpec.from_string(BARE)
-    fp.mujoco.lay_tendons(spec, tomllib.loads(LAID)["tendons"])
+    fp.mujoco.add_tendons(spec, tomllib.loads(LAID)["tendons"])
     for each in (*spec.joints, *spec.tendons):
         each.limited = 0
     scenario, result = ours(spec, 0.1)
@@ -78,5 +78,5 @@ def test_they_move_alike_there_and_here_with_friction_around_joints_and_along_a_
 )
 def test_wrong_tendons_are_named(tendons, entry):
     with pytest.raises(fp.InputError) as caught:
-        fp.mujoco.lay_tendons(mujoco.MjSpec.from_string(BARE), tendons)
+        fp.mujoco.add_tendons(mujoco.MjSpec.from_string(BARE), tendons)
     assert caught.value.entry == entry

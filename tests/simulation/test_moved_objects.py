@@ -5,8 +5,7 @@ import pytest
 from core_cases import condensed
 
 import finger_pin as fp
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import compiled_control
+from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 

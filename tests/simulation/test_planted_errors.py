@@ -8,7 +8,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.control import proportional as controller_block
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping.textbook import integrate
+from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.laws import capstan
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rigid_body import RigidBody

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import compiled_control
+from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.tables import build_tables
-from finger_pin.description.family import Family
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.exceptions import InputError, Interrupted
 
 SCENARIOS = ("fig6", "stick_slip", "servo", "servo_position", "press", "pinch", "hand", "grasp")
@@ -48,10 +47,10 @@ def read_alike(name, key, value, family):
         read = fp.load_scenario(name, {key: value})
     except InputError as error:
         with pytest.raises(InputError) as said:
-            family.at([value])
+            family.with_values([value])
         assert str(said.value) == str(error)
         return False
-    assert family.at([value]) == read, key
+    assert family.with_values([value]) == read, key
     return True
 
 
@@ -75,13 +74,13 @@ def test_every_number_that_ships_makes_what_reading_it_anew_does(name):
     for key, value in numbers(scenario.model_dump(mode="python", exclude_none=True)):
         if ALIKE.match(f"{name}.{key}"):
             continue
-        family = Family(scenario, [key])
+        family = ParametrisedScenario(scenario, [key])
         read_alike(name, key, whole(value), family)
         if read_alike(name, key, changed(value), family):
             together[key] = changed(value)
     assert len(together) > 50
-    family = Family(scenario, [*together])
-    assert same(built(family.at([*together.values()])), built(fp.load_scenario(name, together)))
+    family = ParametrisedScenario(scenario, [*together])
+    assert same(built(family.with_values([*together.values()])), built(fp.load_scenario(name, together)))
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.simulation.sensitivity import nearby
+from finger_pin.simulation.setup import Setup
 
 VARIABLES = ("joint_position", "tendon_tension")
 FRICTION = ["finger.tendon_friction.coulomb", "finger.joint_friction.viscous", "simulation.initial.position.medial"]
@@ -32,7 +34,7 @@ TIGHT = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
             LED,
             ["environment.objects.plate.surface.friction", "finger.tendon_friction.coulomb"],
             VARIABLES,
-            1e-3,
+            2e-3,
         ),
         # A free ball between two pads.
         ("pinch", {"simulation.duration": 0.1}, ["environment.objects.ball.mass"], ("object_position",), 1e-2),
@@ -51,6 +53,21 @@ def test_sensitivities_are_the_differences_of_tight_runs(name, entries, keys, va
             expected = (ends[0][variable] - ends[1][variable]) / (2e-5 * value)
             error = np.sqrt(np.mean((run.slopes[variable][k] - expected) ** 2))
             assert error < bound * np.sqrt(np.mean(expected**2)), (variable, keys[k])
+
+
+def test_differences_on_the_same_steps_and_branches_do_not_depend_on_the_change():
+    # Before 0.7 s the pad touches; one that touches a little later or not yet must not differ by a leap.
+    prepared = fp.prepare(fp.load_scenario("press", {"simulation.duration": 0.7}), ["finger.tendon_friction.coulomb"])
+    (value,) = prepared.values
+    trajectory = Setup.of(prepared.scenario()).integrate()
+    changes = value * np.array([0.0, -1e-6, -1e-7, 1e-7])
+    setups = [Setup.of(prepared.scenario([value + change])) for change in changes]
+    times = np.linspace(0.0, 0.7, 701)
+    same, *moved = (each.interpolate(times)[:, :4] for each in nearby(trajectory, setups))
+    np.testing.assert_allclose(same, trajectory.interpolate(times)[:, :4], atol=1e-12)
+    slopes = [(each - same) / change for each, change in zip(moved, changes[1:], strict=True)]
+    for each in slopes[1:]:
+        assert np.max(np.abs(each - slopes[0])) < 0.05 * np.max(np.abs(slopes[0]))
 
 
 def test_a_later_jump_of_a_tension_is_the_same_motion_later():

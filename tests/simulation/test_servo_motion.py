@@ -9,7 +9,7 @@ import tomli_w
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
-from finger_pin.core.control import held_control
+from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.mechanism.mechanism import Mechanism
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.interface import ControlSignals
 from finger_pin.description.simulation_settings import METHODS
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.references.reference import ReferenceSignals
@@ -252,5 +252,5 @@ def test_runs_of_a_scenario_share_its_finger_and_what_surrounds_it_makes_another
     alone = around.updated(environment={"objects": None})
     fingers = [ClosedLoop.from_scenario(scenario).finger for scenario in (alone, around, alone)]
     assert fingers[0] is fingers[2]
-    assert fingers[0].surroundings is None
-    assert fingers[1].surroundings is not None
+    assert fingers[0].scene is None
+    assert fingers[1].scene is not None

@@ -133,7 +133,7 @@ def test_the_compiled_evaluation_is_the_readable_one(name, request):
     scale = 1.0 + np.abs(readable.rate)
     assert np.abs((compiled.rate - readable.rate) / scale).max() < 1e-8
     found, pushing = compiled.mechanism.touching, readable.mechanism.rows["contacts"].force
-    expected = loop.finger.surroundings.touching(state, pushing)
+    expected = loop.finger.scene.touching(state, pushing)
     for part in ("force", "point", "normal"):
         np.testing.assert_allclose(getattr(found, part), getattr(expected, part), rtol=1e-7, atol=1e-9, err_msg=part)
 
@@ -219,4 +219,4 @@ def test_fingers_touch_each_other_without_objects_where_they_are_told_to(touch):
 def test_fingers_that_are_told_not_to_touch_still_touch_objects():
     described = fp.load_scenario("grasp", {"hand.fingers_touch": False})
     finger = fp.Finger(described.finger, objects=described.environment.objects)
-    assert all("cylinder" in name or "table" in name for name in finger.surroundings.contacts.names)
+    assert all("cylinder" in name or "table" in name for name in finger.scene.contacts.names)

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import finger_pin as fp
-from finger_pin.description.embedded import embedded
+from finger_pin.description.scene_metadata import scene_metadata
 
 STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
 LOST = (
@@ -73,7 +73,7 @@ def synthetic(joints=4, actuated=4, passive=1, samples=2001, seed=0):
     }
     if passive > 1:
         coordinates["passive_tendon"] = names[actuated:]
-    return xr.Dataset(variables, coordinates, embedded(fp.load_scenario("fig6")))
+    return xr.Dataset(variables, coordinates, scene_metadata(fp.load_scenario("fig6")))
 
 
 SIZES = {"paper": (4, 4, 1), "planar": (2, 3, 0), "two passive": (4, 4, 2), "many": (9, 6, 3)}

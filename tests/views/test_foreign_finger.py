@@ -4,12 +4,13 @@ import example_robot_data
 import numpy as np
 import pinocchio as pin
 import pytest
+from paper.plot_workspace import plot_workspace
 
 import finger_pin as fp
 from finger_pin.analysis import force_polytope, self_locking_map
-from finger_pin.description.hand import HandSettings
+from finger_pin.description.finger import HandSettings
 from finger_pin.mechanism.geometry import TendonGeometry
-from finger_pin.views import LiveView, plots, view_forces
+from finger_pin.views import plots, view_forces
 from finger_pin.views.viewer import write_animation
 
 POSITION = (0.1, 0.5, 0.6, 0.4)
@@ -61,7 +62,7 @@ def whole(robot, hand):
 
 def test_every_figure_of_a_finger_takes_it(foreign):
     figures = [
-        plots.plot_workspace(foreign),
+        plot_workspace(foreign),
         plots.plot_force_polytope(foreign, POSITION, 20.0),
         plots.plot_radius_sensitivity(foreign, POSITION, (0.0, 0.0, 0.5)),
         plots.plot_critical_friction(foreign),
@@ -79,10 +80,8 @@ def test_the_viewer_shows_the_tendons_of_one_without_meshes(foreign):
     polytope = force_polytope(foreign, POSITION, 20.0)
     with view_forces(foreign, polytope, open_browser=False, block=False) as shown:
         assert shown.url.startswith("http://127.0.0.1")
-    with LiveView(foreign, open_browser=False) as live:
-        live.update(0.0, POSITION, np.ones(5))
     with pytest.raises(fp.InputError, match=r"joints\.spread\.link.*viewer") as caught:
-        LiveView(foreign.description, open_browser=False)
+        view_forces(foreign.description, polytope, open_browser=False, block=False)
     assert "\n" not in str(caught.value)
 
 

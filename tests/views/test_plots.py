@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from made_up import SIZES, assert_shows, columns, lines, synthetic
 from matplotlib.image import imread
+from paper.plot_friction_law import plot_friction_law
 
 from finger_pin.exceptions import InputError
 from finger_pin.views import plots
@@ -40,7 +41,7 @@ def test_thinning_keeps_a_spike_of_one_sample():
 
 
 def test_fig3_curves_are_the_law_written_out():
-    figure = plots.plot_friction_law()
+    figure = plot_friction_law()
     top, bottom = figure.axes
     kinetic = 0.10
     cases = [(top, label, float(label) * kinetic, 0.010) for label in ("1", "1.5", "2", "3")]
@@ -148,9 +149,9 @@ def test_a_figure_that_a_result_does_not_have_is_named_and_nothing_is_drawn(tmp_
 
 
 def test_an_earlier_picture_survives_a_figure_that_cannot_be_drawn(tmp_path):
-    path = plots.save_figure(plots.plot_friction_law(), tmp_path / "figure.png")
+    path = plots.save_figure(plot_friction_law(), tmp_path / "figure.png")
     before = path.read_bytes()
-    broken = plots.plot_friction_law()
+    broken = plot_friction_law()
     broken.axes[0].set_title("$unbalanced_{$")
     with pytest.raises(ValueError):
         plots.save_figure(broken, path)

@@ -11,6 +11,7 @@ from made_up import synthetic
 from matplotlib.colors import to_rgb
 from matplotlib.figure import SubFigure
 from matplotlib.transforms import Bbox
+from paper.plot_friction_law import plot_friction_law
 
 from finger_pin.exceptions import InputError
 from finger_pin.views import plots
@@ -127,4 +128,4 @@ def test_figures_are_written_in_the_format_that_was_asked_for(tmp_path):
 
 
 def test_a_notebook_shows_a_figure_though_it_belongs_to_no_window():
-    assert plots.plot_friction_law()._repr_png_().startswith(b"\x89PNG")
+    assert plot_friction_law()._repr_png_().startswith(b"\x89PNG")

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from closed_kinematics import A1, A2, A3, A4, equation_1
+from paper.plot_workspace import plot_workspace
 
 from finger_pin.description.loading import load_finger
 from finger_pin.exceptions import InputError
@@ -79,7 +80,7 @@ def test_the_workspace_of_a_planar_finger_lies_in_its_plane():
 def test_fig2_prints_ranges_in_millimetres_and_accepts_finger_and_description(name, tmp_path):
     description = load_finger(name)
     for finger in (Finger(description), description):
-        figure = plots.plot_workspace(finger)
+        figure = plot_workspace(finger)
         space, plane = figure.axes
         labels = [space.get_xlabel(), space.get_ylabel(), space.get_zlabel(), plane.get_xlabel(), plane.get_ylabel()]
         assert all(label.endswith("(mm)") for label in labels)
@@ -93,4 +94,4 @@ def test_fig2_prints_ranges_in_millimetres_and_accepts_finger_and_description(na
 
 def test_fig2_needs_links(network):
     with pytest.raises(InputError):
-        plots.plot_workspace(network(("one",), {"T1": {"one": 5.0}, "T2": {"one": -5.0}}))
+        plot_workspace(network(("one",), {"T1": {"one": 5.0}, "T2": {"one": -5.0}}))

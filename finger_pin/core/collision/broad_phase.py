@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import RATE
-from finger_pin.core.jit import compiled, compiled_within
+from finger_pin.core.jit import njit_always_inline, njit_inline
 from finger_pin.core.path_tables import COLUMNS
 
 # A gap is known so well, m; and a contact is awake where so many steps as the last one might close it.
@@ -21,7 +21,7 @@ KNOWN, _AHEAD = 1e-9, 3.0
 _STRAIGHT = 1e-14
 
 
-@compiled_within
+@njit_always_inline
 def depart(tables: Any, own: Any) -> None:
     """Note the gaps of all contacts that are awake at the beginning of a step."""
     paths = tables.paths
@@ -30,7 +30,7 @@ def depart(tables: Any, own: Any) -> None:
             own.clear[e], own.far[e] = own.out[e, 0], distance(paths, e, own)
 
 
-@compiled
+@njit_inline
 def distance(paths: Any, e: int, own: Any) -> Any:
     """Return the largest distance of the core of a gap's first body from the origin of its frame, m."""
     total = 0.0
@@ -40,7 +40,7 @@ def distance(paths: Any, e: int, own: Any) -> Any:
     return np.sqrt(total) + paths.cores[e]
 
 
-@compiled_within
+@njit_always_inline
 def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
     """Fill the Bernstein coefficients of the interpolant of a step, and the path of each of n coordinates."""
     last, control = k.shape[0] - 1, own.control
@@ -58,7 +58,7 @@ def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
             own.travel[j] += abs(control[j, i + 1] - control[j, i])
 
 
-@compiled_within
+@njit_always_inline
 def glide(x: Any, end: Any, size: int, own: Any) -> None:
     """Fill the same for a motion along a straight line."""
     for j in range(size):
@@ -67,7 +67,7 @@ def glide(x: Any, end: Any, size: int, own: Any) -> None:
         own.travel[j] = abs(end[j] - x[j])
 
 
-@compiled
+@njit_inline
 def path_of(tables: Any, e: int, own: Any) -> Any:
     """Return a bound of the path of a contact's bodies against each other in the step that was traced, m."""
     paths, control = tables.paths, own.control
@@ -88,7 +88,7 @@ def path_of(tables: Any, e: int, own: Any) -> Any:
     return widened(total, turned, own.far[e])
 
 
-@compiled
+@njit_inline
 def widened(path: float, turned: float, far: float) -> Any:
     """Return a path with that of a turn about a distant point, which is as far away as that and the path, m."""
     if turned == 0.0:
@@ -96,7 +96,7 @@ def widened(path: float, turned: float, far: float) -> Any:
     return (path + turned * far) / (1.0 - turned) if turned < 1.0 else np.inf
 
 
-@compiled
+@njit_inline
 def set_asleep(k: int, value: int, asleep: Any) -> None:
     """Let the rows of a contact sleep, or wake them."""
     for m in range(k, k + 3):
@@ -109,7 +109,7 @@ def wake_all(tables: Any, own: Any) -> None:
     own.awake_count[0] = tables.touching // COLUMNS
 
 
-@compiled
+@njit_inline
 def list_awake(tables: Any, own: Any) -> None:
     """List the contacts that are awake."""
     awake = 0
@@ -120,7 +120,7 @@ def list_awake(tables: Any, own: Any) -> None:
     own.awake_count[0] = awake
 
 
-@compiled_within
+@njit_always_inline
 def wake(tables: Any, own: Any) -> None:
     """Wake the contacts that may close on the way that was traced; note the paths of all."""
     paths = tables.paths
@@ -134,7 +134,7 @@ def wake(tables: Any, own: Any) -> None:
                     set_asleep(k, 0, own.asleep)
 
 
-@compiled_within
+@njit_always_inline
 def arrive(tables: Any, own: Any) -> None:
     """Note the gaps of contacts that are awake at the end of a way that was traced."""
     paths = tables.paths
@@ -143,7 +143,7 @@ def arrive(tables: Any, own: Any) -> None:
             own.ahead[e], own.far[e] = own.out[e, 0] - KNOWN, distance(paths, e, own)
 
 
-@compiled_within
+@njit_always_inline
 def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
     for m in range(k + 1, k + 3):
@@ -154,7 +154,7 @@ def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
     return True
 
 
-@compiled
+@njit_inline
 def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
     """Let contacts fall asleep or wake up at the end of a step, by bounds of their gaps there.
 
@@ -180,7 +180,7 @@ def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
     return changed
 
 
-@compiled
+@njit_inline
 def rouse(tables: Any, work: Any) -> None:
     """Wake all contacts, of which nothing is known."""
     for k in range(tables.touching):
@@ -190,7 +190,7 @@ def rouse(tables: Any, work: Any) -> None:
     list_awake(tables, work.paths)
 
 
-@compiled
+@njit_inline
 def wake_since(tables: Any, work: Any, first: Any, second: Any, before: Any, after: Any) -> None:
     """Wake the contacts that may have closed since a state, from its quaternions and numbers and from those of now."""
     for f in range(tables.charts.size):
@@ -209,7 +209,7 @@ def wake_since(tables: Any, work: Any, first: Any, second: Any, before: Any, aft
     list_awake(tables, work.paths)
 
 
-@compiled
+@njit_inline
 def let_sleep(tables: Any, work: Any, state: Any, before: Any) -> None:
     """Let contacts that are far apart at a state sleep, and keep it, for `wake_since`."""
     arrive(tables, work.paths)

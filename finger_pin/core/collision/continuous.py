@@ -16,7 +16,7 @@ import numpy as np
 
 from finger_pin.core.collision.broad_phase import KNOWN, distance, path_of, set_asleep, trace, widened
 from finger_pin.core.evaluation.law_code import SIDE
-from finger_pin.core.jit import call_at, compiled, compiled_within
+from finger_pin.core.jit import call_at, njit_always_inline, njit_inline
 from finger_pin.core.path_tables import LOOKS
 from finger_pin.core.tables import END, FIRST, KINK
 
@@ -31,12 +31,12 @@ _HALVINGS, _BEFORE = 10, 0.999
 _SHARE, _GAP, _NORMAL, _FAR = 0, 1, 2, 5
 
 
-@compiled
+@njit_inline
 def _difference(own: Any, j: int, other: int, i: int) -> Any:
     return own.control[j, i] if other < 0 else own.control[j, i] - own.control[other, i]
 
 
-@compiled_within
+@njit_always_inline
 def _between(start: float, end: float, b: Any) -> Any:
     """Return the Bernstein coefficients of a part of a polynomial."""
     b0, b1, b2, b3, b4 = b
@@ -51,7 +51,7 @@ def _between(start: float, end: float, b: Any) -> Any:
     return b0, b1, b2, b3, b4
 
 
-@compiled_within
+@njit_always_inline
 def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
     """Return bounds of the path between two moments, and of its distance from its chord, m."""
     paths, far = tables.paths, max(one[_FAR], two[_FAR])
@@ -91,7 +91,7 @@ def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
     return path, 1.5 * bends + 4.0 * turns * moves
 
 
-@compiled_within
+@njit_always_inline
 def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
     """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
     path, bend = _bounds(tables, own, e, one, two)
@@ -110,7 +110,7 @@ def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
     return bend + slant + KNOWN < min(one[_GAP], two[_GAP])
 
 
-@compiled
+@njit_inline
 def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None:
     """Note a gap and its slopes at a share of the step."""
     own, state = model.work.paths, model.state
@@ -126,7 +126,7 @@ def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None
         seen[_NORMAL + r] = own.out[e, 1 + r] if near else 0.0
 
 
-@compiled_within
+@njit_always_inline
 def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
     """Return the time just after bodies have met that are apart at one moment and not at another."""
     looks = model.work.paths.looks
@@ -140,7 +140,7 @@ def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
     return min(late, _BEFORE)
 
 
-@compiled
+@njit_inline
 def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
     """Return the share of the step to a meeting of bodies that part again before its end, or `NOTHING`.
 
@@ -170,7 +170,7 @@ def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
     return NOTHING if seen else met
 
 
-@compiled_within
+@njit_always_inline
 def _pressed(tables: Any, rows: Any, k: int) -> bool:
     """Return whether a contact presses, or would if it were not held open."""
     pressed = False
@@ -180,7 +180,7 @@ def _pressed(tables: Any, rows: Any, k: int) -> bool:
     return pressed
 
 
-@compiled_within
+@njit_always_inline
 def survey(integration: Any, model: Any) -> float:
     """Return the share of a step that was tried after which bodies touch, and part before its end; `NOTHING` for none.
 

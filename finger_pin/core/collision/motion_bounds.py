@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from finger_pin.core.chains import Chains
 from finger_pin.core.evaluation.rigid_body import PRISMATIC, ROTATION, TRANSLATION
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.pieces import Piece
+from finger_pin.mechanism.path_elements import PathElement
+from finger_pin.typing import Array
 
 
 class Carrying(NamedTuple):
@@ -46,7 +46,7 @@ class Carrying(NamedTuple):
 
 
 def levers(
-    piece: Piece, coordinates: NDArray[np.int64], moves: NDArray[np.int64], last: list[int], carrying: Carrying
+    piece: PathElement, coordinates: NDArray[np.int64], moves: NDArray[np.int64], last: list[int], carrying: Carrying
 ) -> tuple[Array, NDArray[np.int64]]:
     """Return `levers` and `against` of `Paths` for the coordinates that move a gap's bodies.
 

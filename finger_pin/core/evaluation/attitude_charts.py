@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.rigid_body import ROTATION
-from finger_pin.core.jit import compiled, compiled_within
-from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
+from finger_pin.core.jit import njit_always_inline, njit_inline
+from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
-
-_KNOWN: Remembered[Charts] = Remembered()
+from finger_pin.typing import Array
 
 
 def place(frame: Any, q: Any, body: Any) -> None:
@@ -53,7 +51,7 @@ _place = inlined(place)
 place_bodies = inlined(place_all)
 
 
-@compiled_within
+@njit_always_inline
 def rechart(tables: Any, x: Any, attitude: Any, drift: Any) -> None:
     """Move the angles of all free bodies into their quaternions (x, y, z, w), and into the bodies' placements.
 
@@ -79,7 +77,7 @@ def rechart(tables: Any, x: Any, attitude: Any, drift: Any) -> None:
         _place(tables.chart_frames[f], q, tables.bodies[i])
 
 
-@compiled
+@njit_inline
 def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, angles: Any, rates: Any) -> None:
     """Replace small changes of angles and rates by those of the angles that begin anew, and of their rates."""
     sb, cb, sc, cc = np.sin(b), np.cos(b), np.sin(c), np.cos(c)
@@ -96,7 +94,7 @@ def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, an
     rates[0], rates[1], rates[2] = dx - y * r, dy + x * r, dz - x * q
 
 
-@compiled
+@njit_inline
 def _turn(q: Any, axis: int, angle: float) -> None:
     """Replace a quaternion q by q times the turn about one of its own axes."""
     cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle)
@@ -153,13 +151,9 @@ class Charts:
     size: int
 
     @classmethod
+    @memoised(lambda cls, mechanism: (mechanism.body.form, mechanism.coordinates, mechanism.state_count))
     def of(cls, mechanism: Mechanism) -> Charts:
         """Read a mechanism."""
-        parts = mechanism.body.form, mechanism.coordinates, mechanism.state_count
-        return _KNOWN.of(parts, lambda: cls._of(mechanism))
-
-    @classmethod
-    def _of(cls, mechanism: Mechanism) -> Charts:
         model, width = mechanism.body.model, mechanism.coordinates
         spheres = [joint for joint in model.joints[1:] if joint.nq != joint.nv]
         packed, core = np.ones(mechanism.size, dtype=bool), np.ones(2 * width + mechanism.state_count, dtype=bool)

@@ -10,17 +10,17 @@ from __future__ import annotations
 from typing import Any
 
 from finger_pin.core.evaluation import law_code as at
-from finger_pin.core.jit import compiled, compiled_within
+from finger_pin.core.jit import njit_always_inline, njit_inline
 
 
-@compiled
+@njit_inline
 def extent(blocks: Any, b: int) -> Any:
     """Return the numbers of a block's coordinates and columns: r of positions, velocities and states, and time."""
     width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
     return width, 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
 
 
-@compiled_within
+@njit_always_inline
 def _join(tables: Any, work: Any, blocks: Any) -> None:
     """Fill the block of every atom."""
     paths, label = tables.paths, blocks.label
@@ -48,7 +48,7 @@ def _join(tables: Any, work: Any, blocks: Any) -> None:
     blocks.number[0] = count
 
 
-@compiled_within
+@njit_always_inline
 def partition(tables: Any, work: Any, blocks: Any, gain: Any) -> None:
     """Find the blocks of a step, after the slopes of all laws; of contacts that have opened, clear the rows' gains."""
     paths = tables.paths

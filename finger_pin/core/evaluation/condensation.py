@@ -16,11 +16,11 @@ from typing import Any
 
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
-from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_loosely, compiled_within
+from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, njit_inline, njit_reassociate, unpack
 from finger_pin.core.model import MODEL
 
 
-@compiled
+@njit_inline
 def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int, out: Any) -> None:
     """Fill the change of a weighted sum of earlier forces, times a slope."""
     for c in range(wide):
@@ -31,7 +31,7 @@ def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int
             out[c] += weight * source[c]
 
 
-@compiled_within
+@njit_always_inline
 def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
     """Fill A^T d phi of a block by forces other than its rows': inertial forces, those at tips, and contacts."""
     tables, work, linear, force = model.tables, model.work, model.linear, model.linear.force
@@ -50,7 +50,7 @@ def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) 
         call_at(model.fill_contact_gains, address, g)
 
 
-@compiled_within
+@njit_always_inline
 def _load(model: Any, address: int, k: int, places: Any, width: int, wide: int) -> None:
     """Fill the change of a row's load."""
     tables, linear, load = model.tables, model.linear, model.linear.load
@@ -63,7 +63,7 @@ def _load(model: Any, address: int, k: int, places: Any, width: int, wide: int) 
             call_at(model.add_pushes, address, float(k))
 
 
-@compiled_within
+@njit_always_inline
 def _command(model: Any, k: int, places: Any, width: int, wide: int) -> None:
     """Fill the change of a row's input."""
     tables, control, linear, command = model.tables, model.control, model.linear, model.linear.command
@@ -76,7 +76,7 @@ def _command(model: Any, k: int, places: Any, width: int, wide: int) -> None:
         command[wide - 1] += control.by_time[channel]
 
 
-@compiled
+@njit_inline
 def _add_motion(
     model: Any, k: int, width: int, by_length: float, by_speed: float, by_curvature: float, out: Any
 ) -> None:
@@ -89,7 +89,7 @@ def _add_motion(
         out[place[tables.bend_at[e]]] += by_curvature * linear.bend[e]
 
 
-@compiled
+@njit_inline
 def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
     """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
     tables, linear, slopes, blocks = model.tables, model.linear, model.work.slopes, model.linear.blocks
@@ -149,7 +149,7 @@ def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) ->
                 target[c] += arm * row[c]
 
 
-@compiled_within
+@njit_always_inline
 def factorise(matrix: Any, size: int, pivots: Any) -> bool:
     """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
     for c in range(size):
@@ -171,7 +171,7 @@ def factorise(matrix: Any, size: int, pivots: Any) -> bool:
     return True
 
 
-@compiled_within
+@njit_always_inline
 def substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> None:
     """Replace right-hand sides, one a column, by solutions."""
     for r in range(size):
@@ -194,10 +194,10 @@ def substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> No
             right[r, c] *= inverse
 
 
-@Unit
+@CompiledFunction
 def condense(address: int, g: float) -> int:
     """Fill the solution of (g - J) u = r for all r, after `linearise`; return 0 if g - J is singular, else 1."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     linear, blocks = model.linear, model.linear.blocks
     for index in range(blocks.awake_count[0]):
         s = blocks.awake[index]
@@ -208,7 +208,7 @@ def condense(address: int, g: float) -> int:
     return 1
 
 
-@compiled
+@njit_inline
 def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
     """Fill the rows of the solution that belong to a block."""
     linear, blocks = model.linear, model.linear.blocks
@@ -263,7 +263,7 @@ def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
     return True
 
 
-@compiled_loosely
+@njit_reassociate
 def solve(linear: Any, r: Any, u: Any) -> None:
     """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i. States of contacts asleep stay."""
     blocks, right, solution = linear.blocks, linear.right, linear.solution

@@ -7,15 +7,15 @@ from typing import Any
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
-from finger_pin.core.jit import Unit, bound_at, call_value, compiled, compiled_within
+from finger_pin.core.jit import CompiledFunction, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.tables import END, FIRST
 
 
-@Unit
+@CompiledFunction
 def measure(address: int, _time: float) -> int:
     """Fill lengths, turns and arms of rows with paths through space, and forces of contacts, after `move`."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     measure_paths(model.tables, model.work)
     if model.tables.touching:
         width = model.work.torque.size
@@ -23,7 +23,7 @@ def measure(address: int, _time: float) -> int:
     return 1
 
 
-@compiled_within
+@njit_always_inline
 def _exert(tables: Any, v: Any, z: Any, work: Any) -> None:
     """Evaluate the contacts, which come before all other rows, but for those asleep, and add to A^T phi."""
     rows, paths = work.rows, work.paths
@@ -52,7 +52,7 @@ def _exert(tables: Any, v: Any, z: Any, work: Any) -> None:
             work.torque[tables.arm_at[e]] += work.arm[e] * rows[at.FORCE, tables.arm_row[e]]
 
 
-@compiled
+@njit_inline
 def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, width: int, out: Any) -> None:
     """Add the change of a contact's gap, speed and slips, with a weight each."""
     place = linear.blocks.place
@@ -64,7 +64,7 @@ def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, width: int, out:
             out[width + j] += by_speed * linear.arm[e]
 
 
-@compiled_within
+@njit_always_inline
 def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any, width: int, wide: int) -> None:
     """Fill the gains of the three rows of a contact and of its two states, in the columns of its block."""
     slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
@@ -101,10 +101,10 @@ def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any, width:
                     target[column] += arm * row[column]
 
 
-@Unit
+@CompiledFunction
 def fill_contact_gains(address: int, g: float) -> int:
     """Fill the gains of a block's closed contacts, which depend on no other rows, and add them to A^T d phi."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     linear, blocks = model.linear, model.linear.blocks
     b = blocks.current[0]
     width, wide = extent(blocks, b)
@@ -113,10 +113,10 @@ def fill_contact_gains(address: int, g: float) -> int:
     return 1
 
 
-@Unit
+@CompiledFunction
 def add_pushes(address: int, row: float) -> int:
     """Add to the change of a row's load that of the forces of the closed contacts of its block on its pin."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     tables, work, linear, k = model.tables, model.work, model.linear, int(row)
     paths, own, blocks, load = tables.paths, work.paths, linear.blocks, linear.load
     _, wide = extent(blocks, blocks.current[0])

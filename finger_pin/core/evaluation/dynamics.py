@@ -11,12 +11,12 @@ from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGT
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.evaluation.time_functions import signal_derivatives
-from finger_pin.core.jit import Unit, bound_at, call_at, call_value, compiled, compiled_within
+from finger_pin.core.jit import CompiledFunction, call_at, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.tables import END, FED, FIRST, PRESSED
 
 
-@compiled_within
+@njit_always_inline
 def _tips(tables: Any, work: Any) -> None:
     """Fill positions and Jacobians of the tips, and J^T F, after `move`."""
     size = tables.parents.size
@@ -41,7 +41,7 @@ def _tips(tables: Any, work: Any) -> None:
             j = tables.parents[j]
 
 
-@compiled_within
+@njit_always_inline
 def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
     """Return |-e S + F| of (17) for row k, and keep the vector and e."""
     body = tables.pins[k]
@@ -65,7 +65,7 @@ def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
     return np.sqrt(pull[0] * pull[0] + pull[1] * pull[1] + pull[2] * pull[2])
 
 
-@compiled
+@njit_inline
 def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
     total = 0.0
     for e in range(begin, end):
@@ -73,7 +73,7 @@ def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
     return total
 
 
-@compiled_within
+@njit_always_inline
 def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
     """Fill the arguments of all rows' laws but contacts': positions, velocities, states and inputs from outside.
 
@@ -97,7 +97,7 @@ def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
         rows[COMMAND, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
 
 
-@compiled_within
+@njit_always_inline
 def _act(tables: Any, work: Any) -> None:
     """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
     rows = work.rows
@@ -119,7 +119,7 @@ def _act(tables: Any, work: Any) -> None:
         call_value(tables.laws[g, 0], rows, tables.parameters, begin, end)
 
 
-@compiled_within
+@njit_always_inline
 def _drive(tables: Any, work: Any, rate: Any) -> None:
     """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
     rows, torque = work.rows, work.torque
@@ -133,10 +133,10 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
         rate[i] = rows[RATE, tables.state_row[i]]
 
 
-@Unit
+@CompiledFunction
 def exert(address: int, time: float) -> int:
     """Fill the rows' arguments, forces and rates of states, after `move` and with known inputs."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     tables, control, x, work = model.tables, model.control, model.state, model.work
     width = work.torque.size
     if tables.loaded:
@@ -152,10 +152,10 @@ def exert(address: int, time: float) -> int:
     return 1
 
 
-@Unit
+@CompiledFunction
 def evaluate(address: int, time: float) -> int:
     """Fill the rate of the packed state of a `Model`, and everything in ``work`` that the linearisation needs."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate
     size, width = tables.parents.size, work.torque.size
     q, v = x[:width], x[width : 2 * width]

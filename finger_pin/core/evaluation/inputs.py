@@ -1,4 +1,4 @@
-"""Inputs from outside, compiled: values of a `Control`, and their slopes."""
+"""Inputs from outside, compiled: values of a `InputTable`, and their slopes."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.control import HELD, SCHEDULED
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.time_functions import signal_derivative, signal_derivatives, signal_values
-from finger_pin.core.jit import compiled, compiled_within
-from finger_pin.laws import controller as controller_laws
+from finger_pin.core.inputs import HELD, SCHEDULED
+from finger_pin.core.jit import njit_always_inline, njit_inline
+from finger_pin.laws import inputs as controller_laws
 
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)
 
 
-@compiled
+@njit_inline
 def _coupled(control: Any, values: Any, out: Any) -> None:
     """Fill a derivative of the desired positions from that of the base signals, by the coupling (20)."""
     for j in range(out.size):
@@ -25,7 +25,7 @@ def _coupled(control: Any, values: Any, out: Any) -> None:
             out[j] += control.coupling[j, k] * values[k]
 
 
-@compiled
+@njit_inline
 def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) -> None:
     """Fill the inputs: f_hat of (19), (21), (22), or scheduled ones, and held ones."""
     for i in range(out.size):
@@ -68,7 +68,7 @@ def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) ->
             out[control.channel[i]] = planned[i]
 
 
-@compiled_within
+@njit_always_inline
 def input_slopes(control: Any, time: float) -> None:
     """Fill du/dq, du/dv and du/dt after `inputs`, for the active minimum of (22)."""
     by_position, by_time = control.by_position, control.by_time
@@ -97,7 +97,7 @@ def input_slopes(control: Any, time: float) -> None:
             by_time[row] += share * (control.gain[j] * control.rate[j] + control.damping[j] * control.acceleration[j])
 
 
-@compiled
+@njit_inline
 def tip_forces(control: Any, time: float, order: int, out: Any) -> None:
     """Fill the varying forces at the tips, or a derivative of them, shape (t, 3)."""
     if control.force.harmonics.shape[0] > 0:

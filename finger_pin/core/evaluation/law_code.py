@@ -6,13 +6,16 @@ two, and the core stays as it is.
 
 from __future__ import annotations
 
-import opcode
+import ast
+import builtins
+import inspect
+import textwrap
 from collections.abc import Callable, Sequence
 from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from finger_pin.core.jit import address_of, compiled
+from finger_pin.core.jit import address_of, njit_inline
 from finger_pin.core.jit import numbers as _numbers
 from finger_pin.core.jit import put as _put
 from finger_pin.exceptions import InputError
@@ -24,7 +27,6 @@ LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, SIDE, FORCE, RATE, SIGNALS = ran
 F_LENGTH, F_SPEED, F_STATE, F_RATE, F_LOAD, F_COMMAND, F_CURVATURE = range(7)
 R_LENGTH, R_SPEED, R_STATE, R_LOAD, R_COMMAND, R_CURVATURE, SLOPES = range(7, 14)
 
-_RAISE = opcode.opmap["RAISE_VARARGS"]
 # Filled in for every law.
 _law: Any = None
 _PARAMETERS = _COUNT = 0
@@ -77,13 +79,30 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """
     assert isinstance(function, FunctionType)
     code, known = function.__code__, function.__globals__
-    if _RAISE in code.co_code[::2]:
+    if _may_raise(function):
         raise InputError(
             f"law.{function.__qualname__}", "must raise no exception, as compiled code tells it nobody; return nan"
         )
     called = {name: known[name] for name in code.co_names if isinstance(known.get(name), FunctionType)}
     world = {**known, **{name: inlined(each) for name, each in called.items()}}
-    return compiled(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
+    return njit_inline(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
+
+
+def _may_raise(function: FunctionType) -> bool:
+    """Return whether a function from outside this package has a ``raise`` or an ``assert``."""
+    if function.__module__.startswith("finger_pin."):
+        return False
+    try:
+        nodes = ast.walk(ast.parse(textwrap.dedent(inspect.getsource(function))))
+        return any(isinstance(node, ast.Raise | ast.Assert) for node in nodes)
+    except SyntaxError:
+        # The line of a lambda, which can do neither.
+        return False
+    except (OSError, TypeError):
+        # Without a text, whoever raises an exception names it.
+        known = vars(builtins) | function.__globals__
+        named = [known.get(name) for name in function.__code__.co_names]
+        return any(isinstance(each, type) and issubclass(each, BaseException) for each in named)
 
 
 def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Callable[..., Any]) -> int:
@@ -100,7 +119,7 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
     return address_of(f"void({tables}int64, int64, int64)", twin, announced=shipped)
 
 
-@compiled
+@njit_inline
 def _seen(table: Any, stride: int, k: int) -> Any:
     length, speed, state, load, command, curvature, side = _numbers(table, k, stride, 7)
     return Row(length, speed, state, load, command, curvature, side)
@@ -128,7 +147,7 @@ def _account(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end
         _put(filled, k, stride, found)
 
 
-@compiled
+@njit_inline
 def _touched(table: Any, stride: int, k: int) -> Any:
     gap, speed, state_1, state_2, side = (
         table[LENGTH * stride + k],

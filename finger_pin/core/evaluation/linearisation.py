@@ -11,12 +11,12 @@ from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
 from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.evaluation.time_functions import signal_derivatives
-from finger_pin.core.jit import Unit, bound_at, call_at, call_filling, compiled_within
+from finger_pin.core.jit import CompiledFunction, call_at, call_filling, njit_always_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.tables import END, FIRST
 
 
-@compiled_within
+@njit_always_inline
 def _turning_tips(tables: Any, work: Any, linear: Any) -> None:
     """Subtract d(J^T F)/dq from by_position: a column turns with the joints below it and moves with the tip."""
     axes = work.spatial[AXIS]
@@ -37,7 +37,7 @@ def _turning_tips(tables: Any, work: Any, linear: Any) -> None:
             i = tables.parents[i]
 
 
-@compiled_within
+@njit_always_inline
 def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
     """Fill the derivatives of all loads by the sum of earlier forces, and by the posture that turns the pins' links."""
     axes = work.spatial[AXIS]
@@ -79,10 +79,10 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
             j = tables.parents[j]
 
 
-@Unit
+@CompiledFunction
 def linearise(address: int, time: float) -> int:
     """Fill all partial derivatives of a `Model` at an address after `evaluate` at the same time and state."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     tables, control, x, work, linear = model.tables, model.control, model.state, model.work, model.linear
     size, width = tables.parents.size, work.torque.size
     velocity = x[width : 2 * width]

@@ -6,17 +6,16 @@ from typing import Any
 
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.rigid_body import AXIS, AXIS_CURVE, FORCE, MOTION, inverse_dynamics
-from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
+from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.evaluation.time_functions import signal_derivative
-from finger_pin.core.evaluation.trigonometry import sine_cosine
-from finger_pin.core.jit import Unit, bound_at, compiled
+from finger_pin.core.jit import CompiledFunction, njit_inline, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.laws import palm as palm_laws
+from finger_pin.laws import inputs as palm_laws
 
 _base_motion = inlined(palm_laws.base_motion)
 
 
-@compiled
+@njit_inline
 def _coordinates(signal: Any, time: float, order: int) -> Any:
     return (
         signal_derivative(signal, 0, time, order),
@@ -28,10 +27,10 @@ def _coordinates(signal: Any, time: float, order: int) -> Any:
     )
 
 
-@Unit
+@CompiledFunction
 def move_base(address: int, time: float) -> int:
     """Fill velocity and acceleration of a moving base, and their rates."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     control, tables, work = model.control, model.tables, model.work
     if control.palm.harmonics.shape[0] == 0:
         return 1
@@ -56,10 +55,10 @@ def move_base(address: int, time: float) -> int:
     return 1
 
 
-@Unit
+@CompiledFunction
 def base_power(address: int, _time: float) -> int:
     """Fill the power that a moving base supplies, W, after an evaluation: its velocity times its wrench."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     tables, work, width = model.tables, model.work, model.work.torque.size
     velocity = model.state[width : 2 * width]
     inverse_dynamics(tables, velocity, work.acceleration, work, work.bias, True)
@@ -71,14 +70,14 @@ def base_power(address: int, _time: float) -> int:
     return 1
 
 
-@Unit
+@CompiledFunction
 def bias_rate(address: int, _time: float) -> int:
     """Fill the time derivative of inverse dynamics at a given motion on a moving base, shape (n,).
 
     All velocities change alike, by dV; accelerations by that of the base and by dV x S v of every joint before. What
     an evaluation has left in two layers is overwritten.
     """
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     tables, work, width, out = model.tables, model.work, model.work.torque.size, model.linear.bias_rate
     velocity, size, change = model.state[width : 2 * width], tables.parents.size, work.base_rate[0]
     for i in range(size):

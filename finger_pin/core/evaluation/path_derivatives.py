@@ -12,12 +12,12 @@ from finger_pin.core.evaluation.law_code import FORCE, LOAD
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
 from finger_pin.core.evaluation.rigid_body import AXIS
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
-from finger_pin.core.jit import Unit, bound_at, call_shape, compiled, compiled_within
+from finger_pin.core.jit import CompiledFunction, call_shape, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS, WRENCH
 
 
-@compiled_within
+@njit_always_inline
 def _seen_from(axis: Any, rotation: Any, point: Any, weight: float, out: Any) -> None:
     """Fill a frame's view of a point's velocity, for a unit rate of a coordinate."""
     x = weight * (axis[3] + axis[1] * point[2] - axis[2] * point[1])
@@ -27,7 +27,7 @@ def _seen_from(axis: Any, rotation: Any, point: Any, weight: float, out: Any) ->
         out[c] = rotation[0, c] * x + rotation[1, c] * y + rotation[2, c] * z
 
 
-@compiled
+@njit_inline
 def _changed(slopes: Any, first: int, dy: Any, rotation: Any, out: Any) -> None:
     """Fill a vector's change as the base sees it, from the three rows of slopes that begin somewhere."""
     for r in range(3):
@@ -40,7 +40,7 @@ def _changed(slopes: Any, first: int, dy: Any, rotation: Any, out: Any) -> None:
             out[r] += rotation[r, i] * change
 
 
-@compiled
+@njit_inline
 def _slopes_of_piece(paths: Any, e: int, work: Any) -> None:
     """Fill the derivatives of a piece's wrenches and turn by the coordinates that move it."""
     own = work.paths
@@ -81,7 +81,7 @@ def _slopes_of_piece(paths: Any, e: int, work: Any) -> None:
                     add_force_cross(axis, wrench[6 * p : 6 * p + 6], out[6 * p : 6 * p + 6])
 
 
-@compiled_within
+@njit_always_inline
 def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
     """Add the derivatives of the angle by which a row's path turns."""
     paths, own = tables.paths, work.paths
@@ -113,7 +113,7 @@ def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
         gather[j] = 0.0
 
 
-@compiled_within
+@njit_always_inline
 def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
     """Add to a pin's load the change from contacts that turn with the posture at constant forces."""
     paths, own = tables.paths, work.paths
@@ -130,10 +130,10 @@ def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
                     by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
 
 
-@Unit
+@CompiledFunction
 def linearise_paths(address: int, _time: float) -> int:
     """Fill the derivatives of arms, turns and loads by contacts; subtract those of A^T phi from by_position."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     tables, work, linear = model.tables, model.work, model.linear
     velocity = model.state[work.torque.size : 2 * work.torque.size]
     paths, own, closed, touching = tables.paths, work.paths, COLUMNS * work.paths.closed_count[0], tables.touching

@@ -9,12 +9,12 @@ import numpy as np
 from finger_pin.core.evaluation.law_code import FORCE, SIDE
 from finger_pin.core.evaluation.rigid_body import AXIS, move
 from finger_pin.core.evaluation.spatial import dot
-from finger_pin.core.jit import Unit, bound_at, call_shape, compiled, compiled_within
+from finger_pin.core.jit import CompiledFunction, call_shape, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS, WRENCH
 
 
-@compiled
+@njit_inline
 def add_moment(point: Any, force: Any, out: Any) -> None:
     """Add the moment of a force at a point."""
     out[0] += point[1] * force[2] - point[2] * force[1]
@@ -22,7 +22,7 @@ def add_moment(point: Any, force: Any, out: Any) -> None:
     out[2] += point[0] * force[1] - point[1] * force[0]
 
 
-@compiled_within
+@njit_always_inline
 def _frame(paths: Any, e: int, work: Any) -> None:
     """Place a piece's frame, its points, and its points as the frame sees them."""
     own = work.paths
@@ -54,14 +54,14 @@ def _frame(paths: Any, e: int, work: Any) -> None:
                 own.seen[e, 3 * p + c] += rotation[r, c] * (ends[3 * p + r] - origin[r])
 
 
-@compiled
+@njit_inline
 def turn_out(rotation: Any, out: Any, first: int, vector: Any) -> None:
     """Fill three numbers of a wrench with a vector that a frame sees."""
     for r in range(3):
         vector[r] = rotation[r, 0] * out[first] + rotation[r, 1] * out[first + 1] + rotation[r, 2] * out[first + 2]
 
 
-@compiled
+@njit_inline
 def _look(paths: Any, e: int, work: Any) -> bool:
     """Fill value and wrenches of a piece between placed bodies; return false if it is out of reach."""
     own = work.paths
@@ -79,7 +79,7 @@ def _look(paths: Any, e: int, work: Any) -> bool:
     return not beyond > 0.0
 
 
-@compiled
+@njit_inline
 def _measure(paths: Any, e: int, work: Any) -> None:
     """Fill the value of a piece, and its wrenches."""
     own = work.paths
@@ -107,7 +107,7 @@ def _measure(paths: Any, e: int, work: Any) -> None:
             add_moment(point, wrench[3:6], wrench[:3])
 
 
-@compiled
+@njit_inline
 def net_wrench(moves: Any, wrench: Any, out: Any) -> None:
     """Fill the wrench on all of the three bodies that a coordinate moves."""
     first, second = 1.0 * (moves[0] - moves[2]), 1.0 * (moves[1] - moves[2])
@@ -115,7 +115,7 @@ def net_wrench(moves: Any, wrench: Any, out: Any) -> None:
         out[i] = first * wrench[i] + second * wrench[6 + i]
 
 
-@compiled
+@njit_inline
 def angle_between(first: Any, second: Any) -> Any:
     """Return cosine and sine of the angle between a path's directions before and after a point."""
     cosine = -(first[0] * second[0] + first[1] * second[1] + first[2] * second[2])
@@ -125,16 +125,16 @@ def angle_between(first: Any, second: Any) -> Any:
     return cosine, np.sqrt(x * x + y * y + z * z)
 
 
-@Unit
+@CompiledFunction
 def look(address: int, piece: float) -> int:
     """Place all bodies, and fill value and wrenches of a piece; return 0 if it is out of reach, else 1."""
-    model = bound_at(address, MODEL)
+    model = unpack(address, MODEL)
     work, width = model.work, model.work.torque.size
     move(model.tables, model.state[:width], model.state[width : 2 * width], work)
     return 1 if _look(model.tables.paths, int(piece), work) else 0
 
 
-@compiled_within
+@njit_always_inline
 def measure_paths(tables: Any, work: Any) -> None:
     """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if awake."""
     paths, own, first = tables.paths, work.paths, tables.touching
@@ -185,7 +185,7 @@ def measure_paths(tables: Any, work: Any) -> None:
         own.length[k], own.turn[k] = length, turn
 
 
-@compiled_within
+@njit_always_inline
 def push(tables: Any, work: Any) -> None:
     """Fill the forces of all contacts, after their law."""
     paths, own = tables.paths, work.paths
@@ -197,7 +197,7 @@ def push(tables: Any, work: Any) -> None:
                 own.push[e, r] += work.rows[FORCE, paths.row[e] + m] * own.wrench[e, m, 3 + r]
 
 
-@compiled
+@njit_inline
 def passes(paths: Any, e: int, body: int) -> float:
     """Return the count of passages of a contact's force, less its reaction, through the pin of a body."""
     first, second = paths.carriers[e, 0], paths.carriers[e, 2]

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
-from finger_pin.core.evaluation.trigonometry import sine_cosine
-from finger_pin.core.jit import compiled, compiled_within
+from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
+from finger_pin.core.jit import njit_always_inline, njit_inline
 
 # Columns of the table of bodies.
 ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, ARMATURE, BODY_COLUMNS = 0, 9, 12, 13, 16, 22, 23
@@ -25,7 +24,7 @@ AXIS, AXIS_RATE, AXIS_CURVE, MOTION, SPATIAL_ACCELERATION, FORCE, MOMENTUM, SPAT
 MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
 
 
-@compiled_within
+@njit_always_inline
 def _place(tables: Any, i: int, angle: float, work: Any) -> None:
     """Place body i: rotation, origin and joint axis in the base frame."""
     body, parent, rotation, origin = tables.bodies[i], tables.parents[i], work.rotation[i], work.origin[i]
@@ -47,14 +46,14 @@ def _place(tables: Any, i: int, angle: float, work: Any) -> None:
         origin[r] = start + a * x + b * y + c * z + slid * w
 
 
-@compiled
+@njit_inline
 def _massless(tables: Any, i: int) -> Any:
     """Return whether a body has no inertia, as five of the six of a free object have none."""
     body = tables.bodies[i]
     return body[MASS] == 0.0 and body[INERTIA] == 0.0 and body[INERTIA + 3] == 0.0 and body[INERTIA + 5] == 0.0
 
 
-@compiled_within
+@njit_always_inline
 def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
     """Express the inertia of body i about O in base axes."""
     body, rotation, origin, out = tables.bodies[i], work.rotation[i], work.origin[i], work.inertia[i]
@@ -83,7 +82,7 @@ def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
     out[9] = wx * cx + wy * cy + wz * cz + mass * (px * px + py * py)
 
 
-@compiled
+@njit_inline
 def move(tables: Any, position: Any, velocity: Any, work: Any) -> None:
     """Fill axes, velocities and composite inertias of all bodies."""
     for i in range(tables.parents.size):
@@ -111,7 +110,7 @@ def move(tables: Any, position: Any, velocity: Any, work: Any) -> None:
                 work.composite[tables.parents[i], k] += work.composite[i, k]
 
 
-@compiled
+@njit_inline
 def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, torque: Any, moving: bool) -> None:
     """Fill torque = M a + C v + G after `move`, and the accelerations and composite forces of the bodies.
 
@@ -140,7 +139,7 @@ def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, t
                 work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
 
 
-@compiled_within
+@njit_always_inline
 def mass_matrix(tables: Any, work: Any) -> None:
     """Fill work.square[MASS_MATRIX] = M after `move`; entries between trees are zero from the start."""
     size = tables.parents.size
@@ -156,7 +155,7 @@ def mass_matrix(tables: Any, work: Any) -> None:
         work.square[MASS_MATRIX, i, i] += tables.bodies[i, ARMATURE]
 
 
-@compiled_within
+@njit_always_inline
 def factorise_mass(tables: Any, size: int, work: Any) -> None:
     """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted, tree by tree."""
     factor = work.square[CHOLESKY]
@@ -168,7 +167,7 @@ def factorise_mass(tables: Any, size: int, work: Any) -> None:
             factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
 
 
-@compiled_within
+@njit_always_inline
 def solve_mass(tables: Any, size: int, work: Any, vector: Any) -> None:
     """Replace a vector by M^-1 vector after `factorise_mass`."""
     factor = work.square[CHOLESKY]

@@ -20,10 +20,10 @@ from finger_pin.core.evaluation.rigid_body import (
     SPATIAL_ACCELERATION,
 )
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
-from finger_pin.core.jit import compiled, compiled_within
+from finger_pin.core.jit import njit_always_inline, njit_inline
 
 
-@compiled_within
+@njit_always_inline
 def _coriolis_block(inertia: Any, motion: Any, out: Any) -> None:
     """Fill the upper left block of the body's Coriolis matrix, and its linear momentum in out[9:12].
 
@@ -58,7 +58,7 @@ def _coriolis_block(inertia: Any, motion: Any, out: Any) -> None:
     out[11] = m * uz + wx * hy - wy * hx
 
 
-@compiled
+@njit_inline
 def inverse_dynamics_derivatives(tables: Any, velocity: Any, work: Any) -> None:
     """Fill the derivatives of inverse dynamics by position and velocity after `inverse_dynamics` and `mass_matrix`.
 

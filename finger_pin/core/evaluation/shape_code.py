@@ -9,7 +9,7 @@ from typing import Any
 
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import address_of
-from finger_pin.mechanism.pieces import PieceShape
+from finger_pin.mechanism.path_elements import PathShape
 
 # Numbers that a shape gives, and their derivatives, at most.
 OUT, SLOPES = 16, 80
@@ -18,7 +18,7 @@ OUT, SLOPES = 16, 80
 _shape: Any = None
 
 
-def shape_addresses(shape: PieceShape) -> tuple[int, int]:
+def shape_addresses(shape: PathShape) -> tuple[int, int]:
     """Return the addresses of a shape's value and slopes, compiled; they live as long as the process."""
     return _address(shape.value), _address(shape.slopes)
 

@@ -10,17 +10,17 @@ from finger_pin.core.evaluation.law_code import FORCE
 from finger_pin.core.evaluation.paths import turn_out
 from finger_pin.core.evaluation.rigid_body import ARMATURE, MOTION, move
 from finger_pin.core.jit import (
-    Kind,
+    CompiledFunction,
     Layers,
     Matrix,
-    Unit,
+    StructType,
     Vector,
-    bound_at,
     call_at,
     call_filling,
-    compiled,
-    compiled_within,
     copy,
+    njit_always_inline,
+    njit_inline,
+    unpack,
 )
 from finger_pin.core.model import MODEL
 from finger_pin.core.tables import END, FIRST
@@ -90,10 +90,10 @@ class Motions(NamedTuple):
     bases: Matrix
 
 
-STATES, MOTIONS = Kind(States), Kind(Motions)
+STATES, MOTIONS = StructType(States), StructType(Motions)
 
 
-@compiled
+@njit_inline
 def book(tables: Any, work: Any, totals: Any) -> None:
     """Sum up stored energies and powers of all rows after an evaluation."""
     for c in range(totals.size):
@@ -119,7 +119,7 @@ def book(tables: Any, work: Any, totals: Any) -> None:
                 totals[entry] = total
 
 
-@compiled_within
+@njit_always_inline
 def _touch(paths: Any, work: Any, out: Any) -> None:
     """Fill the forces of contacts on the second body, the points, and the normals; zero for open ones."""
     own = work.paths
@@ -138,7 +138,7 @@ def _touch(paths: Any, work: Any, out: Any) -> None:
                 touch[r] -= work.rows[FORCE, k + i] * own.wrench[e, i, 3 + r]
 
 
-@compiled_within
+@njit_always_inline
 def _set(many: Any, model: Any, m: int) -> None:
     """Set inputs, forces at the tips and state to the m-th."""
     for i in range(many.commands.shape[1]):
@@ -149,7 +149,7 @@ def _set(many: Any, model: Any, m: int) -> None:
     copy(many.states[m], model.state)
 
 
-@compiled_within
+@njit_always_inline
 def _evaluate(many: Any, model: Any, m: int) -> None:
     """Evaluate the state that is set."""
     if many.rates.shape[0] > 0 or many.bases.shape[0] > 0:
@@ -159,7 +159,7 @@ def _evaluate(many: Any, model: Any, m: int) -> None:
         exert_alone(model, many.model, 0.0)
 
 
-@compiled
+@njit_inline
 def exert_alone(model: Any, address: int, time: float) -> None:
     """Fill the rows' forces and rates under known inputs, for powers, which do not need the acceleration."""
     tables, width = model.tables, model.work.torque.size
@@ -169,7 +169,7 @@ def exert_alone(model: Any, address: int, time: float) -> None:
     call_at(model.exert, address, time)
 
 
-@compiled_within
+@njit_always_inline
 def _keep(many: Any, model: Any, m: int) -> None:
     """Fill the m-th place with the latest evaluation."""
     tables, work, rates, rows = model.tables, model.work, many.rates, many.rows
@@ -190,7 +190,7 @@ def _keep(many: Any, model: Any, m: int) -> None:
         book_moved(model, many.model, many.bases.shape[0] > 0, many.booked[m])
 
 
-@compiled
+@njit_inline
 def book_moved(model: Any, address: int, moving: bool, totals: Any) -> None:
     """Book the power of a moving base, or of coordinates led along paths, after a whole evaluation."""
     work, width, last = model.work, model.work.torque.size, totals.size - 1
@@ -203,11 +203,11 @@ def book_moved(model: Any, address: int, moving: bool, totals: Any) -> None:
                 totals[last] -= work.torque[j] * model.state[width + j]
 
 
-@Unit
+@CompiledFunction
 def evaluate_many(address: int, _time: float) -> int:
     """Evaluate the `States` at an address."""
-    many = bound_at(address, STATES)
-    model = bound_at(many.model, MODEL)
+    many = unpack(address, STATES)
+    model = unpack(many.model, MODEL)
     tables, work, before = model.tables, model.work, model.rate
     # Signals have the gaps of all contacts; for powers alone those far apart sleep from state to state.
     sleepy = tables.touching > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
@@ -225,7 +225,7 @@ def evaluate_many(address: int, _time: float) -> int:
     return 1
 
 
-@compiled
+@njit_inline
 def _set_base(bases: Any, m: int, tables: Any, work: Any) -> None:
     """Set the motion of the base to the m-th, or to rest."""
     for k in range(6):
@@ -237,12 +237,12 @@ def _set_base(bases: Any, m: int, tables: Any, work: Any) -> None:
         work.guide[i] = bases[m, 15 + i] if bases.shape[0] > 0 else 0.0
 
 
-@Unit
+@CompiledFunction
 def motion_many(address: int, _time: float) -> int:
     """Fill the `Motions` at an address."""
-    many = bound_at(address, MOTIONS)
+    many = unpack(address, MOTIONS)
     positions, velocities, tips, bases = many.positions, many.velocities, many.tips, many.bases
-    model = bound_at(many.model, MODEL)
+    model = unpack(many.model, MODEL)
     tables, work = model.tables, model.work
     for m in range(positions.shape[0]):
         _set_base(bases, m, tables, work)

@@ -7,10 +7,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.core.jit import compiled
+import numpy as np
+
+from finger_pin.core.jit import njit_inline
+
+_QUARTERS = 0.6366197723675814
+# pi / 2 in parts of 33 bits, whose products with small integers are exact.
+_FIRST, _SECOND, _THIRD = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21
+_S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
+_S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
+_C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
+_C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
+_LARGE = 1e5
 
 
-@compiled
+@njit_inline
 def motion_cross(a: Any, b: Any, out: Any) -> None:
     """Fill out = a x b for motion vectors."""
     x = a[1] * b[2] - a[2] * b[1]
@@ -22,7 +33,7 @@ def motion_cross(a: Any, b: Any, out: Any) -> None:
     out[0], out[1], out[2], out[3], out[4], out[5] = x, y, z, u, v, w
 
 
-@compiled
+@njit_inline
 def add_force_cross(a: Any, f: Any, out: Any) -> None:
     """Add a x* f to out, a motion vector acting on a force vector."""
     x = out[0] + a[1] * f[2] - a[2] * f[1] + a[4] * f[5] - a[5] * f[4]
@@ -34,7 +45,7 @@ def add_force_cross(a: Any, f: Any, out: Any) -> None:
     out[0], out[1], out[2], out[3], out[4], out[5] = x, y, z, u, v, w
 
 
-@compiled
+@njit_inline
 def apply_inertia(inertia: Any, a: Any, out: Any) -> None:
     """Fill out = I a; an inertia is (mass, first moment h, second moment about O: xx xy xz yy yz zz)."""
     m, hx, hy, hz = inertia[0], inertia[1], inertia[2], inertia[3]
@@ -47,7 +58,29 @@ def apply_inertia(inertia: Any, a: Any, out: Any) -> None:
     out[0], out[1], out[2], out[3], out[4], out[5] = x, y, z, u, v, w
 
 
-@compiled
+@njit_inline
 def dot(a: Any, b: Any) -> Any:
     """Return the scalar product of a motion and a force vector."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+
+
+@njit_inline
+def sine_cosine(angle: float) -> Any:
+    """Return sine and cosine of an angle, rad."""
+    if not abs(angle) < _LARGE:
+        return np.sin(angle), np.cos(angle)
+    turns = np.floor(angle * _QUARTERS + 0.5)
+    x = ((angle - turns * _FIRST) - turns * _SECOND) - turns * _THIRD
+    z = x * x
+    sine = x + z * x * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
+    half = 0.5 * z
+    near = 1.0 - half
+    cosine = near + (((1.0 - near) - half) + z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6))))))
+    quarter = int(turns) & 3
+    if quarter == 0:
+        return sine, cosine
+    if quarter == 1:
+        return cosine, -sine
+    if quarter == 2:
+        return -sine, -cosine
+    return -cosine, sine

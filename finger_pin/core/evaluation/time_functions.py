@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.evaluation.trigonometry import sine_cosine
-from finger_pin.core.jit import Layers, Matrix, Vector, compiled
-from finger_pin.laws.quintic import quintic
+from finger_pin.core.evaluation.spatial import sine_cosine
+from finger_pin.core.jit import Layers, Matrix, Vector, njit_inline
+from finger_pin.laws.inputs import quintic
 
 _quintic = inlined(quintic)
 
@@ -33,7 +33,7 @@ def no_signal() -> SignalTable:
     return SignalTable(np.zeros((0, 4)), np.zeros(0), np.zeros((6, 0, 0)))
 
 
-@compiled
+@njit_inline
 def _piece(signal: Any, time: float) -> Any:
     """Return the piece that a time is in, and the time since its knot, both clipped to the knots.
 
@@ -60,7 +60,7 @@ def _piece(signal: Any, time: float) -> Any:
     return low, inside - knots[low]
 
 
-@compiled
+@njit_inline
 def signal_values(signal: Any, time: float, out: Any) -> None:
     """Fill the values of the functions."""
     table = signal.harmonics
@@ -75,7 +75,7 @@ def signal_values(signal: Any, time: float, out: Any) -> None:
             out[j] += _quintic(since, c[0], c[1], c[2], c[3], c[4], c[5])
 
 
-@compiled
+@njit_inline
 def signal_derivative(signal: Any, j: int, time: float, order: int) -> Any:
     """Return a time derivative of function j, of order 0 to 3."""
     table, knots = signal.harmonics, signal.knots
@@ -95,7 +95,7 @@ def signal_derivative(signal: Any, j: int, time: float, order: int) -> Any:
     return value
 
 
-@compiled
+@njit_inline
 def signal_derivatives(signal: Any, time: float, order: int, out: Any) -> None:
     """Fill a time derivative of the functions, as many as there is room for; without functions nothing changes."""
     for j in range(min(out.size, signal.harmonics.shape[0])):

@@ -1,9 +1,11 @@
 """Compiled code: the only place that knows the compiler, which is numba.
 
-`functions` compiles, `tables` hands over arguments of the `kinds` there are, `calls` calls what lies at an address, and
-`dependencies` tells which code on disk still holds. What rests on numba's inside is in `numba_internals`. The rest of
-the core sees the names below.
+`functions` compiles, `tables` hands over arguments of the `struct_types` there are, `calls` calls what lies at an
+address and reads memory, and `digests` tells which code on disk still holds. The rest of the package sees the names
+below.
 """
+
+from numba import types
 
 from finger_pin.core.jit.calls import (
     add_at,
@@ -13,23 +15,34 @@ from finger_pin.core.jit.calls import (
     call_value,
     copy,
     copy_matrix,
+    load,
     look_at,
     numbers,
+    power_over,
     put,
     put_at,
+    scratch,
+    two_to_the,
+    view,
 )
-from finger_pin.core.jit.functions import Unit, address_of, cache_place, compiled, compiled_loosely, compiled_within
-from finger_pin.core.jit.kinds import IndexTable, Indices, Kind, Layers, Matrix, Vector
+from finger_pin.core.jit.functions import (
+    CompiledFunction,
+    address_of,
+    cache_place,
+    njit_always_inline,
+    njit_inline,
+    njit_reassociate,
+)
+from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, StructType, Vector, unpack
 from finger_pin.core.jit.tables import (
     Block,
     alike,
-    bound,
-    bound_at,
     call,
     copied,
     fits,
     indices,
     numbered,
+    pack,
     refill,
     refuse_copy,
     taken,
@@ -37,38 +50,44 @@ from finger_pin.core.jit.tables import (
 
 __all__ = [
     "Block",
+    "CompiledFunction",
     "IndexTable",
     "Indices",
-    "Kind",
     "Layers",
     "Matrix",
-    "Unit",
+    "StructType",
     "Vector",
     "add_at",
     "address_of",
     "alike",
-    "bound",
-    "bound_at",
     "cache_place",
     "call",
     "call_at",
     "call_filling",
     "call_shape",
     "call_value",
-    "compiled",
-    "compiled_loosely",
-    "compiled_within",
     "copied",
     "copy",
     "copy_matrix",
     "fits",
     "indices",
+    "load",
     "look_at",
+    "njit_always_inline",
+    "njit_inline",
+    "njit_reassociate",
     "numbered",
     "numbers",
+    "pack",
+    "power_over",
     "put",
     "put_at",
     "refill",
     "refuse_copy",
+    "scratch",
     "taken",
+    "two_to_the",
+    "types",
+    "unpack",
+    "view",
 ]

@@ -1,4 +1,4 @@
-"""Calls of functions at an address, and rows of numbers read and written, as compiled code does them."""
+"""Calls of functions at an address, and memory read and written, as compiled code does them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from finger_pin.core.jit.functions import compiled
+from finger_pin.core.jit.functions import njit_inline
 
 # Callers see another signature than numba's.
 _generated: Any = intrinsic
@@ -66,19 +66,19 @@ def _call(_typing: Any, function: Any, words: Any) -> Any:
     return types.void(types.int64, words), generate
 
 
-@compiled
+@njit_inline
 def call_value(address: int, rows: Any, parameters: Any, begin: int, end: int) -> None:
     """Evaluate the law at an address for a range of rows."""
     _call(address, (rows.ctypes.data, parameters.ctypes.data, rows.shape[1], begin, end))
 
 
-@compiled
+@njit_inline
 def call_filling(address: int, rows: Any, parameters: Any, filled: Any, begin: int, end: int) -> None:
     """Fill slopes, or energies and powers, by the law at an address for a range of rows."""
     _call(address, (rows.ctypes.data, parameters.ctypes.data, filled.ctypes.data, rows.shape[1], begin, end))
 
 
-@compiled
+@njit_inline
 def call_shape(address: int, y: Any, p: Any, out: Any) -> None:
     """Call the function of a shape at an address with three rows of numbers."""
     _call(address, (y.ctypes.data, p.ctypes.data, out.ctypes.data))
@@ -113,14 +113,77 @@ def put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
     return types.void(table, types.int64, types.int64, values), generate
 
 
-@compiled
+def load(kind: Any) -> Any:
+    """Return a function that reads one number of a type at an address."""
+
+    @_generated
+    def load(_typing: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.load(builder.inttoptr(arguments[0], context.get_value_type(kind).as_pointer()))
+
+        return kind(address), generate
+
+    return load
+
+
+def view(kind: Any) -> Any:
+    """Return a function that gives the numbers of a type at an address, by index.
+
+    An array of numba's would ask of each index whether it is negative.
+    """
+
+    @_generated
+    def view(_typing: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_data_type(kind).as_pointer())
+
+        return types.CPointer(kind)(address), generate
+
+    return view
+
+
+@_generated
+def scratch(_typing: Any, count: Any) -> Any:
+    """Return the address of room for numbers on the caller's stack: an array of NumPy's would be allocated anew."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.ptrtoint(builder.alloca(ir.DoubleType(), size=arguments[0]), ir.IntType(64))
+
+    return types.int64(types.int64), generate
+
+
+@_generated
+def two_to_the(_typing: Any, rounded: Any) -> Any:
+    """Return 2^n of a number with the integer n in its last bits, as bits of its exponent."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        exponent = builder.shl(builder.bitcast(arguments[0], word), word(52))
+        return builder.bitcast(builder.add(exponent, word(1023 << 52)), ir.DoubleType())
+
+    return types.float64(types.float64), generate
+
+
+@_generated
+def power_over(_typing: Any, value: Any) -> Any:
+    """Return the power of two from 1 / x to 2 / x, by the bits of a positive number's exponent."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        exponent = builder.and_(builder.bitcast(arguments[0], word), word(2047 << 52))
+        return builder.bitcast(builder.sub(word(2046 << 52), exponent), ir.DoubleType())
+
+    return types.float64(types.float64), generate
+
+
+@njit_inline
 def copy(source: Any, target: Any) -> None:
     """Copy a vector; an assignment to a slice would take a second more to compile, for its error's text."""
     for index in range(source.size):
         target[index] = source[index]
 
 
-@compiled
+@njit_inline
 def copy_matrix(source: Any, target: Any) -> None:
     """Copy a matrix, as `copy` does."""
     for r in range(source.shape[0]):

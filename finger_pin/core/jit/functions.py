@@ -2,7 +2,7 @@
 
 Numba keeps code beside the file that a function stands in, under the function's name, as long as that file is the
 same. It sees neither what a function calls in other files nor which globals it was given: so functions are handed to
-it under a name that tells all that they reach (`dependencies`), as if they stood in an empty file of the cache's
+it under a name that has a digest of all that they reach (`digests`), as if they stood in an empty file of the cache's
 folder.
 Where no folder can be written, everything is compiled anew in each process. What takes its time is said once, as a
 warning of the logger ``finger_pin``, which Python prints on standard error unless logging is set up otherwise.
@@ -25,8 +25,7 @@ from typing import Any, TypeVar
 import numba
 import platformdirs
 
-from finger_pin.core.jit.dependencies import Unknown, reached
-from finger_pin.core.jit.numba_internals import INTERNAL
+from finger_pin.core.jit.digests import Undigestible, source_digest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _LOGGER = logging.getLogger("finger_pin")
@@ -34,30 +33,29 @@ _LOGGER = logging.getLogger("finger_pin")
 # Of all that is compiled: IEEE arithmetic is kept, so that NaN stays NaN; only a product and a sum may be fused.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 # Arrays are free to pass only where calls are inlined; nobody calls these functions from outside.
-_INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, **INTERNAL}
+_INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
 
-def compiled(function: _Function) -> _Function:
+def njit_inline(function: _Function) -> _Function:
     """Return the function compiled once, to be inlined by the optimiser at each of the places that call it."""
     return numba.njit(**_INLINED)(function)  # type: ignore[no-any-return]
 
 
-def compiled_within(function: _Function) -> _Function:
+def njit_always_inline(function: _Function) -> _Function:
     """Return a function that is compiled as a part of its caller; of several callers, each would compile it anew.
 
-    Numba optimises each function that is `compiled` with all that it calls, and makes machine code of it, though only
+    Numba optimises each function of `njit_inline` with all that it calls, and makes machine code of it, though only
     what calls it is ever run: of a chain of calls, the last function would be optimised as often as the chain is long.
     """
     return numba.njit(inline="always", **_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
-def compiled_loosely(function: _Function) -> _Function:
-    """Return the function compiled as `compiled` does, with sums in any order, for vector instructions."""
-    vars(function)["loose"] = True
+def njit_reassociate(function: _Function) -> _Function:
+    """Return the function compiled as `njit_inline` does, with sums in any order, for vector instructions."""
     return numba.njit(**_INLINED | {"fastmath": {"contract", "reassoc"}})(function)  # type: ignore[no-any-return]
 
 
-class Unit:
+class CompiledFunction:
     """A function of an address and a number that returns an integer, compiled on first use, or found on disk."""
 
     def __init__(self, function: Callable[[int, float], int]) -> None:
@@ -101,7 +99,7 @@ if hasattr(os, "register_at_fork"):
 _living: list[Any] = []
 
 
-def address_of(signature: str, function: FunctionType, announced: bool = True) -> int:
+def address_of(signature: str, function: Callable[..., Any], announced: bool = True) -> int:
     """Return the address of the function compiled for C; it lives as long as the process.
 
     Args:
@@ -109,6 +107,7 @@ def address_of(signature: str, function: FunctionType, announced: bool = True) -
         function: The function. Nothing tells the caller of an exception: it must raise none.
         announced: Whether it is said that compiling takes its time.
     """
+    assert isinstance(function, FunctionType)
     made: Any
     with _lock:
         named = _named(function)
@@ -145,8 +144,8 @@ def _named(function: FunctionType) -> FunctionType | None:
     """Return the function as numba is to keep it, or None if it cannot be kept."""
     place = cache_place()
     try:
-        name = f"{function.__name__}-{reached(function)}"
-    except Unknown:
+        name = f"{function.__name__}-{source_digest(function)}"
+    except Undigestible:
         return None
     if place is None:
         return None

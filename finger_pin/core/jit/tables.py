@@ -1,8 +1,7 @@
 """Arguments handed to compiled code once: unpacking some eighty arrays costs as much as a small step does.
 
-`bound` writes a table of arrays into one `Block` of machine words, from which `bound_at` reads at no cost at every
-later call. To compiled code a table is a pointer, whose attributes are its fields: passing a pointer instead of some
-hundred numbers is what compiling quickly depends on.
+`pack` writes a table of arrays into one `Block` of machine words, from which `unpack` reads at no cost at every
+later call.
 """
 
 from __future__ import annotations
@@ -11,16 +10,12 @@ import ctypes
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
-from finger_pin.core.jit.functions import Unit
-from finger_pin.core.jit.kinds import Kind, Numbers
+from finger_pin.core.jit.functions import CompiledFunction
+from finger_pin.core.jit.struct_types import Numbers, StructType
 
 _Table = TypeVar("_Table", bound=tuple[Any, ...])
 _DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
-# Callers see another signature than numba's.
-_generated: Any = intrinsic
 
 
 def refuse_copy(holder: Any) -> NoReturn:
@@ -36,7 +31,7 @@ def refuse_copy(holder: Any) -> NoReturn:
 
 
 class Block:
-    """A table for `bound_at`, kept alive with its arrays.
+    """A table for `unpack`, kept alive with its arrays.
 
     Attributes:
         address: Where compiled code finds it.
@@ -52,20 +47,20 @@ class Block:
     __reduce__ = refuse_copy
 
 
-def bound(table: Any, kind: Kind) -> Block:
-    """Return a block that holds a table for `bound_at`.
+def pack(table: Any, kind: StructType) -> Block:
+    """Return a block that holds a table for `unpack`.
 
     Raises:
-        TypeError: If the table is not of the kind that `bound_at` will read: another layout would be misread.
+        TypeError: If the table is not of the kind that `unpack` will read: another layout would be misread.
     """
     words: list[int] = []
     _write(table, kind, words)
     return Block(table, words)
 
 
-def call(unit: Unit, table: Any, kind: Kind) -> int:
+def call(unit: CompiledFunction, table: Any, kind: StructType) -> int:
     """Call a unit with a table."""
-    block = bound(table, kind)
+    block = pack(table, kind)
     return unit(block.address)
 
 
@@ -180,28 +175,18 @@ def _address(array: Any) -> int:
     return int(array.ctypes.data)
 
 
-def _write(table: Any, kind: Kind, words: list[int]) -> None:
-    for value, own in zip(table, kind.fields.values(), strict=True):
+def _write(table: Any, kind: StructType, words: list[int]) -> None:
+    for value, own in zip(table, kind.kinds.values(), strict=True):
         if isinstance(own, Numbers):
             fitting = isinstance(value, np.ndarray) and value.ndim == own.dimensions and value.flags.c_contiguous
             if not fitting or value.dtype != _DTYPES[own.dtype]:
-                raise TypeError(f"{value!r} cannot be bound as {own}")
+                raise TypeError(f"{value!r} cannot be packed as {own}")
             words += (_address(value), *value.shape)
-        elif isinstance(own, Kind):
+        elif isinstance(own, StructType):
             _write(value, own, words)
         elif isinstance(value, bool | int) and own in (int, bool):
             words.append(int(value))
         elif isinstance(value, float) and own is float:
             words.append(int(np.float64(value).view(np.int64)))
         else:
-            raise TypeError(f"{value!r} cannot be bound as {own}")
-
-
-@_generated
-def bound_at(_typing: Any, address: Any, kind: Any) -> Any:
-    """Return the table at the address of a block that `bound` has filled."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
-
-    return kind.instance_type(types.int64, kind), generate
+            raise TypeError(f"{value!r} cannot be packed as {own}")

@@ -8,9 +8,9 @@ import numpy as np
 
 from finger_pin.core.collision.broad_phase import list_awake, settle
 from finger_pin.core.collision.continuous import NOTHING, UNSEEN
-from finger_pin.core.control import HELD
 from finger_pin.core.evaluation.attitude_charts import rechart
-from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_within, copy, copy_matrix
+from finger_pin.core.inputs import HELD
+from finger_pin.core.jit import CompiledFunction, call_at, copy, copy_matrix, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.error_norm import step_error, worst
@@ -19,7 +19,7 @@ from finger_pin.core.stepping.rosenbrock import try_step
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
 
-@compiled_within
+@njit_always_inline
 def _begin(integration: Any, model: Any, end: float) -> None:
     """Make ready to advance to a time, with all contacts awake that may be."""
     memory, control = integration.memory, model.control
@@ -35,7 +35,7 @@ def _begin(integration: Any, model: Any, end: float) -> None:
         memory[at.GOAL], memory[at.WINDOW_END] = end, 0.0
 
 
-@compiled_within
+@njit_always_inline
 def _hopeless(integration: Any, width: int) -> int:
     """Return `RUNAWAY` or `CREEPING` if there is no sense in another try, else `DONE`."""
     memory, x = integration.memory, integration.x
@@ -53,15 +53,15 @@ def _hopeless(integration: Any, width: int) -> int:
     return at.DONE
 
 
-@compiled
+@njit_inline
 def _blame(integration: Any) -> None:
     """Remember which number of the state keeps steps short."""
     k = integration.k
     integration.memory[at.CULPRIT] = float(worst(integration.x, k[k.shape[0] - 1], integration.rtol, integration.atol))
 
 
-@compiled
-def _tried(integration: Any, model: Any, h: float) -> int:
+@njit_inline
+def try_counted(integration: Any, model: Any, h: float) -> int:
     """Try a step, and count its evaluations; return its outcome, as `try_step` does."""
     memory, tables = integration.memory, model.tables
     fresh, count = memory[at.FRESH] > 0.0, integration.tableau.nodes.size
@@ -79,7 +79,7 @@ def _tried(integration: Any, model: Any, h: float) -> int:
     return outcome
 
 
-@compiled
+@njit_inline
 def _fitting(integration: Any, error: float) -> Any:
     """Return the factor by which a step of an error is to be longer to fit the tolerance."""
     if not error <= 1e30:
@@ -87,7 +87,7 @@ def _fitting(integration: Any, error: float) -> Any:
     return min(_GROW, max(_SHRINK, _SAFETY * max(error, 1e-10) ** (-1.0 / integration.tableau.order)))
 
 
-@compiled_within
+@njit_always_inline
 def _growth(integration: Any, h: float, error: float, clipped: bool) -> Any:
     """Return the factor by which the step after one that is taken may be longer."""
     memory, factor = integration.memory, _fitting(integration, error)
@@ -99,7 +99,7 @@ def _growth(integration: Any, h: float, error: float, clipped: bool) -> Any:
     return min(factor, 1.0) if memory[at.CULPRIT] < 0.0 else factor
 
 
-@compiled
+@njit_inline
 def _shorten(integration: Any, h: float, whole: float) -> None:
     """Let the next try be shorter than the last; a step that is cut at a kink was longer than that as a whole."""
     memory = integration.memory
@@ -107,7 +107,7 @@ def _shorten(integration: Any, h: float, whole: float) -> None:
     memory[at.CULPRIT], memory[at.STEP], memory[at.WHOLE] = -1.0, h, whole
 
 
-@compiled_within
+@njit_always_inline
 def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) -> None:
     """Count a step that is taken, and set the length of the next."""
     memory = integration.memory
@@ -125,8 +125,8 @@ def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) 
     memory[at.CULPRIT], memory[at.WHOLE] = max(memory[at.CULPRIT], 0.0), 0.0
 
 
-@compiled_within
-def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
+@njit_always_inline
+def arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
     """Go to the end of a step, and keep it, if there is a record."""
     x, attitude, tables, taken = integration.x, integration.attitude, model.tables, stretch.taken[0]
     first = 2 * model.linear.mass.shape[0]
@@ -139,6 +139,8 @@ def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
         stretch.times[taken] = time
         copy_matrix(integration.dense, stretch.dense[taken])
         copy(x, stretch.states[taken])
+        copy(integration.kinks, stretch.branches[taken])
+        stretch.shares[taken] = integration.memory[at.PART]
     rechart(tables, x, attitude, integration.drift)
     if taken < stretch.times.size:
         for f in range(attitude.shape[0]):
@@ -147,7 +149,7 @@ def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
         stretch.taken[0] += 1
 
 
-@compiled_within
+@njit_always_inline
 def _still(integration: Any, model: Any, first: int) -> None:
     """Clear the rates and errors of the states of contacts that sleep, which are zero and stay so."""
     tables = model.tables
@@ -160,12 +162,12 @@ def _still(integration: Any, model: Any, first: int) -> None:
                     integration.k[j, c] = 0.0
 
 
-@Unit
+@CompiledFunction
 def advance(address: int, end: float) -> int:
     """Take steps of the `Stretch` at an address until a time, s, or until its record is full; return a status."""
-    stretch = bound_at(address, at.STRETCH)
-    integration = bound_at(stretch.integration, at.INTEGRATION)
-    model, memory = bound_at(integration.model, MODEL), integration.memory
+    stretch = unpack(address, at.STRETCH)
+    integration = unpack(stretch.integration, at.INTEGRATION)
+    model, memory = unpack(integration.model, MODEL), integration.memory
     _begin(integration, model, end)
     while memory[at.TIME] < end:
         status = _hopeless(integration, model.linear.mass.shape[0])
@@ -179,7 +181,7 @@ def advance(address: int, end: float) -> int:
         clipped = final and end - time < h
         if final:
             h = end - time
-        outcome = _tried(integration, model, h)
+        outcome = try_counted(integration, model, h)
         if outcome == at.SENSELESS:
             return at.NOT_FINITE
         error = np.inf
@@ -206,6 +208,6 @@ def advance(address: int, end: float) -> int:
         else:
             if integration.joints.size + integration.objects.size > 0:
                 call_at(integration.judge, stretch.integration, h)
-            _arrive(stretch, integration, model, end if final and part == 1.0 else time + part * h)
+            arrive(stretch, integration, model, end if final and part == 1.0 else time + part * h)
             _pace(integration, h, error, final, clipped)
     return at.DONE

@@ -8,10 +8,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.jit import Indices, Kind, Unit, Vector, add_at, bound, bound_at, call_at, compiled, look_at, put_at
+from finger_pin.core.jit import (
+    CompiledFunction,
+    Indices,
+    StructType,
+    Vector,
+    add_at,
+    call_at,
+    look_at,
+    njit_inline,
+    pack,
+    put_at,
+    unpack,
+)
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.threads import pool, usable_cores
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 #: In the place of an end: this one is left alone.
 RESTING = -1.0
@@ -38,13 +50,13 @@ class Batch(NamedTuple):
     counts: Indices
 
 
-BATCH = Kind(Batch)
+BATCH = StructType(Batch)
 
 
-@Unit
+@CompiledFunction
 def open_batch(address: int, helpers: float) -> int:
     """Let threads take up the steppers of the `Batch` at an address; return how many helpers are to be sent."""
-    taken = bound_at(address, BATCH).counts.ctypes.data
+    taken = unpack(address, BATCH).counts.ctypes.data
     put_at(taken + 8, 0)
     put_at(taken, 0)
     missing: int = max(int(helpers) - look_at(taken + 16), 0)
@@ -52,10 +64,10 @@ def open_batch(address: int, helpers: float) -> int:
     return missing
 
 
-@Unit
+@CompiledFunction
 def advance_batch(address: int, patience: float) -> int:
     """Advance what nobody has taken up yet of the `Batch` at an address; return whether all is done then."""
-    batch = bound_at(address, BATCH)
+    batch = unpack(address, BATCH)
     done, size = batch.counts.ctypes.data + 8, batch.ends.size
     _take_up(batch)
     while patience > 0.0 and look_at(done) < size:
@@ -63,10 +75,10 @@ def advance_batch(address: int, patience: float) -> int:
     return int(look_at(done) >= size)
 
 
-@Unit
+@CompiledFunction
 def help_batch(address: int, patience: float) -> int:
     """Advance what nobody has taken up yet, and again whenever the `Batch` at an address is opened soon."""
-    batch = bound_at(address, BATCH)
+    batch = unpack(address, BATCH)
     taken, size, asked = batch.counts.ctypes.data, batch.ends.size, 0.0
     while asked <= patience:
         asked += 1.0
@@ -77,7 +89,7 @@ def help_batch(address: int, patience: float) -> int:
     return 1
 
 
-@compiled
+@njit_inline
 def _take_up(batch: Any) -> None:
     taken = batch.counts.ctypes.data
     i = add_at(taken, 1)
@@ -106,7 +118,7 @@ class Together:
             np.zeros(len(parts), dtype=np.int64),
             np.zeros(3, dtype=np.int64),
         )
-        self._block = bound(self._batch, BATCH)
+        self._block = pack(self._batch, BATCH)
         self._patience = 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:

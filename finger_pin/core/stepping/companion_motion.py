@@ -15,7 +15,7 @@ import numpy as np
 
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.island_stepper import Part
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 # So many steps lie between two looks.
 _STEPS = 128

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
 
 
 def check_installed() -> None:

@@ -6,7 +6,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.jit import Indices, Kind, Matrix, Unit, Vector, bound_at, call_at, compiled_within
+from finger_pin.core.jit import (
+    CompiledFunction,
+    Indices,
+    Matrix,
+    StructType,
+    Vector,
+    call_at,
+    njit_always_inline,
+    unpack,
+)
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.rosenbrock import DONE, FULL, INTEGRATION, STRETCH, TIME
 
@@ -49,18 +58,20 @@ class Driven(NamedTuple):
     Attributes:
         drives: The loops.
         stretch: Address of the bound `Stretch`.
-        advance: Address of `adaptive.advance`.
+        advance: Address of what is called to advance, and is given ``given``.
+        given: Address of a block.
     """
 
     drives: Drives
     stretch: int
     advance: int
+    given: int
 
 
-DRIVEN = Kind(Driven)
+DRIVEN = StructType(Driven)
 
 
-@compiled_within
+@njit_always_inline
 def _sample(drives: Any, x: Any, tension: Any) -> None:
     """Take a sample of all motors, and set their voltages."""
     last = drives.goals.shape[0] - 1
@@ -84,16 +95,16 @@ def _sample(drives: Any, x: Any, tension: Any) -> None:
     drives.taken[0] += 1
 
 
-@Unit
+@CompiledFunction
 def advance_driven(address: int, end: float) -> int:
     """Advance as `adaptive.advance` does, and sample at every multiple of the period on the way, both ends included.
 
     The end and a sample there may differ by rounding.
     """
-    driven = bound_at(address, DRIVEN)
-    drives, stretch = driven.drives, bound_at(driven.stretch, STRETCH)
-    integration = bound_at(stretch.integration, INTEGRATION)
-    model = bound_at(integration.model, MODEL)
+    driven = unpack(address, DRIVEN)
+    drives, stretch = driven.drives, unpack(driven.stretch, STRETCH)
+    integration = unpack(stretch.integration, INTEGRATION)
+    model = unpack(integration.model, MODEL)
     memory, times = integration.memory, stretch.times
     while True:
         if memory[TIME] * (1.0 + 1e-12) >= drives.taken[0] * drives.period:
@@ -102,6 +113,6 @@ def advance_driven(address: int, end: float) -> int:
             return DONE
         if stretch.taken[0] == stretch.taken[1] and times.size > 0:
             return FULL
-        status: int = call_at(driven.advance, driven.stretch, min(end, drives.taken[0] * drives.period))
+        status: int = call_at(driven.advance, driven.given, min(end, drives.taken[0] * drives.period))
         if status != DONE:
             return status

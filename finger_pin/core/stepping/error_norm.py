@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.jit import compiled, compiled_within
+from finger_pin.core.jit import njit_always_inline, njit_inline
 
 
-@compiled
+@njit_inline
 def step_error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any:
     """Return the error of a step as a multiple of the tolerance, root mean square over the state.
 
@@ -24,7 +24,7 @@ def step_error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any
     return np.sqrt(total / x.size)
 
 
-@compiled_within
+@njit_always_inline
 def worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
     """Return the index of the first state whose error is no number, else of that with the largest error.
 

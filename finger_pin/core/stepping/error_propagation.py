@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_within
+from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.interpolation import between
@@ -26,14 +26,14 @@ _NODES = (0.5 - np.sqrt(0.05), 0.5 + np.sqrt(0.05), 1.0)
 _WEIGHTS = (5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0)
 
 
-@Unit
+@CompiledFunction
 def judge_step(address: int, h: float) -> int:
     """Carry the error of the run of an `Integration` at an address over a step of a length, or its taken share.
 
     Its state is that of the step's start, that of its model the one at the end.
     """
-    integration = bound_at(address, at.INTEGRATION)
-    model, memory = bound_at(integration.model, MODEL), integration.memory
+    integration = unpack(address, at.INTEGRATION)
+    model, memory = unpack(integration.model, MODEL), integration.memory
     drift, k, width = integration.drift, integration.k, model.linear.mass.shape[0]
     part, turned, last = memory[at.PART], memory[at.SHARE] < 1.0, k.shape[0] - 1
     again = memory[at.CULPRIT] < 0.0 and model.tables.touching > 0
@@ -61,7 +61,7 @@ def judge_step(address: int, h: float) -> int:
     return 1
 
 
-@compiled_within
+@njit_always_inline
 def carry(
     linear: Any, h: float, gamma: float, drift: Any, difference: Any, behind: float, turned: bool, r: Any, u: Any
 ) -> Any:
@@ -97,7 +97,7 @@ def carry(
     return behind + h - time
 
 
-@compiled_within
+@njit_always_inline
 def defect(integration: Any, model: Any, time: float, h: float, share: float) -> None:
     """Replace the difference of the two methods in the last stage by the integrated defect of the rates along a step.
 
@@ -129,7 +129,7 @@ def defect(integration: Any, model: Any, time: float, h: float, share: float) ->
     solve(model.linear, r, k[last])
 
 
-@compiled
+@njit_inline
 def weigh(part: Any, width: int, drift: Any) -> Any:
     """Return the mean square of some coordinates' errors, rad2 or m2, at most one.
 
@@ -151,7 +151,7 @@ def weigh(part: Any, width: int, drift: Any) -> Any:
     return 1.0
 
 
-@compiled
+@njit_inline
 def _flow(linear: Any, g: float, share: float, drift: Any, r: Any, u: Any) -> None:
     """Multiply by exp(share J / g) = sum of (-D)^k L_k(share), D = J / (g - J), Laguerre polynomials with alpha = -1.
 

@@ -13,10 +13,11 @@ from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.companion_motion import Companion
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part, failure
+from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
-from finger_pin.core.stepping.textbook import Statistics, Stop, Trajectory, Watch
+from finger_pin.core.stepping.trajectory import Statistics, Stop, Trajectory, Watch
 from finger_pin.core.threads import in_threads
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
 _MOST_BYTES = 2e9
@@ -116,7 +117,7 @@ def integrate_compiled(
         stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
     # Of a controller that acts in between, the linearised flow knows nothing.
     known = held is None and not stepper.driven
-    judged = known and stepper.judged
+    judged = known and stepper.judged and not stepper.repeats
     recorders = [_Recorder(stepper, index, chunk, judged) for index in range(len(stepper.parts))]
     for recorder in recorders:
         # Compiling is no part of an integration's cost.
@@ -154,7 +155,7 @@ def integrate_compiled(
         estimated_error=_error(stepper, recorders) if judged else np.nan,
         # Inputs that are held in between are not the core's own.
         islands=() if not known or stepper.held else tuple(steps),
-        ends=tuple(each.times for each in steps),
+        steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),
     )
 
 

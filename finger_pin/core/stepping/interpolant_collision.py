@@ -12,10 +12,10 @@ import numpy as np
 from scipy.special import comb
 
 from finger_pin.core.evaluation.attitude_charts import Charts
-from finger_pin.core.stepping.textbook import Meeting
+from finger_pin.core.stepping.trajectory import Meeting
 from finger_pin.core.tables import build_tables
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.typing import Array
 
 #: Maps times, shape (m,), to packed states, shape (m, size): a polynomial within a step.
 Interpolant = Callable[[Array], Array]

@@ -6,7 +6,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled, compiled_within
+from finger_pin.core.jit import (
+    CompiledFunction,
+    Indices,
+    Layers,
+    Matrix,
+    StructType,
+    Vector,
+    njit_always_inline,
+    njit_inline,
+    unpack,
+)
 
 
 class Between(NamedTuple):
@@ -43,13 +53,13 @@ class Between(NamedTuple):
     turned: Layers
 
 
-BETWEEN = Kind(Between)
+BETWEEN = StructType(Between)
 
 
-@Unit
+@CompiledFunction
 def interpolate_many(address: int, _time: float) -> int:
     """Fill the states of a `Between` at an address; there must be a step."""
-    b = bound_at(address, BETWEEN)
+    b = unpack(address, BETWEEN)
     step = -1
     for k in range(b.times.size):
         step = step_at(b, b.times[k], step)
@@ -60,13 +70,13 @@ def interpolate_many(address: int, _time: float) -> int:
     return 1
 
 
-@compiled
+@njit_inline
 def begin_of(b: Any, step: int) -> Any:
     """Return the time at which a step begins."""
     return b.begin if step == 0 else b.ends[step - 1]
 
 
-@compiled
+@njit_inline
 def step_at(b: Any, time: float, known: int) -> Any:
     """Return the step that a time is in, sought from one that is known, -1 for none; fill the state at its begin."""
     step, last = max(known, 0), b.ends.size - 1
@@ -79,7 +89,7 @@ def step_at(b: Any, time: float, known: int) -> Any:
     return step
 
 
-@compiled
+@njit_inline
 def begin_step(b: Any, step: int) -> None:
     """Fill the state at the begin of a step."""
     for c in range(b.before.size):
@@ -88,14 +98,14 @@ def begin_step(b: Any, step: int) -> None:
         begin_anew(b.charts, b.width, b.before)
 
 
-@compiled
+@njit_inline
 def within(b: Any, step: int, time: float, out: Any) -> None:
     """Fill the state at a time within a step, which has begun."""
     begin = begin_of(b, step)
     between(b.before, b.states[step], b.dense[step], (time - begin) / (b.ends[step] - begin), out)
 
 
-@compiled
+@njit_inline
 def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None:
     """Fill the state after a share of a step, from the states at its ends and its row of ``dense``."""
     last, rest = dense.shape[0] - 1, 1.0 - share
@@ -109,7 +119,7 @@ def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None
         out[c] = rest * before[c] + share * (after[c] + rest * out[c])
 
 
-@compiled_within
+@njit_always_inline
 def interpolant(tableau: Any, k: Any, dense: Any) -> None:
     """Fill the coefficients of a step's interpolant from its stages k, shape (s, size)."""
     for row in range(dense.shape[0]):
@@ -122,7 +132,7 @@ def interpolant(tableau: Any, k: Any, dense: Any) -> None:
                 bend[c] += of_stage * k[j, c]
 
 
-@compiled
+@njit_inline
 def cut(before: Any, after: Any, dense: Any, share: float) -> None:
     """Let a step end after a share of it: the state at its end and its row of ``dense`` become those of that part."""
     highest, inverse = share ** (dense.shape[0] + 1), 1.0 / share
@@ -137,7 +147,7 @@ def cut(before: Any, after: Any, dense: Any, share: float) -> None:
         after[c] = (1.0 - share) * before[c] + share * (after[c] + (1.0 - share) * bend)
 
 
-@compiled_within
+@njit_always_inline
 def begin_anew(charts: Any, width: int, x: Any) -> None:
     """Let the angles of free bodies begin anew, as `rechart` does: their rates become the angular velocity."""
     for f in range(charts.size):

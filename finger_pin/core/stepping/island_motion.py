@@ -15,8 +15,8 @@ from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate
 from finger_pin.core.stepping.island_stepper import Part, Record
 from finger_pin.core.stepping.powers import POWERS, Powers, power_many
 from finger_pin.core.threads import in_threads, threads
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True, eq=False)

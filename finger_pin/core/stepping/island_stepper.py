@@ -12,25 +12,24 @@ from numpy.typing import NDArray
 from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
 from finger_pin.core.collision.broad_phase import wake_all
-from finger_pin.core.control import Control
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.evaluation.rigid_body import PRISMATIC
-from finger_pin.core.jit import Block, Unit, bound, copied
+from finger_pin.core.inputs import InputTable
+from finger_pin.core.jit import Block, CompiledFunction, copied, pack
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.adaptive import advance
 from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven
 from finger_pin.core.stepping.error_propagation import judge_step
 from finger_pin.core.stepping.islands import Island
 from finger_pin.core.stepping.knots import KNOTTED, Knotted, advance_knotted
+from finger_pin.core.stepping.repetition import REPETITION, Repetition, Steps, repeat_steps
 from finger_pin.core.stepping.step_cuts import cut_step, survey_step
 from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.core.tables import Tables
-from finger_pin.description.routing import Array
 from finger_pin.laws.law import ContactLaw, Law
+from finger_pin.typing import Array
 
 FIRST_STEP = 1e-6
-# A tolerance that every step keeps, and a step that every end cuts.
-_ANY = 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,17 +41,22 @@ class Record:
         states: States there, before the angles of free bodies begin anew, shape (m, size).
         attitudes: Quaternions after that, shape (m, f, 4).
         dense: Coefficients of the steps' interpolants, shape (m, rows, size).
+        shares: Of the lengths that were tried the shares that were taken, shape (m,).
+        branches: Where the rows were between the sides of their kinks at the start of each, shape (m, K).
     """
 
     times: Array
     states: Array
     attitudes: Array
     dense: Array
+    shares: Array
+    branches: Array
 
     @classmethod
-    def of(cls, count: int, size: int, free: int, rows: int) -> Record:
+    def of(cls, count: int, size: int, free: int, rows: int, kinks: int) -> Record:
         """Make room."""
-        return cls(np.empty(count), np.empty((count, size)), np.empty((count, free, 4)), np.empty((count, rows, size)))
+        shapes = (), (size,), (free, 4), (rows, size), (), (kinks,)
+        return cls(*(np.empty((count, *shape)) for shape in shapes))
 
     def first(self, count: int) -> Record:
         """Return the first steps; no copy."""
@@ -81,17 +85,19 @@ class Part:
         objects: Coordinates of free objects, likewise.
         drives: Loops of motors in position drive, which sample on the way; None for none.
         knots: Times at which steps end, s, positive, in order.
+        steps: Steps that are taken whatever their errors; None to choose them.
     """
 
     drives: Drives | None = None
     knots: Array = np.zeros(0)
+    steps: Steps | None = None
 
     def __init__(
         self,
         island: Island,
         laws: Sequence[Law | ContactLaw],
         tables: Tables,
-        control: Control,
+        control: InputTable,
         x: Array,
         attitude: Array,
         tableau: Tableau,
@@ -127,21 +133,21 @@ class Part:
             survey=survey_step.address if tables.touching else 0,
             judge=judge_step.address if judged else 0,
         )
-        self._block = bound(self._bound, core.INTEGRATION)
+        self._block = pack(self._bound, core.INTEGRATION)
         self.joints, self.objects = self._bound.joints, self._bound.objects
         place_all(tables, attitude)
         self.tables, self.control, self.tableau, self.judged = tables, control, tableau, judged
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
         self._nothing, self._taken = self.room(0), np.zeros(2, dtype=np.int64)
-        # What compiled code was given last: a record, loops and knots; and the blocks that hold them, what they are
-        # for last.
-        self._placed: tuple[Record | None, Drives | None, Array] = (None, None, self.knots)
+        # A record, loops, knots and steps that compiled code was given last; and the blocks that hold them, what they
+        # are for last.
+        self._placed: tuple[Record | None, Drives | None, Array, Steps | None] = (None, None, self.knots, None)
         self._blocks: list[Block] = []
         self._advance = advance
 
     def room(self, count: int) -> Record:
         """Return room for so many steps."""
-        return Record.of(count, len(self.x), len(self.attitude), len(self.tableau.dense))
+        return Record.of(count, len(self.x), len(self.attitude), len(self.tableau.dense), len(self._bound.kinks))
 
     @property
     def rtol(self) -> float:
@@ -163,7 +169,7 @@ class Part:
         block, unit = self.ready(record, rows)
         return unit(block, end), int(self._taken[0])
 
-    def ready(self, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, Unit]:
+    def ready(self, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, CompiledFunction]:
         """Return the address of the `Stretch` to be advanced, and the unit that does it; into a record if given."""
         own = self._nothing if record is None else record
         self._taken[:] = rows.indices(len(own.times))[:2]
@@ -171,21 +177,25 @@ class Part:
         return self._blocks[-1].address, self._advance
 
     def _place(self, record: Record) -> None:
-        """Hand a record to compiled code, with the loops of motors and the knots, if any."""
-        before, drives, knots = self._placed
-        if before is record and drives is self.drives and knots is self.knots:
+        """Hand a record to compiled code, with the loops of motors, knots and given steps, if any."""
+        before, drives, knots, steps = self._placed
+        if before is record and drives is self.drives and knots is self.knots and steps is self.steps:
             return
-        room = (record.times, record.states, record.attitudes, record.dense)
-        stretch = bound(core.Stretch(self._block.address, *room, self._taken), core.STRETCH)
-        self._placed, self._blocks, self._advance = (record, self.drives, self.knots), [stretch], advance
+        room = record.times, record.states, record.attitudes, record.dense, record.shares, record.branches
+        stretch = pack(core.Stretch(self._block.address, *room, self._taken), core.STRETCH)
+        self._placed, self._blocks, self._advance = (record, self.drives, self.knots, self.steps), [stretch], advance
+        if self.steps is not None:
+            repetition = Repetition(self.steps, np.zeros(1, dtype=np.int64), stretch.address)
+            self._blocks.append(pack(repetition, REPETITION))
+            self._advance = repeat_steps
         if self.drives is not None:
-            driven = Driven(self.drives, stretch.address, self._advance.address)
-            self._blocks.append(bound(driven, DRIVEN))
+            driven = Driven(self.drives, stretch.address, self._advance.address, self._blocks[-1].address)
+            self._blocks.append(pack(driven, DRIVEN))
             self._advance = advance_driven
         if len(self.knots):
             passed, given = np.zeros(1, dtype=np.int64), self._blocks[-1].address
             knotted = Knotted(self.knots, passed, stretch.address, self._advance.address, given)
-            self._blocks.append(bound(knotted, KNOTTED))
+            self._blocks.append(pack(knotted, KNOTTED))
             self._advance = advance_knotted
 
     def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
@@ -201,27 +211,27 @@ class Part:
             if self.drives is not None:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
 
-    def renew(self, tables: Tables, control: Control, x: Array, attitude: Array, atol: Array) -> None:
+    def renew(self, tables: Tables, control: InputTable, x: Array, attitude: Array, atol: Array) -> None:
         """Begin anew at time zero with other numbers, which fit, as a new part of them would."""
         self.model.renew(tables, control)
         self.atol[:], self.memory[:], self._bound.drift[:] = atol, 0.0, 0.0
-        self.drives, self.knots = None, Part.knots
+        self.drives, self.knots, self.steps = None, Part.knots, None
         self.restart(x, attitude, 0.0)
 
     def with_loads(self, loaded: bool) -> Part:
         """Return the same part that minds forces at the tips, or not."""
-        bound = self._bound
+        pack = self._bound
         return Part(
             self.island,
             self.laws,
             self.tables._replace(loaded=loaded),
             self.control,
-            bound.x,
-            bound.attitude,
-            bound.tableau,
-            bound.rtol,
-            bound.atol,
-            bound.memory,
+            pack.x,
+            pack.attitude,
+            pack.tableau,
+            pack.rtol,
+            pack.atol,
+            pack.memory,
             self.judged,
         )
 
@@ -230,39 +240,26 @@ class Part:
         """The state and memory that later steps depend on; arrays of its own, which may be filled."""
         return self.x, self.attitude, self.memory, self.control.tension, self.tables.tip_force, self.tables.bodies
 
-    def repeating(self, ends: Array) -> Part:
-        """Return the same part on imposed steps with these ends, s, whatever their errors are."""
-        bound = self._bound
-        twin = Part(
-            self.island,
-            self.laws,
-            self.tables,
-            self.control,
-            bound.x,
-            bound.attitude,
-            bound.tableau,
-            _ANY,
-            np.full_like(bound.atol, _ANY),
-            bound.memory,
-            self.judged,
-        )
-        twin.memory[core.STEP], twin.knots, twin.drives = _ANY, np.array(ends, dtype=float), self.drives
-        return twin
+    def repeat(self, steps: Steps) -> None:
+        """Take given steps from now on, whatever their errors; of other rows than these the branches do not matter."""
+        if steps.branches.shape[1] != len(self._bound.kinks):
+            steps = steps._replace(branches=np.zeros((len(steps.ends), 0)))
+        self.steps = steps
 
     def copy(self, judged: bool | None = None, tolerances: float = 1.0) -> Part:
         """Return an independent part at a share of its tolerances; its error is estimated, if not told, as here."""
-        bound = self._bound
+        pack = self._bound
         return Part(
             self.island,
             self.laws,
             copied(self.tables),
             copied(self.control),
-            bound.x.copy(),
-            bound.attitude.copy(),
-            bound.tableau,
-            bound.rtol * tolerances,
-            bound.atol * tolerances,
-            bound.memory.copy(),
+            pack.x.copy(),
+            pack.attitude.copy(),
+            pack.tableau,
+            pack.rtol * tolerances,
+            pack.atol * tolerances,
+            pack.memory.copy(),
             self.judged if judged is None else judged,
         )
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.axes import Subset
-from finger_pin.core.control import PLANNED, Control
 from finger_pin.core.evaluation.time_functions import SignalTable
+from finger_pin.core.inputs import PLANNED, InputTable
 from finger_pin.core.jit import indices
 from finger_pin.core.tables import Tables
 
@@ -32,7 +32,7 @@ class Island:
     tips: Indices
 
 
-def find_islands(tables: Tables, control: Control, touching: bool = True) -> list[Island]:
+def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> list[Island]:
     """Return the islands of a mechanism under its inputs, coupled by possible contacts or apart from them."""
     count, bodies = len(tables.state), len(tables.parents)
     width = bodies + len(tables.lumps)
@@ -83,13 +83,13 @@ def find_islands(tables: Tables, control: Control, touching: bool = True) -> lis
     return found
 
 
-def wiring(tables: Tables, control: Control) -> bytes:
+def wiring(tables: Tables, control: InputTable) -> bytes:
     """Return the wiring that islands and memory follow from, besides sizes: fingers wired alike differ in numbers."""
     wires = (control.loop, control.channel, _reads(control))
     return b"".join([indices(tables), *(each.tobytes() for each in wires)])
 
 
-def _reads(control: Control) -> NDArray[np.bool_]:
+def _reads(control: InputTable) -> NDArray[np.bool_]:
     """Return a mask of the coordinates that every planned tension depends on, shape (T, N)."""
     return np.asarray((control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0)))
 
@@ -135,7 +135,7 @@ def _groups(tables: Tables, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64],
     return present, np.column_stack([ends[:-1], ends[1:], tables.groups[present, 2:]])
 
 
-def select_control(control: Control, island: Island) -> Control:
+def select_control(control: InputTable, island: Island) -> InputTable:
     """Return the inputs of an island."""
     part = Subset()
     part.keep("coordinate", island.coordinates, len(control.gain))

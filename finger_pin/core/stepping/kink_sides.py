@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import SIDE, SPEED
-from finger_pin.core.jit import call_at, compiled, compiled_within, copy
+from finger_pin.core.jit import call_at, copy, njit_always_inline, njit_inline
 from finger_pin.core.stepping.error_norm import step_error
 from finger_pin.core.stepping.interpolation import between, cut
 from finger_pin.core.tables import END, FIRST, KINK
@@ -22,7 +22,7 @@ _SHARE = 0.25
 _BEHIND, _WANTED, _TRIALS = 0.02, 0.5, 6
 
 
-@compiled
+@njit_inline
 def release(tables: Any, rows: Any) -> None:
     """Let all rows follow the motion."""
     for g in range(tables.groups.shape[0]):
@@ -31,18 +31,19 @@ def release(tables: Any, rows: Any) -> None:
                 rows[SIDE, k] = 0.0
 
 
-@compiled_within
-def hold(tables: Any, rows: Any, kinks: Any) -> None:
-    """Hold all rows on the present side of their kink."""
+@njit_always_inline
+def hold(tables: Any, rows: Any, kinks: Any, given: bool) -> None:
+    """Hold all rows on the present side of their kink, or on that which the signs of ``kinks`` tell."""
     for g in range(tables.groups.shape[0]):
         column = tables.groups[g, KINK]
         if column >= 0:
             for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                kinks[k] = rows[column, k]
-                rows[SIDE, k] = np.sign(rows[column, k])
+                if not given:
+                    kinks[k] = rows[column, k]
+                rows[SIDE, k] = np.sign(kinks[k])
 
 
-@compiled
+@njit_inline
 def leaving(tables: Any, rows: Any, kinks: Any) -> Any:
     """Return the least share of the way to here after which a held row leaves its side; above 1 if none has so far.
 
@@ -59,13 +60,13 @@ def leaving(tables: Any, rows: Any, kinks: Any) -> Any:
     return share
 
 
-@compiled
+@njit_inline
 def strayed(tables: Any, rows: Any, kinks: Any) -> Any:
     """Return the least share of the step after which a held row has left its side; 1 if none has."""
     return min(1.0, leaving(tables, rows, kinks))
 
 
-@compiled
+@njit_inline
 def turn(tables: Any, rows: Any, kinks: Any) -> None:
     """Turn the held rows that have left their side."""
     for g in range(tables.groups.shape[0]):
@@ -76,7 +77,7 @@ def turn(tables: Any, rows: Any, kinks: Any) -> None:
                     rows[SIDE, k] = -rows[SIDE, k]
 
 
-@compiled
+@njit_inline
 def price(integration: Any, model: Any, time: float, h: float) -> Any:
     """Return the error made by rows that are held on a side that they have left, as a multiple of the tolerance."""
     tables, rows, kinks, size = model.tables, model.work.rows, integration.kinks, integration.x.size
@@ -92,7 +93,7 @@ def price(integration: Any, model: Any, time: float, h: float) -> Any:
     return step_error(integration.x, model.state, r, integration.rtol, integration.atol)
 
 
-@compiled_within
+@njit_always_inline
 def past_kink(h: float, share: float, cost: float, rtol: float, tableau: Any) -> Any:
     """Return the greatest length of the step after a kink, s.
 
@@ -107,7 +108,7 @@ def past_kink(h: float, share: float, cost: float, rtol: float, tableau: Any) ->
     return h * radians * np.sqrt((1.0 - share) / max(rtol * cost, 1e-300))
 
 
-@compiled_within
+@njit_always_inline
 def passed(integration: Any, model: Any, time: float, h: float) -> Any:
     """Return the share of a step after which a row has left its side in the middle, if that costs too much; else 1.
 
@@ -125,7 +126,7 @@ def passed(integration: Any, model: Any, time: float, h: float) -> Any:
     return share if share == 1.0 else 0.5 * share
 
 
-@compiled_within
+@njit_always_inline
 def crossing(integration: Any, model: Any, time: float, h: float, share: float, cost: float) -> Any:
     """Let a step end a little behind the first row's leaving its side, at the interpolant's state.
 

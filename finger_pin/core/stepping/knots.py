@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.jit import Indices, Kind, Unit, Vector, bound_at, call_at
+from finger_pin.core.jit import CompiledFunction, Indices, StructType, Vector, call_at, unpack
 from finger_pin.core.stepping.rosenbrock import DONE, FULL, INTEGRATION, STRETCH, TIME
 
 # Times it, a positive number becomes the one before it.
@@ -29,18 +29,18 @@ class Knotted(NamedTuple):
     given: int
 
 
-KNOTTED = Kind(Knotted)
+KNOTTED = StructType(Knotted)
 
 
-@Unit
+@CompiledFunction
 def advance_knotted(address: int, end: float) -> int:
     """Advance as `adaptive.advance` does, by steps that end at knots.
 
     At a knot itself the value after a jump counts: a step that ends there must not see it, and ends just before.
     """
-    knotted = bound_at(address, KNOTTED)
-    knots, passed, stretch = knotted.knots, knotted.passed, bound_at(knotted.stretch, STRETCH)
-    memory = bound_at(stretch.integration, INTEGRATION).memory
+    knotted = unpack(address, KNOTTED)
+    knots, passed, stretch = knotted.knots, knotted.passed, unpack(knotted.stretch, STRETCH)
+    memory = unpack(stretch.integration, INTEGRATION).memory
     while True:
         while passed[0] < knots.size and knots[passed[0]] <= memory[TIME]:
             passed[0] += 1

@@ -8,7 +8,16 @@ from finger_pin.core.collision.broad_phase import let_sleep, rouse, wake_since
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.inputs import inputs
 from finger_pin.core.evaluation.signals import book, book_moved, exert_alone
-from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call_at, compiled, compiled_within
+from finger_pin.core.jit import (
+    CompiledFunction,
+    Matrix,
+    StructType,
+    Vector,
+    call_at,
+    njit_always_inline,
+    njit_inline,
+    unpack,
+)
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.interpolation import Between, step_at, within
 
@@ -29,16 +38,16 @@ class Powers(NamedTuple):
     powers: Matrix
 
 
-POWERS = Kind(Powers)
+POWERS = StructType(Powers)
 
 
-@compiled
+@njit_inline
 def _attitude(b: Any, step: int) -> Any:
     """Return the quaternions from which angles count in a step."""
     return b.attitude if step == 0 else b.attitudes[step - 1]
 
 
-@compiled_within
+@njit_always_inline
 def _keep(tables: Any, work: Any, state: Any, booked: Any, out: Any) -> None:
     """Fill the powers of the rows, which are booked last, and that of the forces at the tips."""
     count, width = out.size - 1, work.torque.size
@@ -50,11 +59,11 @@ def _keep(tables: Any, work: Any, state: Any, booked: Any, out: Any) -> None:
             out[count] += work.external[j] * state[width + j]
 
 
-@Unit
+@CompiledFunction
 def power_many(address: int, _time: float) -> int:
     """Fill the `Powers` at an address."""
-    asked = bound_at(address, POWERS)
-    b, model = asked.between, bound_at(asked.model, MODEL)
+    asked = unpack(address, POWERS)
+    b, model = asked.between, unpack(asked.model, MODEL)
     tables, work, state = model.tables, model.work, model.state
     width, step, last = work.torque.size, -1, -1
     moving = model.base_power != 0 or work.guide.size > 0

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import RATE, SIDE, SPEED, STATE
-from finger_pin.core.jit import call_value, compiled, compiled_within
+from finger_pin.core.jit import call_value, njit_always_inline, njit_inline
 from finger_pin.core.tables import END, FIRST, KINK
 
 # A step is taken as a whole if what is misled in it is so much of the tolerance at most. One that is cut ends a little
@@ -28,7 +28,7 @@ _LOOKS, _TRIALS = 8, 8
 _BEYOND, _BENT, _SLOW = 2.0, 0.1, 1e-9
 
 
-@compiled
+@njit_inline
 def before_reversal(integration: Any, model: Any, h: float) -> Any:
     """Return the share of a step that is taken: all of it, or to a little behind the first reversal of sliding.
 
@@ -52,7 +52,7 @@ def before_reversal(integration: Any, model: Any, h: float) -> Any:
     return share
 
 
-@compiled_within
+@njit_always_inline
 def _misled(integration: Any, model: Any, h: float, share: float) -> Any:
     """Return the error of bristles misled in a share of a step, in tolerances, and the share at which that begins."""
     tables, rows, off, total, first = model.tables, model.work.rows, integration.end, 0.0, 1.0
@@ -73,7 +73,7 @@ def _misled(integration: Any, model: Any, h: float, share: float) -> Any:
     return np.sqrt(total / size), first
 
 
-@compiled_within
+@njit_always_inline
 def _way_back(integration: Any, model: Any, k: int, share: float) -> Any:
     """Return the mean speed of a row against its side in a share of a step, the fastest, and the share at its begin."""
     tables, dense, side = model.tables, integration.dense, model.work.rows[SIDE, k]
@@ -102,7 +102,7 @@ def _way_back(integration: Any, model: Any, k: int, share: float) -> Any:
     return way / _LOOKS, side * fastest, turned
 
 
-@compiled_within
+@njit_always_inline
 def _more(tables: Any, rows: Any, g: int, k: int, speed: float) -> Any:
     """Return the rate of a row's state at a speed, held on the other side, less that on this side."""
     side, own, more = rows[SIDE, k], rows[SPEED, k], 0.0
@@ -115,7 +115,7 @@ def _more(tables: Any, rows: Any, g: int, k: int, speed: float) -> Any:
     return more
 
 
-@compiled_within
+@njit_always_inline
 def overloaded(integration: Any, model: Any) -> Any:
     """Return whether bristles have bent further in a step although they were bent far beyond what they can bear.
 
@@ -133,7 +133,7 @@ def overloaded(integration: Any, model: Any) -> Any:
     return False
 
 
-@compiled
+@njit_inline
 def _burden(model: Any, g: int, k: int, way: float) -> Any:
     """Return by how much a row's bristles are bent, of what they can bear at its speed, if it slides on that way."""
     rows, parameters, law = model.work.rows, model.tables.parameters, model.tables.laws[g, 0]

@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.core.collision.broad_phase import depart
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Vector, call_at, compiled_within
+from finger_pin.core.jit import Indices, Layers, Matrix, StructType, Vector, call_at, njit_always_inline
 from finger_pin.core.stepping.kink_sides import hold, release, strayed
 from finger_pin.core.stepping.tableaus import Tableau
 
@@ -20,7 +20,9 @@ HELD_STEP, GOAL, WINDOW_START, WINDOW_END, DRIFT, OBJECT_DRIFT, BEHIND = range(1
 FRESH, JUMPED, WHOLE, AFTER = range(17, 21)
 # What has come of the try; the share of it that is taken, that to try next, or 1, that after which a row has left its
 # side, and that at which bodies touch and part again.
-OUTCOME, PART, KEPT, SHARE, TOUCH, MEMORY_SIZE = range(21, 27)
+OUTCOME, PART, KEPT, SHARE, TOUCH = range(21, 26)
+# Whether the branches of kinks are given instead of those where the step starts.
+FROZEN, MEMORY_SIZE = range(26, 28)
 DONE, FULL, UNDERFLOW, NOT_FINITE, CREEPING, RUNAWAY = range(6)
 
 # So many tries in a row must advance by so much time each on average, s: a second at that pace would take hours.
@@ -49,7 +51,7 @@ class Integration(NamedTuple):
         end: Scratch, shape (size,).
         dense: Coefficients of a step's interpolant, shape (rows of the tableau's dense, size).
         drift: Estimate of the error so far, shape (size,).
-        kinks: Where each row was between the sides of its kink when the step began, shape (K,).
+        kinks: Where each row was between the sides of its kink when the step began, or a sign, shape (K,).
         joints: Coordinates whose error is estimated; without any nothing is, which saves a tenth.
         objects: Those of free objects, likewise.
         cut: Address of the unit that cuts a step that was tried.
@@ -87,6 +89,8 @@ class Stretch(NamedTuple):
         states: States there, with the angles of free bodies since the step's start, shape (m, size).
         attitudes: Quaternions of the free bodies there, shape (m, f, 4).
         dense: Interpolants of the steps, shape (m, rows of the tableau's dense, size).
+        shares: Of the length that was tried the share that was taken, shape (m,).
+        branches: Where each row was between the sides of its kink at the start of each step, shape (m, K).
         taken: Number of steps recorded so far, and that at which to stop, shape (2,).
     """
 
@@ -95,13 +99,15 @@ class Stretch(NamedTuple):
     states: Matrix
     attitudes: Layers
     dense: Layers
+    shares: Vector
+    branches: Matrix
     taken: Indices
 
 
-INTEGRATION, STRETCH = Kind(Integration), Kind(Stretch)
+INTEGRATION, STRETCH = StructType(Integration), StructType(Stretch)
 
 
-@compiled_within
+@njit_always_inline
 def try_step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> int:
     """Try one step: fill the increments k and, in model.state, the state at its end.
 
@@ -115,7 +121,7 @@ def try_step(integration: Any, model: Any, time: float, h: float, fresh: bool) -
     size, state, rate = x.size, model.state, model.rate
     tables, rows, kinks = model.tables, model.work.rows, integration.kinks
     g = 1.0 / (h * tableau.gamma)
-    outcome = TRIED
+    outcome, frozen = TRIED, integration.memory[FROZEN] > 0.0
     for i in range(tableau.nodes.size):
         for c in range(size):
             r[c], rate[c], state[c] = 0.0, start[c], x[c]
@@ -127,6 +133,8 @@ def try_step(integration: Any, model: Any, time: float, h: float, fresh: bool) -
                 r[c] += of_coupling * k[j, c]
         if i == 0 and fresh:
             release(tables, rows)
+            if frozen:
+                hold(tables, rows, kinks, frozen)
         # For a second try too: what pins and tips feel there is read from the memory of the evaluation.
         if i > 0 or fresh or tables.loaded or tables.touching > 0:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
@@ -136,7 +144,8 @@ def try_step(integration: Any, model: Any, time: float, h: float, fresh: bool) -
                     start[c] = rate[c]
                     if not np.isfinite(rate[c]):
                         return SENSELESS
-                hold(tables, rows, kinks)
+                if not frozen:
+                    hold(tables, rows, kinks, frozen)
                 if tables.touching:
                     depart(tables, model.work.paths)
                 call_at(model.linearise, integration.model, time)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.collision.continuous import survey
-from finger_pin.core.jit import Unit, bound_at, call_at, compiled_within
+from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.interpolation import cut, interpolant
@@ -18,11 +18,11 @@ from finger_pin.core.stepping.reversals import before_reversal, overloaded
 _SHORTEST, _LONGEST, _SHORTENED = 0.1, 0.9, 0.25
 
 
-@Unit
+@CompiledFunction
 def cut_step(address: int, h: float) -> int:
     """Cut a step that an `Integration` at an address has tried; fill its interpolant and the share that is taken."""
-    integration = bound_at(address, at.INTEGRATION)
-    model, memory = bound_at(integration.model, MODEL), integration.memory
+    integration = unpack(address, at.INTEGRATION)
+    model, memory = unpack(integration.model, MODEL), integration.memory
     interpolant(integration.tableau, integration.k, integration.dense)
     part, kept, share = _kept_at_kinks(integration, model, h, int(memory[at.OUTCOME]))
     if kept == 1.0:
@@ -36,15 +36,15 @@ def cut_step(address: int, h: float) -> int:
     return 1
 
 
-@Unit
+@CompiledFunction
 def survey_step(address: int, _h: float) -> int:
     """Look for touches that no stage has seen in a step that an `Integration` at an address has tried."""
-    integration = bound_at(address, at.INTEGRATION)
-    integration.memory[at.TOUCH] = survey(integration, bound_at(integration.model, MODEL))
+    integration = unpack(address, at.INTEGRATION)
+    integration.memory[at.TOUCH] = survey(integration, unpack(integration.model, MODEL))
     return 1
 
 
-@compiled_within
+@njit_always_inline
 def _kept_at_kinks(integration: Any, model: Any, h: float, outcome: int) -> Any:
     """Return the share of a step that is taken, that of another try, and the share after which a row strays.
 
@@ -74,7 +74,7 @@ def _kept_at_kinks(integration: Any, model: Any, h: float, outcome: int) -> Any:
     return part, min(_LONGEST, max(_SHORTEST, 1.02 * share)) if dear and long else 1.0, share
 
 
-@compiled_within
+@njit_always_inline
 def _part_before_reversal(integration: Any, model: Any, h: float) -> Any:
     """Let a step end a little behind the first reversal of sliding; return the share that is taken, 1 without one."""
     memory, part = integration.memory, before_reversal(integration, model, h)

@@ -10,19 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.collision.broad_phase import wake_all
-from finger_pin.core.control import HELD, Control
 from finger_pin.core.evaluation.attitude_charts import Charts
+from finger_pin.core.inputs import HELD, InputTable
 from finger_pin.core.jit import alike, copied, fits, numbered, taken
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
 from finger_pin.core.stepping.islands import Island, find_islands, groups_of, select, select_control, wiring
+from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables
 from finger_pin.core.threads import in_threads
-from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
+from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.typing import Array
 
 #: Of every island: whether it minds forces at tips, its loops of motors, its knots, and arrays that steps change.
 Moments = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
@@ -30,7 +31,6 @@ Moments = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
 
 # Of mechanisms that are wired alike.
-_ISLANDS: Remembered[list[Island]] = Remembered()
 
 # As often the error that is carried along counts.
 _TWICE = 2.0
@@ -48,7 +48,7 @@ class Stepper:
     def __init__(
         self,
         mechanism: Mechanism,
-        control: Control,
+        control: InputTable,
         x: Array,
         tableau: Tableau,
         rtol: float,
@@ -89,7 +89,7 @@ class Stepper:
     def renew(
         self,
         mechanism: Mechanism,
-        control: Control,
+        control: InputTable,
         x: Array,
         tableau: Tableau,
         rtol: float,
@@ -121,7 +121,7 @@ class Stepper:
         """Return the tables of every island."""
         return [tables] if len(self._islands) == 1 else [select(tables, island) for island in self._islands]
 
-    def _selected_inputs(self, control: Control) -> list[Control]:
+    def _selected_inputs(self, control: InputTable) -> list[InputTable]:
         """Return the inputs of every island."""
         alone = len(self._islands) == 1
         return [control] if alone else [select_control(control, island) for island in self._islands]
@@ -131,7 +131,7 @@ class Stepper:
         """The places of the numbers of every island's tables in those of the whole."""
         return self._selected(numbered(build_tables(self.mechanism)))
 
-    def _begun(self) -> Iterator[tuple[Tables, Control, Array, Array, Array]]:
+    def _begun(self) -> Iterator[tuple[Tables, InputTable, Array, Array, Array]]:
         """Yield of every island its tables, inputs, state, quaternions and absolute tolerances at the start."""
         mechanism, _, x, _, _, atol, force, _ = self._made_of
         forces = np.zeros((len(mechanism.body.tips), 3))
@@ -158,6 +158,11 @@ class Stepper:
     def driven(self) -> bool:
         """Whether loops of motors run."""
         return any(part.drives is not None for part in self.parts)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it takes given steps."""
+        return any(part.steps is not None for part in self.parts)
 
     @property
     def held(self) -> bool:
@@ -224,10 +229,13 @@ class Stepper:
         for part in self.parts:
             part.knots = np.array(knots, dtype=float)
 
-    def repeat(self, ends: Sequence[Array]) -> None:
-        """Take steps with given ends from now on, s, for each island, whatever their errors."""
-        for index, (part, own) in enumerate(zip(self.parts, ends, strict=True)):
-            self.parts[index] = part.repeating(own[own > part.time])
+    def repeat(self, steps: Sequence[Steps]) -> None:
+        """Take given steps from now on in each island, whatever their errors."""
+        if len(steps) != len(self.parts):
+            # Parameters that join what moved apart, or part it, leave the steps of all to each.
+            steps = [Steps.whole(np.unique(np.concatenate([each.ends for each in steps])))] * len(self.parts)
+        for part, own in zip(self.parts, steps, strict=True):
+            part.repeat(own)
 
     def hold(self, inputs: Array) -> None:
         """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""
@@ -292,7 +300,12 @@ class Stepper:
         return failure(part, status, [names[at] for at in self.places(part.island)])
 
 
-def _islands(wires: bytes, tables: Tables, control: Control) -> list[Island]:
-    """Return the islands of a mechanism under its inputs, found anew only for another wiring."""
+def _wires(wires: bytes, tables: Tables, control: InputTable) -> tuple[object, ...]:
     arrays = tables.parents, tables.lumps, tables.state, control.tension, control.minimum
-    return _ISLANDS.of((wires, control.kind, *map(len, arrays)), partial(find_islands, tables, control))
+    return (wires, control.kind, *map(len, arrays))
+
+
+@memoised(_wires)
+def _islands(wires: bytes, tables: Tables, control: InputTable) -> list[Island]:
+    """Return the islands of a mechanism under its inputs, found anew only for another wiring."""
+    return find_islands(tables, control)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finger_pin.core.jit import Matrix, Vector
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 
 class Tableau(NamedTuple):

@@ -24,8 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.mechanism.gaps.gap import Gap
-from finger_pin.mechanism.gaps.nearest import ALONG, DISC, EPSILON, INSIDE, RADIUS, lowered, nearest
+from finger_pin.mechanism.gaps.nearest import ALONG, DISC, EPSILON, INSIDE, RADIUS, SignedDistance, lowered, nearest
 from finger_pin.mechanism.gaps.prism import NUMBERS, RIM, ROUNDING, deepest, offset, surface
 
 # Tangents are turned from those of one direction, (2, 3, 6) / 7, to those of the normal, the short way. They jump only
@@ -261,4 +260,6 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
 
 
 #: The gap between a part of a body and a rounded prism; sizes of the latter from `prism_parameters`.
-PRISM = Gap(name="rounded prism", parameters=("radius", "disc", "along", *NUMBERS), value=_value, slopes=_slopes)
+PRISM = SignedDistance(
+    name="rounded prism", parameters=("radius", "disc", "along", *NUMBERS), value=_value, slopes=_slopes
+)

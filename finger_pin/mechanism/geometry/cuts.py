@@ -15,8 +15,8 @@ from enum import Enum
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
+from finger_pin.typing import Array
 
 
 class Groove(Enum):

@@ -9,15 +9,14 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.hand import HandSettings
-from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.urdf import build_rigid_body, to_urdf
-from finger_pin.mechanism.geometry.foreign import chain, placed_solids, turned_model, width_of
+from finger_pin.mechanism.from_pinocchio import chain, placed_solids, turned_model, width_of
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes, tendon_lanes
 from finger_pin.mechanism.geometry.winding import BASE_LEAD, Arc, WoundSpan, wind
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.shapes import MATERIALS
+from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
 
 
 @dataclass(frozen=True)

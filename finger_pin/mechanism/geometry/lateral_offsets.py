@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import FingerDescription
+from finger_pin.typing import Array
 
 #: Part of the narrowest link that the lanes may take up, and most that one lane may take.
 _ALL_LANES, _ONE_LANE = 0.4, 0.13

@@ -9,15 +9,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import FingerDescription
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.urdf import build_rigid_body
+from finger_pin.mechanism.from_pinocchio import turned_model
 from finger_pin.mechanism.geometry.cuts import Cut, Groove, cuts
 from finger_pin.mechanism.geometry.fingers import fingers_of_links, fingers_on_model, palm_of
-from finger_pin.mechanism.geometry.foreign import turned_model
 from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
 from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.urdf import build_rigid_body
+from finger_pin.typing import Array
 
 #: Drawn sag of a loose span in parts of its length, and lift of a loose arc off its pulley in parts of its radius.
 SAG, LIFT = 0.12, 0.15

@@ -9,18 +9,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.meshes import Mesh
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
 from finger_pin.description.tree_parts import TreeSolid
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes, joint_axes
 from finger_pin.mechanism.geometry.paths import LinkPoses, TendonPath
-from finger_pin.mechanism.pieces import Leg, Piece
-from finger_pin.mechanism.routes import rotation
+from finger_pin.mechanism.path_elements import PathElement, PathTerm
 from finger_pin.mechanism.shapes import MATERIALS
 from finger_pin.mechanism.spans import CYLINDER, STRAIGHT
+from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.mechanism.tree import build_tree
+from finger_pin.typing import Array
 
 # Points of a stretch that may wrap.
 _POINTS = 12
@@ -109,12 +109,12 @@ class TreeGeometry:
         return tuple(paths)
 
 
-def _path(legs: tuple[Leg, ...], rotations: Array, places: Array) -> Array:
+def _path(legs: tuple[PathTerm, ...], rotations: Array, places: Array) -> Array:
     """Return the points of a path at one posture, shape (P, 3)."""
     return np.concatenate([_stretch(leg.piece, rotations, places) for leg in legs])
 
 
-def _stretch(piece: Piece, rotations: Array, places: Array) -> Array:
+def _stretch(piece: PathElement, rotations: Array, places: Array) -> Array:
     first, second, *side = (rotations[end.joint] @ end.point + places[end.joint] for end in piece.ends)
     if piece.shape is STRAIGHT:
         return np.array([first, second])
@@ -131,7 +131,7 @@ def _stretch(piece: Piece, rotations: Array, places: Array) -> Array:
     return np.asarray(np.concatenate([[a], arc, [b]]) @ turned.T + origin)
 
 
-def _touch(piece: Piece, point: Array, direction: Array) -> Array:
+def _touch(piece: PathElement, point: Array, direction: Array) -> Array:
     """Return the meeting point of the straight part from a point with the wrap."""
     flat = np.array([1.0, 1.0, 0.0]) if piece.shape is CYLINDER else np.ones(3)
     a, d = point * flat, direction * flat
@@ -140,7 +140,7 @@ def _touch(piece: Piece, point: Array, direction: Array) -> Array:
     return np.asarray(point + (-half - math.sqrt(spread)) / square * direction)
 
 
-def _arc(piece: Piece, start: Array, end: Array, direction: Array, turn: float) -> Array:
+def _arc(piece: PathElement, start: Array, end: Array, direction: Array, turn: float) -> Array:
     """Return points between two points of a wrap, about the axis that the path turns about."""
     flat = np.array([1.0, 1.0, 0.0]) if piece.shape is CYLINDER else np.ones(3)
     share = np.linspace(0.0, 1.0, _POINTS - 2)

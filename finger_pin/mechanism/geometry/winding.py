@@ -17,9 +17,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.finger import FingerDescription
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes
+from finger_pin.typing import Array
 
 #: Least wrap over the range of a joint, rad: of a path that passes, and of one that ends there.
 PASSING_WRAP, ENDING_WRAP = 0.05, 0.35

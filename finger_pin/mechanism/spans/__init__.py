@@ -2,11 +2,10 @@
 
 from finger_pin.mechanism.spans.cylinder import CYLINDER
 from finger_pin.mechanism.spans.polynomial import ANGLE, RISE
-from finger_pin.mechanism.spans.span import Span
+from finger_pin.mechanism.spans.span import STRAIGHT, WrapSegment
 from finger_pin.mechanism.spans.sphere import SPHERE
-from finger_pin.mechanism.spans.straight import STRAIGHT
 
 #: All kinds.
 SPANS = (STRAIGHT, CYLINDER, SPHERE, ANGLE, RISE)
 
-__all__ = ["ANGLE", "CYLINDER", "RISE", "SPANS", "SPHERE", "STRAIGHT", "Span"]
+__all__ = ["ANGLE", "CYLINDER", "RISE", "SPANS", "SPHERE", "STRAIGHT", "WrapSegment"]

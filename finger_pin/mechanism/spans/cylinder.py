@@ -9,9 +9,8 @@ import math
 from typing import Any
 
 from finger_pin.mechanism.spans.circle import FREE, INSIDE, path, way_of_path
-from finger_pin.mechanism.spans.plane import curvatures, directions, gradient
-from finger_pin.mechanism.spans.span import WRAP, Span, side_point
-from finger_pin.mechanism.spans.straight import straight_slopes, straight_value
+from finger_pin.mechanism.spans.span import WRAP, WrapSegment, side_point, straight_slopes, straight_value
+from finger_pin.mechanism.spans.sphere import curvatures, directions, gradient
 
 
 def _plane(y: Any, p: Any) -> Any:
@@ -82,4 +81,4 @@ def cylinder_slopes(y: Any, p: Any, out: Any) -> None:
 
 
 #: About the z axis.
-CYLINDER = Span("cylinder", WRAP, cylinder_value, cylinder_slopes)
+CYLINDER = WrapSegment("cylinder", WRAP, cylinder_value, cylinder_slopes)

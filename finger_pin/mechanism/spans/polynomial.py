@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from finger_pin.description.tree_parts import MOST_POWER
-from finger_pin.mechanism.spans.span import Span
+from finger_pin.mechanism.spans.span import WrapSegment
 
 _PARAMETERS = tuple(f"power_{k}" for k in range(MOST_POWER + 1))
 
@@ -72,6 +72,6 @@ def rise_slopes(y: Any, p: Any, out: Any) -> None:
 
 
 #: Of the angle by which a point has turned about the z axis, from -pi to pi.
-ANGLE = Span("polynomial of an angle", _PARAMETERS, angle_value, angle_slopes)
+ANGLE = WrapSegment("polynomial of an angle", _PARAMETERS, angle_value, angle_slopes)
 #: Of the distance of two points along the z axis.
-RISE = Span("polynomial of a rise", _PARAMETERS, rise_value, rise_slopes)
+RISE = WrapSegment("polynomial of a rise", _PARAMETERS, rise_value, rise_slopes)

@@ -2,13 +2,9 @@ from .comparing import compare as compare
 from .contact import plot_contact as plot_contact
 from .convergence import plot_convergence as plot_convergence
 from .energy import plot_energy as plot_energy
-from .experiments.friction_influence import plot_friction_influence as plot_friction_influence
-from .experiments.passive_delivery import plot_passive_delivery as plot_passive_delivery
-from .experiments.transmission import plot_transmission as plot_transmission
 from .fig6 import plot_fig6 as plot_fig6
 from .force_capability import plot_force_polytope as plot_force_polytope
 from .force_capability import plot_radius_sensitivity as plot_radius_sensitivity
-from .friction_law import plot_friction_law as plot_friction_law
 from .hand_motion import plot_hand_motion as plot_hand_motion
 from .identification import plot_identification as plot_identification
 from .identification import plot_profiles as plot_profiles
@@ -21,4 +17,3 @@ from .self_locking import plot_runaway as plot_runaway
 from .self_locking import plot_self_locking_map as plot_self_locking_map
 from .servo import plot_servo as plot_servo
 from .sweep import plot_sweep as plot_sweep
-from .workspace import plot_workspace as plot_workspace

@@ -7,7 +7,7 @@ from matplotlib.figure import SubFigure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 AXES = "xyz"
 # Least extent of a side, in parts of the largest, so that flat things have a box.

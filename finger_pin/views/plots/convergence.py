@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series
 from finger_pin.views.plots.panels import legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import GREY, Width, colour, limit_line, styled

@@ -9,9 +9,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
+from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import entries
+from finger_pin.typing import Array
 from finger_pin.views.plots.lines import shade, trace
 from finger_pin.views.plots.panels import labelled, legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import (

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from finger_pin.analysis import Friction, force_polytope, largest_force, tension_for_force
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
 from finger_pin.views.plots.axes_3d import AXES, space
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.panels import sheet, title

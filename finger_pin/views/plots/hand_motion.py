@@ -5,8 +5,8 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.tree import STATEFUL, STATELESS
+from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, trace
 from finger_pin.views.plots.panels import sheet, stack, title
 from finger_pin.views.plots.style import Width, styled

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
 from finger_pin.views.plots.lines import bundle, names
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import Width

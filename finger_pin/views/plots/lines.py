@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 from finger_pin.views.plots.style import DASHES, colour, cycle_colours
 
 #: Bins of a decimated line, two points each: more than a panel has columns of pixels.

@@ -6,7 +6,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
 from finger_pin.views.plots.panels import cut_spikes, flatten_rounding, labelled, legend, sheet, stack, title

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 from finger_pin.views.plots.style import Width, fit, inches, new_figure, power_of_ten, settings
 
 # Parts are drawn at this share of their own width before they go below each other.

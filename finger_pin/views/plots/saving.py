@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.description.embedded import described
+from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.views.plots.contact import plot_contact
@@ -30,7 +30,7 @@ FIGURES_OF_TREES = {"motion": plot_hand_motion, "energy": plot_energy}
 def figures_of(result: xr.Dataset) -> dict[str, Callable[..., Figure]]:
     """Return the figures that are drawn of a result, by name."""
     figures: dict[str, Callable[..., Figure]] = dict(
-        FIGURES if described(result.attrs).finger.tree is None else FIGURES_OF_TREES
+        FIGURES if read_scene(result.attrs).finger.tree is None else FIGURES_OF_TREES
     )
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence

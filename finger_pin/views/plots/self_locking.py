@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.analysis import SelfLockingMap, critical_friction
-from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger_like import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.typing import Array
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.panels import grid, heading, legend, plain, sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin

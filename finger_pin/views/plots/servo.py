@@ -9,8 +9,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.description.embedded import described
-from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, shade, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
@@ -44,7 +44,7 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     """
     if "motor" not in result.dims:
         raise InputError("result", "is of a finger without servos")
-    finger = described(result.attrs).finger
+    finger = read_scene(result.attrs).finger
     actuators = finger.actuators
     tendons = [name for actuator in actuators.values() for name in actuator.tendons]
     height = max(6.6, 1.7 * len(tendons))

@@ -14,7 +14,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 from finger_pin.views.plots.panels import grid, plain, sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled
 

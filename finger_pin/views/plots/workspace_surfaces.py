@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
 
 _PARALLEL = 1e-6
 

@@ -1,7 +1,7 @@
 """The finger in a browser: meshcat with tendons along their paths, coloured by tension.
 
-The page is meshcat's own viewer with a player beside it. It is the same page as a file (`write_animation`), served
-while a result is viewed (`view`), and during a simulation (`LiveView`). Meshcat's server is not used: it
+The page is meshcat's own viewer with a player beside it. It is the same page as a file (`write_animation`) and served
+while a result is viewed (`view`). Meshcat's server is not used: it
 listens on every network interface, while this one is bound to the loopback address. `draw` puts the
 finger into meshcat's own window.
 """
@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from finger_pin.views.viewer.animation import write_animation
 from finger_pin.views.viewer.drawing import draw
-from finger_pin.views.viewer.viewing import LiveView, Viewing, view, view_forces
+from finger_pin.views.viewer.viewing import PageHandle, view, view_forces
 
 if TYPE_CHECKING:
     from finger_pin.views.viewer.video import write_video
 
-__all__ = ["LiveView", "Viewing", "draw", "view", "view_forces", "write_animation", "write_video"]
+__all__ = ["PageHandle", "draw", "view", "view_forces", "write_animation", "write_video"]
 
 
 def __getattr__(name: str) -> Any:

@@ -12,13 +12,13 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.description.embedded import described
-from finger_pin.description.routing import Array
+from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_text
+from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.typing import Array
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
 from finger_pin.views.viewer.scene_objects import SceneObjects
@@ -72,7 +72,7 @@ def animation_page(
     seen = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
     beside = Playback.of(ghost).ghost(motion.time) if ghost is not None else None
     header = motion.scene.header(
-        motion.title, motion.position[every], motion.largest, live=False, forces=forces, ghost=beside, palm=seen
+        motion.title, motion.position[every], motion.largest, forces=forces, ghost=beside, palm=seen
     )
     chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
     if beside is not None:
@@ -96,7 +96,7 @@ def posture_page(finger: FingerLike, forces: ForcePolytope, strands: ArrayLike |
     tension = np.zeros((1, len(scene.strands))) if strands is None else np.asarray(strands, dtype=float)[None]
     position = forces.position[None]
     title = description.title or description.name
-    header = scene.header(title, position, float(tension.max()), live=False, forces=forces)
+    header = scene.header(title, position, float(tension.max()), forces=forces)
     return render({**header, "chunks": [scene.chunk([0.0], position, tension)]})
 
 
@@ -145,7 +145,7 @@ class Playback:
         Raises:
             InputError: If the result lacks something that is shown.
         """
-        scene = Scene(finger or described(result.attrs).finger)
+        scene = Scene(finger or read_scene(result.attrs).finger)
         time = _variable(result, "time")
         if len(time) == 0:
             raise InputError("result.time", "must have at least one sample")

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.typing import Array
 from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.scene import SLACK_TENSION, Scene, scale_above
 from finger_pin.views.viewer.solids import ROOT, Command, link_names, placed, set_object, solid_commands

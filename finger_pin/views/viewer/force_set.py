@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 from finger_pin.views.viewer.solids import ROOT, Command, newton_length, set_object
 
 _PATH = f"{ROOT}/forces"

@@ -13,10 +13,10 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.description.routing import Array
+from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, description_of
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual, joint_axes
+from finger_pin.typing import Array
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.solids import ROOT, encode, is_mesh, link_names, root_command, solid_commands
 
@@ -119,7 +119,6 @@ class Scene:
         joint_positions: ArrayLike,
         largest_tension: float,
         *,
-        live: bool,
         forces: ForcePolytope | None = None,
         ghost: Ghost | None = None,
         palm: LinkPoses | None = None,
@@ -130,7 +129,6 @@ class Scene:
             title: Shown above the legend.
             joint_positions: Postures that the camera must have in view, shape (m, n), rad.
             largest_tension: Tension that the legend must reach, N.
-            live: Whether frames will come from the server.
             forces: Drawn at the fingertip of its posture, if given.
             ghost: Another finger, drawn faintly beside this one, if given.
             palm: Poses of the palm at those positions, if it moves.
@@ -158,7 +156,6 @@ class Scene:
         drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
-            "live": live,
             "commands": [root_command(turn), *solid_commands(geometry, tube), *drawn],
             "ghost": ghost.header() if ghost is not None else None,
             "forces": shown.note if shown is not None else "",

@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 import xarray as xr
 
-from finger_pin.description.embedded import described
 from finger_pin.description.objects import Object
-from finger_pin.description.routing import Array
+from finger_pin.description.scene_metadata import read_scene
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.typing import Array
 from finger_pin.views.viewer.solids import (
     ROOT,
     SOLID_OPACITY,
@@ -73,7 +73,7 @@ class SceneObjects:
         """
         if "contact_force" not in result:
             return None
-        objects = dict(described(result.attrs).objects)
+        objects = dict(read_scene(result.attrs).objects)
         level, normal = np.asarray(result["contact_level"]), np.asarray(result["contact_normal_force"])
         steepness = np.max(np.divide(level, normal, out=np.zeros_like(level), where=normal > 1e-6), axis=0)
         frames, closed = np.searchsorted(np.asarray(result["time"]), time), np.flatnonzero(steepness > 0.0)

@@ -11,9 +11,9 @@ import coal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry import TendonGeometry, TreeGeometry
+from finger_pin.typing import Array
 
 ROOT = "/finger_pin"
 Command = dict[str, Any]

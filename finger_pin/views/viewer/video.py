@@ -23,10 +23,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.files import replacing
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.typing import Array
 from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, tension_colours

@@ -8,10 +8,10 @@ from motion import joint_position
 from pages import opened, seek
 
 import finger_pin as fp
-from finger_pin.description.embedded import embedded
-from finger_pin.description.exercise import exercise
+from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
-from finger_pin.mechanism.exchange.from_mujoco import from_mujoco
+from finger_pin.description.scene_metadata import scene_metadata
+from finger_pin.exchange.from_mujoco import from_mujoco
 from finger_pin.views.viewer import write_animation
 
 
@@ -80,12 +80,12 @@ JOINT_ALONE = """<mujoco><worldbody><body><joint name="knuckle" axis="0 1 0" ran
 
 def test_a_hand_that_no_tendon_pulls_shows_its_joints_and_no_scale_of_tensions(browser, tmp_path):
     (tmp_path / "alone.xml").write_text(JOINT_ALONE)
-    scenario = read_scenario(exercise(from_mujoco(tmp_path / "alone.xml", "alone")), {})
+    scenario = read_scenario(demo_motion(from_mujoco(tmp_path / "alone.xml", "alone")), {})
     still = {
         "joint_position": (("time", "joint"), np.zeros((2, 1))),
         "tendon_tension": (("time", "tendon"), np.zeros((2, 0))),
     }
-    result = xr.Dataset(still, {"time": [0.0, 1.0]}, embedded(scenario))
+    result = xr.Dataset(still, {"time": [0.0, 1.0]}, scene_metadata(scenario))
     page = opened(browser, write_animation(result, tmp_path / "alone.html").as_uri())
     assert page.find_element("id", "joints").text.startswith("knuckle")
     assert [each.is_displayed() for each in page.find_elements("css selector", "#legend, #tensions")] == [False, False]

@@ -11,14 +11,13 @@ class Player {
     this.time = 0;
     this.speed = 1;
     this.playing = false;
-    this.following = config.live;
     this.sharpness = 1;
     this.due = this.started = 0;
     this.build();
     for (const chunk of config.chunks) this.append(chunk);
     this.scene.frame("oblique");
     this.seek(this.frames.start);
-    if (config.live) this.listen(); else this.play();
+    this.play();
     requestAnimationFrame((now) => this.tick(now));
   }
 
@@ -33,21 +32,6 @@ class Player {
     for (const trace of this.scene.traces) trace.rebuild();
     this.element.scrub.min = this.frames.start;
     this.element.scrub.max = this.frames.end;
-  }
-
-  // A simulation in progress sends its frames; the newest is shown until somebody scrubs or pauses.
-  listen() {
-    this.element.live.hidden = false;
-    const source = new EventSource("frames");
-    source.onmessage = (message) => {
-      this.append(JSON.parse(message.data));
-      this.seek(this.following ? this.frames.end : this.time);
-    };
-    source.addEventListener("end", () => {
-      source.close();
-      this.following = false;
-      this.element.live.hidden = true;
-    });
   }
 
   tick(now) {
@@ -83,7 +67,6 @@ class Player {
   }
 
   play() {
-    this.following = false;
     if (this.time >= this.frames.end) this.seek(this.frames.start);
     this.shown = performance.now();
     this.playing = true;
@@ -91,15 +74,9 @@ class Player {
   }
 
   pause() {
-    this.following = this.playing = false;
+    this.playing = false;
     this.sharpen(1);
     this.refresh();
-  }
-
-  follow() {
-    this.pause();
-    this.following = true;
-    this.seek(this.frames.end);
   }
 
   seek(time) {
@@ -128,16 +105,15 @@ class Player {
   }
 
   refresh() {
-    const { play, scrub, clock, live } = this.element;
+    const { play, scrub, clock } = this.element;
     play.classList.toggle("playing", this.playing);
     play.setAttribute("aria-label", this.playing ? "Pause" : "Play");
     scrub.value = this.time;
     clock.textContent = `${this.time.toFixed(2)} / ${this.frames.end.toFixed(2)} s`;
-    live.classList.toggle("on", this.following);
   }
 
   build() {
-    const names = ["play", "restart", "scrub", "clock", "speed", "loop", "live", "legend", "ticks"];
+    const names = ["play", "restart", "scrub", "clock", "speed", "loop", "legend", "ticks"];
     this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
     document.getElementById("title").textContent = this.config.title;
     for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title], ["objects", this.config.objects?.note]]) {
@@ -162,16 +138,15 @@ class Player {
       Object.assign(row.insertCell(), { className: "name", textContent: name, title: name });
       return Object.assign(row.insertCell(), { className: "value" });
     });
-    const { play, restart, scrub, speed, live } = this.element;
+    const { play, restart, scrub, speed } = this.element;
     play.onclick = () => (this.playing ? this.pause() : this.play());
-    restart.onclick = () => { this.following = false; this.seek(this.frames.start); };
+    restart.onclick = () => this.seek(this.frames.start);
     scrub.oninput = () => {
       const wanted = Number(scrub.value);
       this.pause();
       this.seek(wanted);
     };
     speed.onchange = () => { this.speed = Number(speed.value); };
-    live.onclick = () => this.follow();
     for (const button of document.querySelectorAll("[data-view]")) {
       button.onclick = () => this.scene.frame(button.dataset.view);
     }

@@ -1,0 +1,141 @@
+"""Digest of all that a compiled function depends on: compiled code is kept on disk as long as it is the same.
+
+Of this package it is the text of all files that the core may import. Of a function from elsewhere, such as a law in a
+user's script, it is the code object that numba compiles, and the values that the function takes for constants: those of
+its closure, its defaults and its globals, and all functions among them. The code object is hashed as it is, and nothing
+in it is read but names: unlike the text of the file, it is what was imported, and tells two lambdas of a line apart.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+from numba.extending import is_jitted
+
+#: The core, its sibling, and the rooms below them, which are all that they may import.
+ROOMS = ("core", "description", "exchange", "laws", "mechanism", "mujoco", "references")
+_OURS = tuple(f"finger_pin.{room}" for room in ROOMS)
+# Their names tell what they have, as their versions are part of the digest.
+_KNOWN = {"builtins", "cmath", "llvmlite", "math", "numba", "numpy", "operator"}
+_PLAIN = (int, float, complex, str, bytes, bool, type(None), slice)
+
+
+class Undigestible(Exception):
+    """A thing without a lasting identity: a later process cannot recognise it."""
+
+
+def source_digest(function: FunctionType) -> str:
+    """Return a digest of a function with all that it depends on.
+
+    Raises:
+        Undigestible: If it takes for a constant what is none, or stands in no module that another process could import.
+    """
+    return _hashed(f"{_package_digest()} {_function(function, ())}")[:16]
+
+
+@cache
+def _package_digest() -> str:
+    """Return a digest of the package's files and of the versions that compile them."""
+    root = Path(__file__).parents[2]
+    found = hashlib.sha256(f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
+    for path in sorted([*root.glob("*.py"), *(each for room in ROOMS for each in (root / room).rglob("*.py"))]):
+        found.update(f"{path.relative_to(root)}\n".encode() + path.read_bytes())
+    return found.hexdigest()
+
+
+def _hashed(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _function(function: FunctionType, above: tuple[FunctionType, ...]) -> str:
+    """Return a digest of a function that others above it call."""
+    if function in above:
+        return f"calls back {above.index(function)}"
+    if function.__module__ not in sys.modules:
+        # What is kept on disk names the modules that it is of.
+        raise Undigestible(f"{function.__qualname__} stands in no module")
+    names = frozenset(_names(function.__code__))
+    text = [function.__module__, function.__qualname__, _code(function.__code__)]
+    for name, value in _values(function, names):
+        text.append(f"{name} = {_described(value, names, (*above, function))}")
+    return _hashed("\n".join(text))
+
+
+def _code(code: CodeType) -> str:
+    constants = [
+        _code(each) if isinstance(each, CodeType) else _described(each, frozenset(), ()) for each in code.co_consts
+    ]
+    signature = (code.co_argcount, code.co_flags, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
+    return _hashed(f"{code.co_code.hex()} {signature} {constants}")
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield from _names(each)
+
+
+def _values(function: FunctionType, names: frozenset[str]) -> Iterator[tuple[str, Any]]:
+    """Give the closure, the defaults and the globals of a function, but for what the package's files say."""
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
+    yield "defaults", (function.__defaults__, function.__kwdefaults__)
+    said = vars(sys.modules[function.__module__]) if _is_ours(function) else {}
+    for name in sorted(names & function.__globals__.keys()):
+        value = function.__globals__[name]
+        if name not in said or said[name] is not value:
+            yield name, value
+
+
+def _is_ours(value: Any) -> bool:
+    return (getattr(value, "__module__", None) or "").startswith(_OURS)
+
+
+def _described(value: Any, names: frozenset[str], above: tuple[FunctionType, ...]) -> str:
+    """Return a text that differs for constants that differ; of a module, for the attributes of some names."""
+
+    def described(each: Any) -> str:
+        return _described(each, names, above)
+
+    if isinstance(value, _PLAIN):
+        return repr(value)
+    if is_jitted(value):
+        dispatcher: Any = value
+        return f"{described(dispatcher.targetoptions)} {_function(dispatcher.py_func, above)}"
+    if isinstance(value, numba.types.Type):
+        # The type of a table has its layout.
+        return f"{value.name} {described(getattr(value, 'kinds', {}))}"
+    if isinstance(value, ModuleType):
+        if value.__name__.partition(".")[0] in _KNOWN:
+            return value.__name__
+        return f"{value.__name__} {described({name: vars(value)[name] for name in names & vars(value).keys()})}"
+    if isinstance(value, tuple):
+        return f"{type(value).__qualname__} {[described(each) for each in value]}"
+    if isinstance(value, dict):
+        return f"{sorted((name, described(each)) for name, each in value.items())}"
+    if isinstance(value, set | frozenset):
+        return f"{sorted(described(each) for each in value)}"
+    if isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject:
+        return f"{value.dtype.descr} {value.shape} {value.tobytes().hex()}"
+    module, name = str(getattr(value, "__module__", None)), getattr(value, "__qualname__", None)
+    if isinstance(value, np.ufunc) and any(value is each for each in vars(np).values()):
+        return f"numpy {value}"
+    if name is not None and module.partition(".")[0] in _KNOWN:
+        return f"{module}.{name}"
+    if isinstance(value, FunctionType):
+        return _function(value, above)
+    if isinstance(value, type) and issubclass(value, tuple):
+        return f"{module}.{name} {getattr(value, '_fields', '')}"
+    if name is not None and _is_ours(value):
+        return f"{module}.{name}"
+    raise Undigestible(f"{value!r} is no constant of compiled code")

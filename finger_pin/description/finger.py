@@ -1,0 +1,273 @@
+"""A finger as data, and a hand: several on a palm.
+
+Every description is frozen and validated; nothing here computes physics.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, PrivateAttr, field_validator, model_validator
+
+from finger_pin.description.actuators import Actuator, check_actuators
+from finger_pin.description.caching import memoised
+from finger_pin.description.effects import OF_FINGER, OF_HAND, refuse_idle
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
+from finger_pin.description.parameters import Joint, PassiveTendon, StrokeLimiterSettings, Tendon
+from finger_pin.description.placement import (
+    PLACE,
+    Palm,
+    actuator_of_hand,
+    joined_table,
+    rotation,
+    scaled,
+    tendon_of_hand,
+)
+from finger_pin.description.tree import Tree
+from finger_pin.description.validation import IN_RADIANS, Description, Name, check_size, problem, quantity, real, vector
+from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
+
+
+class FingerDescription(Description):
+    """A finger of links, all fingers of a hand together, or a tree of bodies. Actuated tendons come first.
+
+    Lists of numbers follow the order of the joints, of all tendons, or of the passive tendons.
+    """
+
+    file_keys = ("base",)
+
+    def __repr__(self) -> str:
+        """Return its name and size in a line; `to_toml` writes all of it."""
+        return f"<{type(self).__name__} {self.name}: {len(self.joints)} joints, {len(self.tendons)} tendons>"
+
+    __str__ = __repr__
+
+    name: Name = Field(description="Name of the finger, and of the robot in the URDF.")
+    title: str = Field("", strict=True, max_length=200, description="One line for listings.")
+    gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
+        (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="Base frame; in a hand `hand.gravity`."
+    )
+    joints: dict[Name, Joint] = Field(min_length=1, description="Joints by name, from the base to the tip.")
+    tendons: dict[Name, Tendon] = Field(description="Tendons by name; at least one, unless there is a tree.")
+    tendon_friction: TendonFrictionSettings = TendonFrictionSettings()
+    joint_friction: JointFrictionSettings = JointFrictionSettings()
+    passive_tendon: PassiveTendon = PassiveTendon()
+    stroke_limiter: StrokeLimiterSettings = StrokeLimiterSettings()
+    actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
+    touches_itself: bool = Field(
+        False,
+        strict=True,
+        description="Whether links that are not neighbours touch each other, where there are contacts.",
+    )
+    _hand: HandSettings | None = PrivateAttr(None)
+    tree: Tree | None = Field(None, description="Bodies in place of links, with joints, tendons and actuators.")
+
+    @field_validator("tendons")
+    @classmethod
+    def _actuated_first(cls, value: dict[str, Tendon]) -> dict[str, Tendon]:
+        return dict(sorted(value.items(), key=lambda item: item[1].kind))
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        joints, tendons = tuple(self.joints), tuple(self.tendons)
+        if not self.tendons and self.tree is None:
+            raise problem("tendons", "must have at least one entry")
+        if self.tree is not None and tuple(self.tree.joints) != joints:
+            raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
+        for name, tendon in self.tendons.items():
+            paths = tuple(self.tree.tendons) if self.tree else ()
+            if tendon.along is not None and tendon.along not in paths:
+                allowed = f"no such tendon of the tree; there are {', '.join(paths) or 'none'}"
+                raise problem(f"tendons.{name}.along", allowed, tendon.along)
+            for joint in tendon.crossings:
+                if joint not in self.joints:
+                    allowed = f"no such joint; the joints are {', '.join(joints)}"
+                    raise problem(f"tendons.{name}.crossings.{joint}", allowed)
+        driven = (*self.actuated_names, *self.tree.actuators) if self.tree is not None else ()
+        for key, keyframe in (self.tree.keyframes if self.tree is not None else {}).items():
+            for name in keyframe.inputs:
+                if name not in driven:
+                    allowed = f"no such actuator or tendon; there are {', '.join(driven)}"
+                    raise problem(f"tree.keyframes.{key}.inputs.{name}", allowed)
+        check_actuators(self.actuators, self.actuated_names, self.passive_names)
+        for key, each in self.actuators.items():
+            for name in each.tendons:
+                if self.tendons[name].maximum_tension is not None:
+                    allowed = f"is for ideal sources: actuators.{key} pulls it"
+                    raise problem(f"tendons.{name}.maximum_tension", allowed, self.tendons[name].maximum_tension)
+        for group, names, what in (
+            ("tendon_friction", (*tendons, *self.canals), "tendon"),
+            ("joint_friction", joints, "joint"),
+            ("passive_tendon", self.passive_names, "passive tendon"),
+            ("stroke_limiter", joints, "joint"),
+        ):
+            for field, value in getattr(self, group):
+                check_size(value, names, f"{group}.{field}", what)
+        refuse_idle(self, OF_FINGER)
+        return self
+
+    @property
+    def outline(self) -> str:
+        """Name, joints and tendons, in a line."""
+        if self.hand is not None:
+            sizes = f"{len(self.joints)} joints, {len(self.tendons)} tendons"
+            return f"{self.name}: fingers {', '.join(self.hand.fingers)}; {sizes}"
+        if self.tree is not None:
+            tree, pulled = self.tree, len(self.tendons)
+            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
+            return f"{self.name}: a tree of {sizes}, {len(tree.actuators)} actuators"
+        tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in self.tendons.items())
+        return f"{self.name}: joints {', '.join(self.joints)}; tendons {tendons}"
+
+    @property
+    def hand(self) -> HandSettings | None:
+        """The palm and the fingers on it, if it is a hand of such."""
+        return self._hand
+
+    @property
+    def canals(self) -> tuple[str, ...]:
+        """Names of the tree's tendons that something else than ideal sources pulls: they rub as all tendons do."""
+        return self.tree.rubbing if self.tree is not None else ()
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """Names of the passive tendons."""
+        return tuple(name for name, tendon in self.tendons.items() if tendon.kind == "passive")
+
+    @property
+    def actuated_names(self) -> tuple[str, ...]:
+        """Names of the actuated tendons."""
+        return tuple(name for name, tendon in self.tendons.items() if tendon.kind == "actuated")
+
+
+class PlacedFinger(Description):
+    """A finger and the place of its base frame on the palm."""
+
+    finger: FingerDescription = Field(description="Name of one that ships, path of a .toml file, or a table.")
+
+    @field_validator("finger")
+    @classmethod
+    def _made_of_links(cls, value: FingerDescription) -> FingerDescription:
+        if value.tree is not None:
+            raise problem("tree", "a tree of bodies cannot be placed on a palm; it is a hand of its own")
+        return value
+
+    position: Annotated[tuple[float, float, float], PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its base frame, in the palm's frame."
+    )
+    orientation: Annotated[tuple[float, float, float], vector(3, -2.0 * math.pi, 2.0 * math.pi, IN_RADIANS)] = quantity(
+        (0.0, 0.0, 0.0), unit="rad", source="design", doc="Roll, pitch and yaw of its base frame, as in a URDF."
+    )
+    scale: Annotated[float, real(0.1, 10.0)] = quantity(
+        1.0, unit="1", source="design", doc="All lengths times this, masses times its third power."
+    )
+
+    @property
+    def rotation(self) -> Array:
+        """From the finger's base frame to the palm's, shape (3, 3)."""
+        return rotation(*self.orientation).copy()
+
+
+class HandSettings(Description):
+    """A palm and the fingers on it, the table ``[hand]``. `joined` describes them all together, as one finger.
+
+    Its gravity, in the world's frame, replaces that of the fingers; a palm at rest has that frame.
+    """
+
+    file_keys = ("base",)
+
+    def __repr__(self) -> str:
+        """Return its name and fingers in a line; `to_toml` writes all of it."""
+        return f"<{type(self).__name__} {self.name}: fingers {', '.join(self.fingers)}>"
+
+    __str__ = __repr__
+
+    name: Name = Field("hand", description="Name of the hand.")
+    title: str = Field("", strict=True, max_length=200, description="One line for listings.")
+    gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
+        (0.0, 0.0, -9.81), unit="m/s2", source="palm down", doc="In the world's frame."
+    )
+    palm: Palm = Palm()
+    fingers: dict[Name, PlacedFinger] = Field(min_length=1, description="Fingers by name.")
+    fingers_touch: bool | None = Field(
+        None,
+        strict=True,
+        description="Whether links of different fingers touch each other; by default where there are objects, too.",
+    )
+
+    @field_validator("fingers")
+    @classmethod
+    def _distinct(cls, value: dict[str, PlacedFinger]) -> dict[str, PlacedFinger]:
+        folded: dict[str, str] = {}
+        for name in value:
+            if name.casefold() in folded:
+                raise problem(name, f"another finger is called {folded[name.casefold()]}; names must differ in letters")
+            folded[name.casefold()] = name
+        return value
+
+    @model_validator(mode="after")
+    def _acting(self) -> Self:
+        refuse_idle(self, OF_HAND)
+        return self
+
+    def parts(self) -> dict[str, HandSettings]:
+        """Return hands of one finger each, by name."""
+        return {name: self.updated(fingers={name: placed}, name=name) for name, placed in self.fingers.items()}
+
+    def built(self) -> dict[str, FingerDescription]:
+        """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
+        return {name: _placed_finger(name, placed, self.gravity) for name, placed in self.fingers.items()}
+
+    @memoised(lambda self: (self,))
+    def joined(self) -> FingerDescription:
+        """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
+        joined = self._put_together().model_copy()
+        joined._hand = self
+        return joined
+
+    # Of hands whose palms differ all else is the same.
+    @memoised(lambda self: (self.name, self.title, self.gravity, *self.fingers, *self.fingers.values()))
+    def _put_together(self) -> FingerDescription:
+        parts = self.built()
+        tendons, actuators = (
+            {f"{name}.{own}": each for name, part in parts.items() for own, each in getattr(part, group).items()}
+            for group in ("tendons", "actuators")
+        )
+        return FingerDescription.model_construct(
+            name=self.name,
+            title=self.title,
+            gravity=self.gravity,
+            joints={f"{name}.{own}": joint for name, part in parts.items() for own, joint in part.joints.items()},
+            tendons={
+                name: tendon_of_hand(name.split(".")[0], tendon)
+                for name, tendon in sorted(tendons.items(), key=lambda item: item[1].kind)
+            },
+            tendon_friction=joined_table(parts, "tendon_friction", TendonFrictionSettings),
+            joint_friction=joined_table(parts, "joint_friction", JointFrictionSettings),
+            passive_tendon=joined_table(parts, "passive_tendon", PassiveTendon),
+            stroke_limiter=joined_table(parts, "stroke_limiter", StrokeLimiterSettings),
+            actuators={name: actuator_of_hand(name.split(".")[0], actuator) for name, actuator in actuators.items()},
+            touches_itself=any(part.touches_itself for part in parts.values()),
+        )
+
+
+@memoised(lambda name, placed, gravity: (name, placed, gravity))
+def _placed_finger(name: str, placed: PlacedFinger, gravity: tuple[float, float, float]) -> FingerDescription:
+    own = placed.rotation.T @ np.array(gravity)
+    finger = scaled(placed.finger, placed.scale)
+    return finger.updated(name=name, gravity=tuple(own.tolist()))
+
+
+def one_finger(description: FingerDescription) -> None:
+    """Refuse to give a hand's fingers together for a single one.
+
+    Raises:
+        InputError: If it is a hand of several fingers.
+    """
+    hand = description.hand
+    if hand is not None and len(hand.fingers) > 1:
+        allowed = f"is a hand; take one of its fingers: scenario.parts()[NAME] with {', '.join(hand.fingers)}"
+        raise InputError("finger", allowed, hand.name)

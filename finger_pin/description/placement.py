@@ -1,0 +1,183 @@
+"""A finger in its place on a palm: rotated, to scale, its tables joined with those of the other fingers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache, reduce
+from typing import Annotated, Any, Self, TypeVar
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from finger_pin.description.actuators import Actuator
+from finger_pin.description.caching import memoised
+from finger_pin.description.parameters import Joint, Link, Tendon
+from finger_pin.description.recordings.series import Series, series
+from finger_pin.description.signals import SignalSettings
+from finger_pin.description.validation import (
+    Description,
+    Name,
+    Numbers,
+    expand,
+    problem,
+    quantity,
+    real,
+    suggestion,
+    vector,
+)
+from finger_pin.typing import Array
+
+_MILLIMETRES = " m (is it in millimetres?)"
+#: A place on the palm.
+PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
+#: The coordinates of a palm's path: place, m, and roll, pitch and yaw, rad, in the world.
+PATH = ("x", "y", "z", "roll", "pitch", "yaw")
+_COORDINATE = real(-12.5, 12.5)
+
+_Table = TypeVar("_Table", bound=Description)
+_Finger = TypeVar("_Finger", bound=Description)
+
+
+@lru_cache
+def rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation of fixed angles, about x, then y, then z, shape (3, 3)."""
+    (a, b, c), (d, e, f) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    about = ([[1, 0, 0], [0, a, -d], [0, d, a]], [[b, 0, e], [0, 1, 0], [-e, 0, b]], [[c, -f, 0], [f, c, 0], [0, 0, 1]])
+    turned: Array = reduce(lambda first, then: np.array(then) @ first, about, np.eye(3))
+    return turned
+
+
+# Powers of the scale that a link's numbers go with.
+_POWERS = {"length": 1, "offset": 1, "width": 1, "centre_of_mass": 1, "mass": 3}
+_POWERS |= {"transverse_inertia": 5, "axial_inertia": 5}
+
+
+@memoised(lambda link, scale: (link, scale), most=1024)
+def _scaled_link(link: Link, scale: float) -> Link:
+    return link.model_copy(update={key: getattr(link, key) * scale**power for key, power in _POWERS.items()})
+
+
+@memoised(lambda tendon, scale: (tendon, scale), most=1024)
+def _scaled_tendon(tendon: Tendon, scale: float) -> Tendon:
+    crossings = {
+        joint: crossing.updated(radius=crossing.radius * scale) for joint, crossing in tendon.crossings.items()
+    }
+    return tendon.updated(crossings=crossings)
+
+
+@memoised(lambda joint, scale: (joint, scale), most=1024)
+def _scaled_joint(joint: Joint, scale: float) -> Joint:
+    return joint.updated(link=joint.link and _scaled_link(joint.link, scale))
+
+
+def scaled(finger: _Finger, scale: float) -> _Finger:
+    """Return a finger of the same shape and material in another size.
+
+    Lengths and radii go with the scale, masses with its third power and moments of inertia with its fifth; so do the
+    friction coefficients of joints, which are lengths (coefficient times pin radius). Springs, tendons, actuators and
+    limiters stay as they are.
+    """
+    if scale == 1.0:
+        return finger
+    tables: Any = finger
+    joints = {name: _scaled_joint(joint, scale) for name, joint in tables.joints.items()}
+    tendons = {name: _scaled_tendon(tendon, scale) for name, tendon in tables.tendons.items()}
+    friction = tables.joint_friction
+    lengths = {
+        key: tuple((scale * expand(getattr(friction, key), len(joints))).tolist()) for key in ("coulomb", "stiction")
+    }
+    update = {"joints": joints, "tendons": tendons, "joint_friction": friction.updated(**lengths)}
+    return finger.updated(**update)
+
+
+@memoised(lambda finger, tendon: (finger, tendon), most=1024)
+def tendon_of_hand(finger: str, tendon: Tendon) -> Tendon:
+    """Return a tendon whose crossings are of the joints of a hand."""
+    return tendon.updated(crossings={f"{finger}.{name}": each for name, each in tendon.crossings.items()})
+
+
+@memoised(lambda finger, actuator: (finger, actuator), most=1024)
+def actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
+    """Return an actuator whose tendons are those of a hand."""
+    return actuator.updated(tendons=tuple(f"{finger}.{tendon}" for tendon in actuator.tendons))
+
+
+def joined_table(parts: Mapping[str, Any], group: str, table: type[_Table]) -> _Table:
+    """Return a table of all fingers, whose entries are lists of numbers in the order of the whole."""
+    tables: list[_Table] = [getattr(part, group) for part in parts.values()]
+    joined: _Table = _joined(table, tables, [_kinds(part, group) for part in parts.values()])
+    return joined
+
+
+@memoised(lambda table, tables, kinds: (*tables, *kinds), most=1024)
+def _joined(table: Any, tables: Sequence[Any], kinds: list[tuple[str, ...]]) -> Any:
+    return table.model_construct(**_lists(tables, kinds))
+
+
+def _kinds(part: Any, group: str) -> tuple[str, ...]:
+    """Return the kinds by which the numbers of a table are ordered: actuated tendons of all before passive ones."""
+    if group == "tendon_friction":
+        return tuple(tendon.kind for tendon in part.tendons.values())
+    return ("",) * len(part.passive_names if group == "passive_tendon" else part.joints)
+
+
+def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dict[str, Any]:
+    of_all = [kind for each in kinds for kind in each]
+    order = sorted(range(len(of_all)), key=of_all.__getitem__)
+    found = {}
+    for entry in type(tables[0]).model_fields:
+        pairs = zip(tables, kinds, strict=True)
+        numbers = [number for table, own in pairs for number in _each(getattr(table, entry), len(own))]
+        found[entry] = tuple([numbers[place] for place in order])
+    return found
+
+
+def _each(value: Numbers, size: int) -> Sequence[float]:
+    return value if isinstance(value, tuple) else [float(value)] * size
+
+
+class PathSignal(SignalSettings):
+    """A coordinate of the palm over time: m for x, y, z, rad for roll, pitch, yaw."""
+
+    offset: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _COORDINATE] | None = quantity(None, unit="m or rad", source="chosen", doc="Of none.")
+    values: Annotated[tuple[float, ...] | Series, series(-12.5, 12.5)] | None = quantity(
+        None, unit="m or rad", source="chosen", doc="At the points or samples."
+    )
+
+    @model_validator(mode="after")
+    def _accelerates(self) -> Self:
+        if self.kind in ("step", "ramp"):
+            raise problem("kind", "must be one of sine, points, samples: a palm has an acceleration", self.kind)
+        return self
+
+
+_AT_REST = PathSignal()
+
+
+class Palm(Description):
+    """The palm, on which fingers stand: the base frame of the hand, at rest or moved along a path."""
+
+    size: Annotated[tuple[float, float, float], vector(3, 0.0, 2.0, _MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Sides of the box that is drawn; zero for none."
+    )
+    centre: Annotated[tuple[float, float, float], PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the box, in the palm's frame."
+    )
+    path: dict[Name, PathSignal] | None = Field(
+        None, description="Where the palm is in the world over time, by x, y, z, roll, pitch and yaw; at rest without."
+    )
+
+    @field_validator("path")
+    @classmethod
+    def _coordinates(cls, value: dict[str, PathSignal] | None) -> dict[str, PathSignal] | None:
+        for name in value or {}:
+            if name not in PATH:
+                hint = suggestion(name, PATH)
+                raise problem(name, f"no such coordinate; there are {', '.join(PATH)}{hint}")
+        return value
+
+    def on_path(self, name: str) -> PathSignal:
+        """Return a coordinate of the path, by default zero."""
+        return (self.path or {}).get(name, _AT_REST)

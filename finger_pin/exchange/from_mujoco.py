@@ -1,0 +1,308 @@
+"""A MuJoCo model as a description: bodies, joints, tendons, couplings and actuators; other elements are listed.
+
+MuJoCo resolves defaults, classes and includes; what is read here is its compiled model (`mujoco.MjModel`).
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.meshes import Mesh
+from finger_pin.description.validation import validate
+from finger_pin.exceptions import InputError, LeftOutWarning
+from finger_pin.exchange.mujoco_actuators import ActuatorReader
+from finger_pin.exchange.mujoco_equalities import read_equalities
+from finger_pin.exchange.mujoco_flags import apply_flags
+from finger_pin.exchange.mujoco_free import FreeBodies
+from finger_pin.exchange.mujoco_names import Names, Table, distinct, entry_name, quaternion
+from finger_pin.exchange.mujoco_overlay import add_tendons
+from finger_pin.exchange.mujoco_shapes import Shapes
+from finger_pin.exchange.mujoco_tendons import STOP, TendonReader
+from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest
+from finger_pin.mechanism.tendon_paths import rotation
+from finger_pin.typing import Array
+
+# Stiffness with which the range of a joint stops it where it slides, N/m.
+_STOP_SLIDING = 1e4
+_LEAST_FRICTION = 1e-7
+# Groups from this one on are hidden in MuJoCo's viewer, unless one asks for them.
+_HIDDEN = 3
+
+
+def from_mujoco(
+    model: Any, name: str = "hand", *, tendons: Mapping[str, Mapping[str, Any]] | str | Path | None = None
+) -> FingerDescription:
+    """Return the description of a MuJoCo model, to be simulated, written with `to_toml` and changed by keys.
+
+    Motors that can only pull a tendon, through space or around hinges, become tendons of the hand, with friction along
+    their path and slack; their tension is their force, N. Other actuators exert what MuJoCo's do. Friction of tendons
+    and joints, which MuJoCo has not, gets this package's defaults, but for viscous friction of joints, which is the
+    model's. Other tendons rub alike where springs, ranges, servos or what drives their joint pull them. Ranges, less
+    their margins, are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level of
+    (9). A free body that a tendon passes moves by three slides and three hinges, of which the second must not come to a
+    right angle; others, and geoms of the world, become objects. Names keep letters, digits and underscores: ``a/b`` is
+    ``a_b``. What is not carried over stands in ``tree.left_out``, and is warned of where it moves or carries anything.
+
+    Args:
+        model: A `mujoco.MjModel`, or the path of an XML file.
+        name: Of the hand.
+        tendons: Tendons to lay over a model that has none, or not all; see `add_tendons`. The model has to be a file
+            then, or a `mujoco.MjSpec`.
+
+    Raises:
+        InputError: If it is neither, MuJoCo refuses the file, or it has muscles, ball joints or nothing that drives it.
+    """
+    plugins: list[str] = []
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError("model", "needs MuJoCo: pip install 'finger-pin[mujoco]'") from None
+    if isinstance(model, str | Path | mujoco.MjSpec):
+        try:
+            spec = model.copy() if isinstance(model, mujoco.MjSpec) else mujoco.MjSpec.from_file(str(model))
+            plugins = [each.plugin_name for each in spec.plugins]
+            if tendons is not None:
+                add_tendons(spec, tendons)
+            model = spec.compile()
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"model {model}", " ".join(str(error).split())) from None
+    elif tendons is not None:
+        raise InputError("model", "must be a file or a mujoco.MjSpec to lay tendons over it", type(model).__name__)
+    if not isinstance(model, mujoco.MjModel):
+        raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
+    reader = _Reader(mujoco, model, plugins)
+    found = validate(FingerDescription, reader.table(name), ("finger",))
+    if moving := reader.rest.moving():
+        warnings.warn(LeftOutWarning(f"{name}: not carried over: {'; '.join(moving)}"), stacklevel=2)
+    return found
+
+
+class _Reader:
+    """Reads a model, element by element."""
+
+    def __init__(self, mujoco: Any, model: Any, plugins: list[str]) -> None:
+        self.mujoco, self.model = mujoco, apply_flags(mujoco, model)
+        model = self.model
+        self.rest = Rest(mujoco, model)
+        self.names = Names.of(model, plugins)
+        self._read = ElementReader(mujoco, model, self.names, self.rest)
+        self.shapes = Shapes(self._read)
+        kinds = mujoco.mjtJoint
+        for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
+            raise InputError(
+                f"joint {self.names.joints[i]}", "is a ball joint; joints have to turn or slide about one axis"
+            )
+        self.actuators = ActuatorReader(*vars(self._read).values())
+        self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
+        self.free = FreeBodies(self._read, self._passed())
+
+    def table(self, name: str) -> Table:
+        """Return the description as a table."""
+        model = self.model
+        if not self.kept_joints:
+            raise InputError("model", "has no joints that turn or slide")
+        reader = TendonReader(*vars(self._read).values())
+        tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
+        bodies = self._bodies()
+        actuators, pulled = self.actuators.table(), self.actuators.pulled()
+        couplings, loops, differences = read_equalities(self._read)
+        joints, moving, loss = self._joints()
+        stops = [_STOP_SLIDING if each["kind"] == "slide" else STOP for each in moving.values()]
+        pairs, keyframes = self.shapes.pairs(bodies), self._keyframes()
+        return {
+            "name": entry_name(name),
+            "gravity": model.opt.gravity.tolist(),
+            "joints": joints,
+            "tendons": pulled,
+            "joint_friction": {"viscous": 0.0, "floor": np.maximum(loss, _LEAST_FRICTION).tolist()},
+            **({"stroke_limiter": {"stiffness": stops}} if any(each["limited"] for each in joints.values()) else {}),
+            "touches_itself": bool(pairs),
+            "tree": {
+                "bodies": self._still() | {self.names.bodies[i]: self._body(i) for i in bodies},
+                "joints": moving,
+                "tendons": tendons | {_free(name, tendons): each for name, each in differences.items()},
+                "couplings": couplings,
+                "loops": loops,
+                "actuators": actuators,
+                "keyframes": keyframes,
+                "objects": self.shapes.objects(self.free.loose),
+                "tip": self._tip(),
+                "touching": pairs,
+                "meshes": self._meshes(bodies),
+                "left_out": self.rest.listed(),
+            },
+        }
+
+    def _passed(self) -> set[int]:
+        """Return the bodies that tendons pass or whose geoms they wrap."""
+        model, types = self.model, self.mujoco.mjtWrap
+        sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE]
+        wraps = model.wrap_objid[self._wraps()]
+        return {int(each) for each in (*model.site_bodyid[sites], *model.geom_bodyid[wraps])}
+
+    def _joints(self) -> tuple[Table, Table, list[float]]:
+        """Return the joints of the finger, those of its tree, and their losses by friction, in the bodies' order."""
+        joints: Table = {}
+        moving: Table = {}
+        loss: list[float] = []
+        for i in range(self.model.njnt):
+            if i in self.kept_joints:
+                name = self.names.joints[i]
+                joints[name], moving[name] = self._joint(i), self._moving(i)
+                loss.append(float(self.model.dof_frictionloss[self.model.jnt_dofadr[i]]))
+            elif i in self.free.kept:
+                for name, joint, moved in self.free.joints(i):
+                    joints[name], moving[name] = joint, moved
+                    loss.append(0.0)
+        return joints, moving, loss
+
+    def _keyframes(self) -> Table:
+        """Return the postures that the model comes with."""
+        model, found = self.model, []
+        for k in range(model.nkey):
+            qpos = model.key_qpos[k]
+            position = {self.names.joints[i]: float(qpos[model.jnt_qposadr[i]]) for i in self.kept_joints}
+            for i in self.free.kept:
+                position |= self.free.position(i, qpos)
+            found.append({"position": position, "inputs": self.actuators.inputs(model.key_ctrl[k])})
+        return dict(zip(distinct("keyframe", [model.key(k).name for k in range(model.nkey)]), found, strict=True))
+
+    def _bodies(self) -> list[int]:
+        """Return the bodies that move, that tendons pass or that carry these, parents first."""
+        model = self.model
+        # What lies around does not carry a tip.
+        needed = self._passed() | {self._tip_body()[0]} | self.shapes.still()
+        sides = [int(each) for each in model.wrap_prm[self._wraps()] if each >= 0]
+        needed |= {int(each) for each in model.site_bodyid[sides]}
+        moved: set[int] = set()
+        for i in range(1, model.nbody):
+            own = any(model.jnt_bodyid[j] == i for j in (*self.kept_joints, *self.free.kept))
+            if own or int(model.body_parentid[i]) in moved:
+                moved.add(i)
+        needed |= moved
+        for i in range(model.nbody - 1, 0, -1):
+            if i in needed:
+                needed.add(int(model.body_parentid[i]))
+        return sorted(needed - {0})
+
+    def _still(self) -> Table:
+        """Return the body that has the shapes of the world; none without any."""
+        shapes = self.shapes.of_body(0)
+        return {self.names.bodies[0]: {"shapes": shapes, "solids": self._solids(0)}} if shapes else {}
+
+    def _body(self, i: int) -> Table:
+        model = self.model
+        turned = rotation(quaternion(model.body_iquat[i]))
+        moments = turned @ np.diag(model.body_inertia[i]) @ turned.T
+        return {
+            **self.names.carrier(int(model.body_parentid[i]), "parent"),
+            "position": model.body_pos[i].tolist(),
+            "orientation": quaternion(model.body_quat[i]),
+            "mass": float(model.body_mass[i]),
+            "gravity_compensation": float(model.body_gravcomp[i]),
+            "centre": model.body_ipos[i].tolist(),
+            "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            "solids": self._solids(i),
+            "shapes": self.shapes.of_body(i),
+        }
+
+    def _solids(self, body: int) -> Table:
+        """Return the visible geoms of a body, or all if none is; meshes of moving bodies only."""
+        model, kinds, found = self.model, self.mujoco.mjtGeom, {}
+        own = np.flatnonzero(model.geom_bodyid == body)
+        shown = own[model.geom_group[own] < _HIDDEN]
+        for i in shown if len(shown) else own:
+            kind, size = model.geom_type[i], model.geom_size[i]
+            place = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
+            radius, length = float(size[0]), 2.0 * float(size[1])
+            if kind == kinds.mjGEOM_SPHERE:
+                found[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+            elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
+                name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
+                found[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+            elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
+                found[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+            elif kind == kinds.mjGEOM_MESH and model.body_weldid[body]:
+                # A forearm that stands still would be in the way.
+                name = self.names.meshes[model.geom_dataid[i]]
+                found[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **place}
+        return found
+
+    def _meshes(self, bodies: list[int]) -> Table:
+        """Return the meshes that the solids of bodies are made of."""
+        model, names = self.model, self.names.meshes
+        used = {solid.get("mesh") for i in bodies for solid in self._solids(i).values()}
+        found = {}
+        for i in range(model.nmesh):
+            points = slice(model.mesh_vertadr[i], model.mesh_vertadr[i] + model.mesh_vertnum[i])
+            faces = slice(model.mesh_faceadr[i], model.mesh_faceadr[i] + model.mesh_facenum[i])
+            if names[i] in used:
+                found[names[i]] = Mesh.packed(model.mesh_vert[points], model.mesh_face[faces])
+        return found
+
+    def _joint(self, i: int) -> Table:
+        model, dof = self.model, int(self.model.jnt_dofadr[i])
+        spring = {
+            "stiffness": float(model.jnt_stiffness[i]),
+            "rest": float(model.qpos_spring[model.jnt_qposadr[i]]),
+            "damping": float(model.dof_damping[dof]),
+        }
+        limited, hinge = bool(model.jnt_limited[i]), model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE
+        margin, reach = float(model.jnt_margin[i]), math.pi if hinge else 1.0
+        return {
+            "range": (model.jnt_range[i] + (margin, -margin)).tolist() if limited else [-reach, reach],
+            "limited": limited,
+            **({"spring": spring} if spring["stiffness"] or spring["damping"] else {}),
+        }
+
+    def _moving(self, i: int) -> Table:
+        model = self.model
+        hinge = model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE
+        return {
+            "body": self.names.bodies[model.jnt_bodyid[i]],
+            "kind": "hinge" if hinge else "slide",
+            "axis": model.jnt_axis[i].tolist(),
+            "anchor": model.jnt_pos[i].tolist(),
+            "reference": float(model.qpos0[model.jnt_qposadr[i]]),
+            "armature": float(model.dof_armature[model.jnt_dofadr[i]]),
+        }
+
+    def _tip_body(self) -> tuple[int, Array]:
+        """Return a body and a point of it: the first site called a tip, or the origin of the last body that moves."""
+        model = self.model
+        for i in range(model.nsite):
+            if "tip" in model.site(i).name.lower() and int(model.site_bodyid[i]) in self._moved_by_joints():
+                return int(model.site_bodyid[i]), model.site_pos[i]
+        return int(model.jnt_bodyid[self.kept_joints[-1]]), np.zeros(3)
+
+    def _moved_by_joints(self) -> set[int]:
+        """Return the bodies that joints move which turn or slide."""
+        model, found = self.model, set[int]()
+        for i in range(1, model.nbody):
+            if int(model.body_parentid[i]) in found or any(model.jnt_bodyid[j] == i for j in self.kept_joints):
+                found.add(i)
+        return found
+
+    def _wraps(self) -> NDArray[np.bool_]:
+        """Return a mask of the pieces of tendons' paths that are wraps."""
+        types = self.mujoco.mjtWrap
+        return np.isin(self.model.wrap_type, (int(types.mjWRAP_SPHERE), int(types.mjWRAP_CYLINDER)))
+
+    def _tip(self) -> Table:
+        body, position = self._tip_body()
+        return {**self.names.carrier(body, "body"), "position": position.tolist()}
+
+
+def _free(name: str, taken: Table) -> str:
+    """Return a name that is not taken."""
+    return _free(f"{name}_equality", taken) if name in taken else name

@@ -1,0 +1,269 @@
+"""MJCF of a finger: the part of the model that MuJoCo can express, as text. MuJoCo itself is not needed here.
+
+Exported are the rigid body, the routing, the passive tendons with their lumped mass, the springs of joints, viscous
+friction, gravity and the shapes; on request law (9) too, which MuJoCo then needs `finger_pin.mujoco` for. MuJoCo has no
+counterpart of the stroke limiters (2) and of the cut at zero of a delivered tension (12); they are left out, and the
+file says so at its head.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.loading import DescriptionLike
+from finger_pin.description.parameters import Link
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import expand
+from finger_pin.exceptions import InputError
+from finger_pin.exchange.mjcf_friction import add_friction_elements
+from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
+from finger_pin.mechanism.tendons import Tendons
+from finger_pin.mechanism.urdf import BASE_FRAME, TENSION_LIMIT, TIP_FRAME, exported
+from finger_pin.typing import Array
+
+#: Time step, s, of a model without lumped masses.
+TIMESTEP = 1e-4
+
+# A dead band that a tendon never leaves at its lower end, m.
+_SLACK = 1000.0
+# A slide does not turn, but MuJoCo wants a positive inertia of every body that moves, kg m2.
+_NO_INERTIA = 1e-12
+
+_NOTES = """
+  {title}
+
+  Controls are tendon tensions f^a, N. The length of an actuated tendon is l = H_c theta, m, positive when the tendon is
+  drawn towards its actuator, so that a positive control pulls.{passive}
+
+{friction}
+  Left out, because MuJoCo has no counterpart:{rough}{held}
+  - the cut of a delivered tension at zero (viscous drag can make a tendon push when its control is near zero);
+  - the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false", and limited="true" makes them
+    MuJoCo's own soft constraints;
+  - an external force at the fingertip: apply it to the site "{tip}".{servos}
+  Added: controls are clamped to 0 to {limit:g} N; shapes touch other objects, not each other.
+"""
+_SMOOTH = """
+  - stiction and Coulomb friction of tendons and joints (the dynamic friction law; only its viscous part is here);"""
+_ROUGH = """
+  Friction of tendons and joints (the dynamic friction law) is the plugin "finger_pin.friction": import
+  finger_pin.mujoco in Python before loading this file.
+"""
+_HELD = """
+  - what springs of joints and passive tendons hold against their motion (hysteresis);"""
+_SERVOS = """
+  - servos, their spools and what stretches on the way: controls pull at the entrance of the canals."""
+_MASSIVE = """
+  A passive tendon is a slide joint, its lumped mass, between two springs that only pull."""
+_MASSLESS = """
+  A passive tendon is one spring that only pulls, without its lumped mass and the drag on it."""
+
+
+def to_mjcf(
+    description: DescriptionLike | Scenario,
+    *,
+    posture: Sequence[float] | None = None,
+    timestep: float | None = None,
+    integrator: str = "implicitfast",
+    massless: bool = False,
+    shapes: bool = True,
+    friction: bool = False,
+) -> str:
+    """Return the MJCF of a finger as text, or of a hand with its palm at rest.
+
+    The coordinates are the joints in order, then one slide per passive tendon: its position p_5. Bodies and frames
+    are named as in the URDF. Numbers are written so that reading them gives the same floats.
+
+    Args:
+        description: The finger or hand, its name, the path of its file, or the scenario that has it.
+        posture: theta of the keyframe ``start``, shape (n,), rad, with the lumped masses where both halves are
+            stretched alike; all joints at zero by default.
+        timestep: Of MuJoCo, s; by default a step that the lumped masses are stable with.
+        integrator: One of MuJoCo's.
+        massless: Replace each passive tendon by one spring K_t without a mass (5): coarser, but with time steps of
+            0.1 ms instead of some microseconds.
+        shapes: Whether to write the shapes.
+        friction: Whether to write law (9) of tendons and joints, with which the model loads only where
+            `finger_pin.mujoco` has been imported.
+
+    Raises:
+        InputError: If it is no finger or hand, it has a tree of bodies or a joint without a link, the posture has the
+            wrong size, or the time step is not positive.
+    """
+    description = exported(description)
+    tendons = Tendons.from_description(description)
+    links = _links(description)
+    position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)
+    if position.shape != (len(links),):
+        raise InputError("posture", f"must be {len(links)} numbers, one per joint", posture)
+    step = _stable_step(tendons, massless) if timestep is None else timestep
+    if not step > 0.0:
+        raise InputError("timestep", "must be above 0", timestep)
+    root = ET.Element("mujoco", model=description.name)
+    notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
+    notes |= {"friction": _ROUGH, "rough": ""} if friction else {"friction": "", "rough": _SMOOTH}
+    springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
+    notes["held"] = _HELD if any(springs) or tendons.hysteresis.any() else ""
+    notes["servos"] = _SERVOS if description.actuators else ""
+    if tendons.routing.passive:
+        notes["passive"] = _MASSLESS if massless else _MASSIVE
+    root.append(ET.Comment(_NOTES.format(**notes).replace("--", "- -")))
+    ET.SubElement(root, "compiler", angle="radian", eulerseq="XYZ")
+    option = {"timestep": _numbers(step), "gravity": _numbers(*description.gravity), "integrator": integrator}
+    ET.SubElement(root, "option", option)
+    world = ET.SubElement(root, "worldbody")
+    if shapes:
+        assets = ET.Element("asset")
+        for name, colour in MATERIALS.items():
+            ET.SubElement(assets, "material", name=name, rgba=_numbers(*colour))
+        root.insert(list(root).index(world), assets)
+    if description.hand is not None:
+        _add_hand(world, description.hand, shapes)
+    else:
+        _add_links(ET.SubElement(world, "body", name=BASE_FRAME), description, links, shapes)
+    if not massless:
+        _add_masses(world, description, tendons)
+    _add_tendons(root, tendons, massless)
+    if friction:
+        add_friction_elements(root, description, tendons, massless)
+    passive = np.zeros(0) if massless else tendons.rest_position(position)
+    keyframe = ET.SubElement(root, "keyframe")
+    ET.SubElement(keyframe, "key", name="start", qpos=_numbers(*position, *passive))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _links(description: FingerDescription) -> dict[str, Link]:
+    links = {}
+    for name, joint in description.joints.items():
+        if joint.link is None:
+            raise InputError(f"finger.joints.{name}.link", "is needed to generate an MJCF")
+        links[name] = joint.link
+    return links
+
+
+def _stable_step(tendons: Tendons, massless: bool) -> float:
+    """Return a time step, s, to one digit: explicit stiffness is stable below 2 / omega, omega^2 = 2 K_h / m_5."""
+    if massless or not tendons.routing.passive:
+        return TIMESTEP
+    fastest = math.sqrt(float(np.max(2.0 * tendons.half_stiffness / tendons.mass)))
+    return min(TIMESTEP, float(f"{0.8 / fastest:.0e}"))
+
+
+def _add_hand(world: ET.Element, hand: HandSettings, shapes: bool) -> None:
+    """Add the palm and, on it, the fingers; names of a finger begin with its own and a dot."""
+    palm = ET.SubElement(world, "body", name="palm")
+    if shapes and all(hand.palm.size):
+        _add_shapes(palm, [Shape("box", hand.palm.size, hand.palm.centre, material="palm")])
+    for name, finger in hand.built().items():
+        placed = hand.fingers[name]
+        place = {"pos": _numbers(*placed.position), "euler": _numbers(*placed.orientation)}
+        base = ET.SubElement(palm, "body", {"name": f"{name}.{BASE_FRAME}", **place})
+        _add_links(base, finger, _links(finger), shapes, f"{name}.")
+
+
+def _add_links(
+    body: ET.Element, description: FingerDescription, links: dict[str, Link], shapes: bool, prefix: str = ""
+) -> None:
+    """Nest the links: a body's frame is its joint's, the axis is z and the link runs along x."""
+    size = len(links)
+    first, last = next(iter(links)), next(reversed(links.values()))
+    drawn = link_shapes(description, links)
+    damping = expand(description.joint_friction.viscous, size)
+    if shapes:
+        _add_shapes(body, palm_shapes(description, first, links[first]))
+    place, twist = (0.0, 0.0, 0.0), 0.0
+    for index, (name, link) in enumerate(links.items()):
+        frame = {"name": f"{prefix}{name}_link", "pos": _numbers(*place), "euler": _numbers(twist, 0, 0)}
+        body = ET.SubElement(body, "body", frame)
+        axial, transverse = link.inertia
+        inertia = {"pos": _numbers(link.mass_centre, 0, link.offset), "mass": _numbers(link.mass)}
+        ET.SubElement(body, "inertial", {**inertia, "diaginertia": _numbers(axial, transverse, transverse)})
+        bounds = {"range": _numbers(*description.joints[name].range), "limited": "false"}
+        hinge = {"name": f"{prefix}{name}", "type": "hinge", "axis": _numbers(0, 0, 1), **bounds}
+        spring = description.joints[name].spring
+        if spring is not None:
+            hinge |= {"stiffness": _numbers(spring.stiffness), "springref": _numbers(spring.rest)}
+        drag = damping[index] + (spring.damping if spring else 0.0)
+        ET.SubElement(body, "joint", {**hinge, "damping": _numbers(drag)})
+        if shapes:
+            _add_shapes(body, drawn[name])
+        place, twist = (link.length, 0.0, link.offset), link.twist
+    if shapes:
+        _add_shapes(body, pad_shapes(last), place)
+    ET.SubElement(body, "site", name=f"{prefix}{TIP_FRAME}", pos=_numbers(*place), euler=_numbers(twist, 0, 0))
+
+
+def _add_masses(world: ET.Element, description: FingerDescription, tendons: Tendons) -> None:
+    """Add a slide for every lumped mass, across gravity, which must not act on it (13)."""
+    gravity = np.array(description.gravity)
+    helper = np.eye(3)[np.argmin(np.abs(gravity))]
+    axis = np.cross(gravity, helper) if np.any(gravity) else helper
+    axis = axis / np.linalg.norm(axis)
+    actuated = tendons.routing.actuated
+    for index, name in enumerate(tendons.routing.passive_names):
+        body = ET.SubElement(world, "body", name=f"{name}_mass")
+        inertia = {"pos": _numbers(0, 0, 0), "mass": _numbers(tendons.mass[index])}
+        ET.SubElement(body, "inertial", {**inertia, "diaginertia": _numbers(*[_NO_INERTIA] * 3)})
+        slide = {"name": f"{name}_mass", "type": "slide", "axis": _numbers(*axis)}
+        ET.SubElement(body, "joint", {**slide, "damping": _numbers(tendons.viscous[actuated + index])})
+
+
+def _add_tendons(root: ET.Element, tendons: Tendons, massless: bool) -> None:
+    """Add tendons whose lengths are sums of coordinates: (3) for the actuated ones, stretches (12) for passive ones."""
+    routing = tendons.routing
+    table, actuators = ET.SubElement(root, "tendon"), ET.SubElement(root, "actuator")
+    limits = {"gear": _numbers(1), "ctrllimited": "true", "ctrlrange": _numbers(0, TENSION_LIMIT)}
+    for index, name in enumerate(routing.tendons[: routing.actuated]):
+        _add_tendon(table, name, routing.joints, routing.coupling[index], damping=tendons.viscous[index])
+        ET.SubElement(actuators, "motor", {"name": name, "tendon": name, **limits})
+    for index, name in enumerate(routing.passive_names):
+        stiffness = tendons.half_stiffness[index]
+        if massless:
+            coupling = -routing.coupling[routing.actuated + index]
+            _add_tendon(table, name, routing.joints, coupling, stiffness=0.5 * stiffness)
+            continue
+        coordinates = (*routing.joints, f"{name}_mass")
+        proximal = np.append(-routing.proximal_coupling[index], -1.0)
+        distal = np.append(-routing.distal_coupling[index], 1.0)
+        _add_tendon(table, f"{name}_proximal", coordinates, proximal, stiffness=stiffness)
+        _add_tendon(table, f"{name}_distal", coordinates, distal, stiffness=stiffness)
+
+
+def _add_tendon(
+    table: ET.Element,
+    name: str,
+    coordinates: Sequence[str],
+    coupling: Array,
+    damping: float = 0.0,
+    stiffness: float = 0.0,
+) -> None:
+    """Add a tendon; one with stiffness pulls at positive lengths and is slack at negative ones."""
+    law = {"damping": _numbers(damping)} if stiffness == 0.0 else {"stiffness": _numbers(stiffness)}
+    if stiffness != 0.0:
+        law["springlength"] = _numbers(-_SLACK, 0)
+    tendon = ET.SubElement(table, "fixed", {"name": name, **law})
+    for coordinate, factor in zip(coordinates, coupling, strict=True):
+        if factor != 0.0:
+            ET.SubElement(tendon, "joint", joint=coordinate, coef=_numbers(factor))
+
+
+def _add_shapes(body: ET.Element, shapes: Iterable[Shape], place: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+    """Add shapes, moved to a place, m; those that collide meet objects of MuJoCo's default type, but not each other."""
+    for shape in shapes:
+        centre = [at + by for at, by in zip(shape.position, place, strict=True)]
+        size = [0.5 * side for side in shape.size]
+        if shape.kind != "box":
+            size[0] = shape.size[0]
+        frame = {"pos": _numbers(*centre), "euler": _numbers(*shape.rotation), "material": shape.material}
+        contact = {"mass": "0", "contype": "0", "conaffinity": str(int(shape.collides))}
+        ET.SubElement(body, "geom", {"type": shape.kind, "size": _numbers(*size), **frame, **contact})
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(repr(float(value)) for value in values)

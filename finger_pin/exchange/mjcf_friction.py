@@ -1,0 +1,88 @@
+"""Friction of a finger in its MJCF, which `finger_pin.mujoco` computes while MuJoCo steps."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+from finger_pin.description.finger import FingerDescription
+from finger_pin.exchange.mujoco_friction import (
+    COUNT,
+    GROUP,
+    LEAST_LOSS,
+    MASS,
+    NAME,
+    PIN,
+    PLUGIN,
+    TENDON,
+    PluginFriction,
+)
+from finger_pin.mechanism.joints import JointFriction
+from finger_pin.mechanism.tendons import Tendons
+
+
+def add_friction_elements(root: ET.Element, description: FingerDescription, tendons: Tendons, massless: bool) -> None:
+    """Add friction of tendons (9), (14), (16) and of joints (9), (17) to an MJCF that has both.
+
+    A passive tendon without its mass is a spring, and rubs as a driven tendon that its spring pulls.
+    """
+    found = [*_of_tendons(description, tendons, massless), *_of_joints(description, tendons)]
+    elements = {(each.tag, each.get("name")): each for kind in ("joint", "fixed") for each in root.iter(kind)}
+    for each in found:
+        owner = elements["joint" if each.of_joint else "fixed", each.name]
+        owner.set("frictionloss", repr(max(each.least, LEAST_LOSS)))
+        # Viscous friction is part of it; a joint's spring keeps its damping.
+        spring = description.joints[each.name].spring if each.kind == PIN else None
+        owner.set("damping", repr(float(spring.damping) if spring else 0.0))
+    default = ET.Element("default")
+    own = ET.SubElement(default, "default", {"class": NAME})
+    ET.SubElement(own, "general", gaintype="dcmotor", input="none")
+    root.insert(1, default)
+    extension = ET.Element("extension")
+    plugin = ET.SubElement(extension, "plugin", plugin=PLUGIN)
+    instance = ET.SubElement(plugin, "instance", name=NAME)
+    ET.SubElement(instance, "config", key=COUNT, value=str(len(found)))
+    root.insert(2, extension)
+    actuators = root.find("actuator")
+    assert actuators is not None
+    place = {"tendon" if not found[0].of_joint else "joint": found[0].name, "instance": NAME, "class": NAME}
+    states = {"actdim": str(sum(each.states for each in found)), "group": str(GROUP), "gear": "0"}
+    ET.SubElement(actuators, "plugin", {"name": NAME, **place, **states})
+    table = ET.SubElement(ET.SubElement(root, "custom"), "tuple", name=NAME)
+    for each in found:
+        for kind, name, value in each.elements():
+            ET.SubElement(table, "element", objtype=kind, objname=name, prm=repr(float(value)))
+
+
+def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool) -> list[PluginFriction]:
+    found = []
+    for index, (name, tendon) in enumerate(description.tendons.items()):
+        numbers = [float(getattr(tendons, each)[index]) for each in _TENDON]
+        numbers += [float(tendons.lag[index] * tendons.stiffness[index]), float(tendons.drag[index])]
+        law = (*numbers, tendon.curvature_offset)
+        crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
+        if tendon.kind == "actuated":
+            found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
+        elif massless:
+            # Its viscous friction is left out with its mass.
+            law = (*law[:3], 0.0, *law[4:])
+            found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
+        else:
+            split, mass = tendon.proximal_crossings, f"{name}_mass"
+            halves = [(False, f"{name}_{half}", 0.0) for half in ("proximal", "distal")]
+            more = (halves[0], *crossed[:split], halves[1], *crossed[split:])
+            found.append(PluginFriction(MASS, mass, mass, True, 1.0, law, more))
+    return found
+
+
+_TENDON = ("surface", "stiction_ratio", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
+_JOINT = ("kinetic", "static", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
+
+
+def _of_joints(description: FingerDescription, tendons: Tendons) -> list[PluginFriction]:
+    friction = JointFriction.from_description(description, tendons.routing.loads)
+    found = []
+    for index, name in enumerate(description.joints):
+        numbers = [float(getattr(friction, each)[index]) for each in _JOINT]
+        law = (*numbers, float(friction.lag[index] * friction.stiffness[index]), 0.0, 0.0)
+        found.append(PluginFriction(PIN, name, name, True, 1.0, law))
+    return found

@@ -1,0 +1,215 @@
+"""Actuators of a MuJoCo model whose force is affine in control, its lag, length and speed; others are listed."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from finger_pin.description.tree import LARGEST_RADIUS
+from finger_pin.exchange.mujoco_flags import is_disabled
+from finger_pin.exchange.mujoco_names import Table, distinct
+from finger_pin.exchange.mujoco_unsupported import ElementReader
+from finger_pin.typing import Array
+
+# What forces are at most, N.
+_LARGE = 1e9
+
+
+def _affine(gain: float, offset: float, by_length: float, by_speed: float) -> Table:
+    return {"gain": gain, "offset": offset, "by_length": by_length, "by_speed": by_speed}
+
+
+# The attributes of MuJoCo's PID plugin, in order.
+_PID = ("kp", "ki", "kd", "imax", "slewmax")
+
+
+class ActuatorReader(ElementReader):
+    """Reads actuators."""
+
+    @cached_property
+    def laws(self) -> dict[int, Table]:
+        """The laws of the actuators that can be carried over, as entries of a description; the others are listed."""
+        found = {}
+        for i in range(getattr(self.model, "nactuator", self.model.nu)):
+            why = is_disabled(self.mujoco, self.model, i) or self._foreign(i)
+            law = self._law(i) if why is None else why
+            if isinstance(law, str):
+                self.rest.add(f"actuator {self.model.actuator(i).name or f'actuator_{i}'}: {law}")
+            else:
+                found[i] = law
+        return found
+
+    @cached_property
+    def pulling(self) -> list[int]:
+        """The motors that can only pull a tendon, through space or around joints."""
+        return [i for i in self.laws if self._pulls(i)]
+
+    def table(self) -> Table:
+        """Return all others, by name."""
+        model, found = self.model, {}
+        for i in self.laws:
+            if i in self.pulling:
+                continue
+            kind, at = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
+            of_tendon = kind == self.mujoco.mjtTrn.mjTRN_TENDON
+            found[i] = {
+                **({"tendon": self.names.tendons[at]} if of_tendon else {"joint": self.names.joints[at]}),
+                "gear": float(model.actuator_gear[i, 0]),
+                **self.laws[i],
+            }
+            if model.actuator_ctrllimited[self._control(i)]:
+                found[i]["input_range"] = model.actuator_ctrlrange[self._control(i)].tolist()
+            bounds = self._bounds(i)
+            if np.isfinite(bounds).any():
+                found[i]["force_range"] = np.clip(bounds, -_LARGE, _LARGE).tolist()
+        names = distinct("actuator", [model.actuator(i).name for i in found])
+        return dict(zip(names, found.values(), strict=True))
+
+    def inputs(self, controls: Array) -> dict[str, float]:
+        """Return the inputs for a model's controls, by the names of actuators and of tendons that are pulled."""
+        found = {}
+        for chosen in ([i for i in self.laws if i not in self.pulling], self.pulling):
+            names = distinct("actuator", [self.model.actuator(i).name for i in chosen])
+            for name, i in zip(names, chosen, strict=True):
+                value = float(controls[self._control(i)])
+                pulls = -float(self.model.actuator_gear[i, 0]) * self.laws[i]["gain"]
+                found[name] = value * pulls if i in self.pulling else value
+        return found
+
+    def pulled(self) -> Table:
+        """Return the tendons that motors pull, by the names of these."""
+        model = self.model
+        names = distinct("actuator", [model.actuator(i).name for i in self.pulling])
+        found = {}
+        for name, i in zip(names, self.pulling, strict=True):
+            found[name] = self._route(int(model.actuator_trnid[i, 0])) | {"maximum_tension": float(max(self._ends(i)))}
+        return found
+
+    def _ends(self, i: int) -> Array:
+        """Return the tensions of a motor at both ends of its control's range, within its limits, shape (2,), N."""
+        exerted = self.laws[i]["gain"] * self.model.actuator_ctrlrange[self._control(i)]
+        return np.asarray(-self.model.actuator_gear[i, 0] * np.clip(exerted, *self._bounds(i)))
+
+    def _bounds(self, i: int) -> tuple[float, float]:
+        """Return the limits of an actuator's force, its own and those of the joint or tendon that it alone drives."""
+        model, mujoco = self.model, self.mujoco
+        low, high = model.actuator_forcerange[i] if model.actuator_forcelimited[i] else (-np.inf, np.inf)
+        at, gear = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0])
+        what = "tendon" if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON else "joint"
+        prefix = "tendon_actfrc" if what == "tendon" else "jnt_actfrc"
+        # Older versions have no limits.
+        if getattr(model, f"{prefix}limited", np.zeros(at + 1))[at] and gear:
+            same = [k for k in self.laws if self._drives(k) == (what, at)]
+            if len(same) > 1:
+                name = getattr(model, what)(at).name or f"{what}_{at}"
+                self.rest.add(f"{what} {name}: a limit on what actuators exert on it together")
+            else:
+                ends = sorted(getattr(model, f"{prefix}range")[at] / gear)
+                low, high = max(low, ends[0]), min(high, ends[1])
+        return float(low), float(high)
+
+    def _drives(self, i: int) -> tuple[str, int]:
+        """Return the kind and number of what an actuator drives."""
+        of_tendon = self.model.actuator_trntype[i] == self.mujoco.mjtTrn.mjTRN_TENDON
+        return "tendon" if of_tendon else "joint", int(self.model.actuator_trnid[i, 0])
+
+    def _route(self, tendon: int) -> Table:
+        """Return the path of a tendon, or the joints that it crosses, which all bend it."""
+        around = self._around(tendon)
+        if not around:
+            return {"along": self.names.tendons[tendon]}
+        return {"crossings": {self.names.joints[j]: {"radius": -arm, "bends": True} for j, arm in around.items()}}
+
+    def _around(self, tendon: int) -> dict[int, float]:
+        """Return the joints that a fixed tendon runs over, and its coefficients; none of one through space."""
+        model = self.model
+        pieces = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
+        fixed = model.wrap_type[pieces[0]] == self.mujoco.mjtWrap.mjWRAP_JOINT
+        return {int(model.wrap_objid[k]): float(model.wrap_prm[k]) for k in pieces} if fixed else {}
+
+    def _foreign(self, i: int) -> str | None:
+        """Return the reason against carrying an actuator's target or computation over, or None."""
+        model, mujoco = self.model, self.mujoco
+        driven = mujoco.mjtTrn(int(model.actuator_trntype[i])).name.removeprefix("mjTRN_").lower()
+        if driven not in ("joint", "jointinparent", "tendon"):
+            return f"it drives a {driven}"
+        if driven != "tendon" and model.jnt_type[model.actuator_trnid[i, 0]] == mujoco.mjtJoint.mjJNT_FREE:
+            return "it drives a free joint"
+        return None
+
+    def _law(self, i: int) -> Table | str:
+        """Return an actuator's law as in `laws`, or the reason for its lack."""
+        model, gains, biases = self.model, self.mujoco.mjtGain, self.mujoco.mjtBias
+        if model.actuator_plugin[i] >= 0:
+            return self._plugin(i)
+        kind = gains(int(model.actuator_gaintype[i])).name.removeprefix("mjGAIN_").lower()
+        gain, bias = model.actuator_gainprm[i].tolist(), model.actuator_biasprm[i].tolist()
+        state = self._state(i)
+        if isinstance(state, str):
+            return state + (f", of kind {kind}" if kind != "fixed" else "")
+        if kind == "dcmotor" and not (any(gain[2:]) or any(bias) or np.any(model.actuator_dynprm[i]) or state):
+            resistance, constant = gain[:2]
+            return _affine(constant / resistance, 0.0, 0.0, -(constant**2) / resistance)
+        if kind == "pid" and not (any(gain) or any(bias[3:]) or np.any(model.actuator_dynprm[i]) or state):
+            return _affine(-bias[1], *bias[:3])
+        if kind != "fixed":
+            return f"its gain is not constant, but of kind {kind}"
+        if model.actuator_biastype[i] not in (int(biases.mjBIAS_NONE), int(biases.mjBIAS_AFFINE)):
+            return "its bias is not affine"
+        affine = model.actuator_biastype[i] == biases.mjBIAS_AFFINE
+        return _affine(gain[0], *(bias[:3] if affine else (0.0, 0.0, 0.0))) | state
+
+    def _state(self, i: int) -> Table | str:
+        """Return the lag of an actuator, or that its input is a rate; nothing without a state."""
+        model, dynamics = self.model, self.mujoco.mjtDyn
+        if not model.actuator_actnum[i]:
+            return {}
+        kind, numbers = int(model.actuator_dyntype[i]), model.actuator_dynprm[i]
+        limits: Table = {"state_range": model.actuator_actrange[i].tolist()} if model.actuator_actlimited[i] else {}
+        if kind in (int(dynamics.mjDYN_FILTER), int(dynamics.mjDYN_FILTEREXACT)) and numbers[0] > 0.0:
+            return {"time_constant": float(numbers[0]), **limits}
+        if kind == int(dynamics.mjDYN_INTEGRATOR) and model.actuator_actnum[i] == 1:
+            return {"integrates": True, **limits}
+        return "it has dynamics of its own"
+
+    def _plugin(self, i: int) -> Table | str:
+        """Return the law of MuJoCo's PID plugin, whose derivative is that of the length alone."""
+        model, instance = self.model, int(self.model.actuator_plugin[i])
+        first = int(model.plugin_attradr[instance])
+        given = bytes(model.plugin_attr)[first:].split(b"\0")[: len(_PID)]
+        numbers = {key: float(text) for key, text in zip(_PID, (each.decode() for each in given), strict=False) if text}
+        if self.names.plugins[instance : instance + 1] != ["mujoco.pid"]:
+            return "a plugin computes it"
+        if numbers.get("slewmax"):
+            return "its PID limits the rate of its input"
+        if model.actuator_dyntype[i] != self.mujoco.mjtDyn.mjDYN_NONE:
+            return "its PID has an input that comes late"
+        law = _affine(numbers.get("kp", 0.0), 0.0, -numbers.get("kp", 0.0), -numbers.get("kd", 0.0))
+        if numbers.get("ki"):
+            law["integral"] = numbers["ki"]
+            if "imax" in numbers:
+                most = numbers["imax"] / numbers["ki"]
+                law["state_range"] = [-most, most]
+        return law
+
+    def _control(self, i: int) -> int:
+        """Return the control of an actuator; those before it may have several, or none."""
+        first = getattr(self.model, "actuator_ctrladr", None)
+        return i if first is None else int(first[i])
+
+    def _pulls(self, i: int) -> bool:
+        model, mujoco = self.model, self.mujoco
+        at, control = int(model.actuator_trnid[i, 0]), self._control(i)
+        if (
+            model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_TENDON
+            or set(key for key, value in self.laws[i].items() if value) - {"gain"}
+            or not model.actuator_ctrllimited[control]
+        ):
+            return False
+        # What is no radius of a hinge is a transmission, and no tendon.
+        for joint, arm in self._around(at).items():
+            if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or abs(arm) > LARGEST_RADIUS:
+                return False
+        ends = self._ends(i)
+        return bool(np.all(ends >= 0.0) and np.any(ends))

@@ -1,0 +1,100 @@
+"""Free bodies of a MuJoCo model: those that tendons pass as joints of the tree, others for objects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from finger_pin.exchange.mujoco_names import Table
+from finger_pin.exchange.mujoco_unsupported import ElementReader
+from finger_pin.typing import Array
+
+_SLIDES, _TURNS = ("x", "y", "z"), ("yaw", "pitch", "roll")
+# The range of what searches and pictures go through, m.
+_REACH = 1.0
+
+
+class FreeBodies:
+    """Bodies with free joints.
+
+    Attributes:
+        kept: Free joints of the bodies that tendons pass, or that carry other joints: they become slides and hinges.
+        loose: The other bodies with free joints.
+    """
+
+    def __init__(self, read: ElementReader, passed: set[int]) -> None:
+        """Find the free bodies of a model, given those that tendons pass."""
+        self.model, self.names, mujoco = read.model, read.names, read.mujoco
+        model = self.model
+        joints = [int(i) for i in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)]
+        trees = {i: self._carried(int(model.jnt_bodyid[i])) for i in joints}
+        linked = {
+            int(each)
+            for k in range(model.neq)
+            for each in (model.eq_obj1id[k], model.eq_obj2id[k])
+            if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_BODY and model.eq_active0[k]
+        }
+        moving = {int(model.jnt_bodyid[i]) for i in range(model.njnt) if i not in joints}
+        self.kept = [i for i in joints if trees[i] & (passed | moving | linked)]
+        self.loose = [int(model.jnt_bodyid[i]) for i in joints if i not in self.kept]
+        # Upwards is the axis of the first hinge: what hangs turns about it as often as it likes.
+        gravity = model.opt.gravity
+        up = -gravity / np.linalg.norm(gravity) if np.any(gravity) else np.array([0.0, 0.0, 1.0])
+        across = np.cross(np.eye(3)[int(np.argmin(np.abs(up)))], up)
+        across /= np.linalg.norm(across)
+        self._axes = np.column_stack([np.cross(across, up), across, up])
+
+    def _carried(self, body: int) -> set[int]:
+        found = {body}
+        for i in range(body + 1, self.model.nbody):
+            if int(self.model.body_parentid[i]) in found:
+                found.add(i)
+        return found
+
+    def _of(self, joint: int) -> tuple[int, str, Array]:
+        """Return the body of a joint, its name, and its rotation at the model's reference."""
+        body = int(self.model.jnt_bodyid[joint])
+        return body, self.names.bodies[body], _rotation(self.model.body_quat[body])
+
+    def joints(self, joint: int) -> Iterator[tuple[str, Table, Table]]:
+        """Yield names, joints and their motion: along the base's axes, then about axes through the mass centre."""
+        model = self.model
+        body, name, turned = self._of(joint)
+        first = int(model.jnt_dofadr[joint])
+        centre = model.body_ipos[body].tolist()
+        for k, (what, axis) in enumerate(zip((*_SLIDES, *_TURNS), (*np.eye(3), *self._axes.T[::-1]), strict=True)):
+            reach = _REACH if k < len(_SLIDES) else math.pi
+            damping, armature = float(model.dof_damping[first + k]), float(model.dof_armature[first + k])
+            spring = {"spring": {"stiffness": 0.0, "damping": damping}} if damping else {}
+            yield (
+                f"{name}_{what}",
+                {"range": [-reach, reach], "limited": False, **spring},
+                {
+                    "body": name,
+                    "kind": "slide" if k < len(_SLIDES) else "hinge",
+                    "axis": (turned.T @ axis).tolist(),
+                    "anchor": centre,
+                    "armature": armature,
+                    "bearing": False,
+                },
+            )
+
+    def position(self, joint: int, qpos: Array) -> dict[str, float]:
+        """Return the positions of a body's slides and hinges in a state of the model."""
+        model = self.model
+        body, name, turned = self._of(joint)
+        at = int(model.jnt_qposadr[joint])
+        now = _rotation(qpos[at + 3 : at + 7])
+        centre = model.body_ipos[body]
+        moved = qpos[at : at + 3] + now @ centre - model.body_pos[body] - turned @ centre
+        angles = Rotation.from_matrix(self._axes.T @ now @ turned.T @ self._axes).as_euler("ZYX")
+        names = (f"{name}_{what}" for what in (*_SLIDES, *_TURNS))
+        return dict(zip(names, [*moved.tolist(), *angles.tolist()], strict=True))
+
+
+def _rotation(real_first: Array) -> Array:
+    """Return the rotation of a quaternion w, x, y, z."""
+    return np.asarray(Rotation.from_quat(np.roll(real_first, -1)).as_matrix())

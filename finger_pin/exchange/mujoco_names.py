@@ -1,0 +1,64 @@
+"""Names of the elements of a MuJoCo model, as entries of a description, and its quaternions."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from finger_pin.typing import Array
+
+Table = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names by index, letters, digits and underscores, all different within a kind; plugins by instance."""
+
+    bodies: list[str]
+    joints: list[str]
+    tendons: list[str]
+    sites: list[str]
+    geoms: list[str]
+    meshes: list[str]
+    plugins: list[str]
+
+    @classmethod
+    def of(cls, model: Any, plugins: list[str]) -> Names:
+        """Read the names of a model; those of instances of plugins only its specification has."""
+        return cls(
+            bodies=distinct("body", [model.body(i).name for i in range(model.nbody)]),
+            joints=distinct("joint", [model.joint(i).name for i in range(model.njnt)]),
+            tendons=distinct("tendon", [model.tendon(i).name for i in range(model.ntendon)]),
+            sites=distinct("site", [model.site(i).name for i in range(model.nsite)]),
+            geoms=distinct("geom", [model.geom(i).name for i in range(model.ngeom)]),
+            meshes=distinct("mesh", [model.mesh(i).name for i in range(model.nmesh)]),
+            plugins=plugins,
+        )
+
+    def carrier(self, body: int, entry: str) -> Table:
+        """Return the entry that names a body; nothing for the world."""
+        return {entry: self.bodies[body]} if body else {}
+
+
+def quaternion(real_first: Array) -> tuple[float, float, float, float]:
+    """Return a quaternion x, y, z, w of one w, x, y, z."""
+    w, x, y, z = real_first.tolist()
+    return x, y, z, w
+
+
+def entry_name(text: str) -> str:
+    """Return a name of letters, digits and underscores."""
+    name = re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_")[:60]
+    return name if re.match(r"[A-Za-z]", name) else f"n{name}"
+
+
+def distinct(what: str, given: list[str]) -> list[str]:
+    """Return names for elements, all different; those without one are numbered."""
+    found: list[str] = []
+    for index, each in enumerate(given):
+        name = entry_name(each) if each else f"{what}_{index}"
+        while name in found:
+            name = f"{name[:56]}_{index}"
+        found.append(name)
+    return found

@@ -1,0 +1,88 @@
+"""Tendons of a MuJoCo model, fixed and spatial, as entries of a description."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from finger_pin.description.waypoints import Waypoint, points_inside_wraps
+from finger_pin.exchange.mujoco_names import Table, distinct, quaternion
+from finger_pin.exchange.mujoco_unsupported import ElementReader
+from finger_pin.typing import Array
+
+#: Stiffness with which a range stops a joint, N m/rad, as the stroke limiters do; also the range of a tendon.
+STOP = 50.0
+
+
+class TendonReader(ElementReader):
+    """Reads tendons."""
+
+    def table(self, i: int) -> Table:
+        """Return a tendon by its index."""
+        model, types = self.model, self.mujoco.mjtWrap
+        pieces = range(int(model.tendon_adr[i]), int(model.tendon_adr[i] + model.tendon_num[i]))
+        found: Table = {
+            "stiffness": float(model.tendon_stiffness[i]),
+            "rest": model.tendon_lengthspring[i].tolist(),
+            "damping": float(model.tendon_damping[i]),
+            "friction": float(model.tendon_frictionloss[i]),
+        }
+        if model.wrap_type[pieces[0]] == types.mjWRAP_JOINT:
+            found["joints"] = {self.names.joints[model.wrap_objid[k]]: float(model.wrap_prm[k]) for k in pieces}
+            share = sum(coefficient**2 for coefficient in found["joints"].values())
+            found["limit_stiffness"] = STOP / share if share else 0.0
+        else:
+            names = distinct("pulley", [self._piece_name(k) for k in pieces])
+            found["path"] = self._without_idle({name: self._piece(k) for name, k in zip(names, pieces, strict=True)})
+        if model.tendon_limited[i]:
+            margin = float(model.tendon_margin[i])
+            found["range"] = (model.tendon_range[i] + (margin, -margin)).tolist()
+        return found
+
+    def _without_idle(self, path: Table) -> Table:
+        """Return a path without the wraps that a point of their own body lies inside of: they never wrap."""
+        read = {name: Waypoint.model_validate(each) for name, each in path.items()}
+        idle = set()
+        for point, wrap in points_inside_wraps(read):
+            self.rest.add(f"wrap {wrap}: {point} lies inside of it, so that the path goes straight", moves=False)
+            idle.add(wrap)
+        return {name: each for name, each in path.items() if name not in idle}
+
+    def _piece_name(self, k: int) -> str:
+        kind, at, types = self.model.wrap_type[k], self.model.wrap_objid[k], self.mujoco.mjtWrap
+        if kind == types.mjWRAP_PULLEY:
+            return ""
+        return (self.names.sites if kind == types.mjWRAP_SITE else self.names.geoms)[int(at)]
+
+    def _piece(self, k: int) -> Table:
+        """Return a piece of a spatial tendon's path."""
+        model, types, kind = self.model, self.mujoco.mjtWrap, self.model.wrap_type[k]
+        at = int(model.wrap_objid[k])
+        if kind == types.mjWRAP_PULLEY:
+            return {"kind": "pulley", "divisor": float(model.wrap_prm[k])}
+        if kind == types.mjWRAP_SITE:
+            place = {"kind": "point", "position": model.site_pos[at].tolist()}
+            return place | self.names.carrier(int(model.site_bodyid[at]), "body")
+        wrap = {
+            "kind": "cylinder" if kind == types.mjWRAP_CYLINDER else "sphere",
+            "position": model.geom_pos[at].tolist(),
+            "orientation": quaternion(model.geom_quat[at]),
+            "radius": float(model.geom_size[at, 0]),
+            **self.names.carrier(int(model.geom_bodyid[at]), "body"),
+        }
+        side = int(model.wrap_prm[k])
+        if side >= 0:
+            carrier = int(model.site_bodyid[side])
+            if carrier != model.geom_bodyid[at]:
+                place = {"position": model.site_pos[side].tolist(), **self.names.carrier(carrier, "body")}
+                wrap["side_point"] = place
+            else:
+                wrap["side"] = self._seen_from(at, side).tolist()
+        return wrap
+
+    def _seen_from(self, geom: int, site: int) -> Array:
+        """Return a site in the frame of a geom, at the model's reference."""
+        mujoco, model = self.mujoco, self.model
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        turned = data.geom_xmat[geom].reshape(3, 3)
+        return np.asarray(turned.T @ (data.site_xpos[site] - data.geom_xpos[geom]))

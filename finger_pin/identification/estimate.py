@@ -1,0 +1,257 @@
+"""The estimate: least squares with a noise for every signal, weighed by the number of its independent samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.identification.problem import Problem, minus_twice_likelihood, pooled
+from finger_pin.typing import Array
+
+# Rounds of steps and weights in turn; steps in each, and how many of them in a row may fail.
+_ROUNDS, _STEPS, _FAILS = 5, 40, 3
+# Where steps end, by how much minus twice the likelihood may still fall: of motions, whose own errors it feels, where
+# only means count, where it is felt, where it is hardly felt; and of closed forms.
+_ROUGHLY, _NEARLY, _GAIN, _EXACT = 1.0, 0.05, 1e-3, 1e-9
+# The longest step, of the range of a parameter.
+_FARTHEST = 0.3
+# Damping at first and at the least, of the information; how it falls and rises (Levenberg, Marquardt).
+_DAMPING, _LESS, _MORE = 1e-3, 0.2, 30.0
+# What a motion's own errors may hide of what a step gains: mostly, at the most, and of every sample where it is far
+# from what was recorded.
+_FEIGNED, _MOST_FEIGNED, _BY_SAMPLE = 0.05, 1.0, 1e-3
+# Parts of what a step promises: from what gain on it is taken; up to what error of it its slopes serve again, or bent
+# ones from what gain on.
+_TAKEN, _SERVED = 0.05, 0.3
+#: What a squared residual u counts for where outliers are to count less, and how fast that grows.
+LOSSES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
+    "linear": (lambda u: u, np.ones_like),
+    "soft_l1": (lambda u: 2.0 * (np.sqrt(1.0 + u) - 1.0), lambda u: 1.0 / np.sqrt(1.0 + u)),
+    "huber": (lambda u: np.where(u > 1.0, 2.0 * np.sqrt(u) - 1.0, u), lambda u: 1.0 / np.sqrt(np.maximum(u, 1.0))),
+    "cauchy": (np.log1p, lambda u: 1.0 / (1.0 + u)),
+    "arctan": (np.arctan, lambda u: 1.0 / (1.0 + u * u)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A minimum.
+
+    Attributes:
+        z: Search variables, shape (p,).
+        residuals: Of every signal.
+        noise: rms of the residuals of every signal, shape (s,).
+        correlation: Of neighbouring residuals, shape (s,).
+        weights: Part of the samples that are independent, (1 - rho) / (1 + rho), shape (s,) (Bartlett).
+        objective: Sum of w n log(SSE / n), outliers as they count.
+        slopes: Of every signal's residuals, those of the last step, which need not be of here; none without steps.
+    """
+
+    z: Array
+    residuals: Sequence[Array]
+    noise: Array
+    correlation: Array
+    weights: Array
+    objective: float
+    slopes: Sequence[Array] | None = None
+
+
+def fit(
+    problem: Problem,
+    start: Array,
+    *,
+    held: Mapping[int, float] | None = None,
+    weights: Array | None = None,
+    loss: str = "linear",
+    slopes: Sequence[Array] | None = None,
+    scale: Array | None = None,
+) -> Fit:
+    """Return the minimum that is reached from a start.
+
+    Args:
+        problem: The problem to fit.
+        start: Shape (p,), transformed.
+        held: Entries of z that stay as they are.
+        weights: Of the signals; by default they follow from the residuals at the end.
+        loss: One of `LOSSES`, for outliers.
+        slopes: Of the residuals near the start, to step with as long as they serve; by default those at the start.
+        scale: Beyond which residuals are outliers, of the signals; by default their rms.
+    """
+    z, free = start.copy(), np.ones(len(start), dtype=bool)
+    for k, value in (held or {}).items():
+        z[k], free[k] = value, False
+    z = problem.feasible(z, free)
+    shares = np.ones(len(problem.signals)) if weights is None else weights
+    residuals: Sequence[Array] = problem.residuals(z)
+    if not all(np.isfinite(e).all() for e in residuals):
+        # What cannot be integrated there is the worst of all minima.
+        nothing = np.zeros(len(residuals))
+        return Fit(z, residuals, nothing, nothing, nothing, math.inf)
+    for k in range(_ROUNDS if free.any() else 0):
+        before = z
+        z, residuals, slopes, ended = _descend(problem, z, residuals, free, shares, loss, slopes, scale)
+        if weights is not None or not ended or (k > 0 and z is before):
+            break
+        shares = _independent(problem, residuals)[1]
+    correlation, own = _independent(problem, residuals)
+    shares = own if weights is None else weights
+    noise = _noise(problem, residuals)
+    counted = _counted(residuals, noise if scale is None else scale, loss)[0]
+    objective = minus_twice_likelihood(counted, shares, problem.groups)
+    return Fit(z, residuals, noise, correlation, shares, objective, slopes)
+
+
+def _descend(
+    problem: Problem,
+    z: Array,
+    residuals: Sequence[Array],
+    free: NDArray[np.bool_],
+    shares: Array,
+    loss: str,
+    slopes: Sequence[Array] | None,
+    scale: Array | None,
+) -> tuple[Array, Sequence[Array], Sequence[Array], bool]:
+    """Return the place of the greatest likelihood, its residuals, the slopes of the last step, and success.
+
+    Steps are those of Gauss and Newton, damped. A run costs less than its slopes: these are made anew only where a
+    step does not gain what they promise. Of motions they are bent to agree with it while far from the end: over whole
+    steps the little leaps of a motion count less than in slopes at one place.
+    """
+    fresh, damping, failed = slopes is None, _DAMPING, 0
+    slopes = problem.slopes(z) if slopes is None else list(slopes)
+    moves = any(signal.ordered for signal in problem.signals)
+    gain = _GAIN if problem.finely else _ROUGHLY if problem.means else _NEARLY
+    enough, feigned = (gain, _FEIGNED) if moves else (_EXACT, 0.0)
+    count = float(sum(w * len(e) for w, e in zip(shares, residuals, strict=True)))
+    hidden = _MOST_FEIGNED if problem.finely else max(_MOST_FEIGNED, _BY_SAMPLE * count)
+    bending = moves and not problem.finely
+    for _ in range(_STEPS):
+        noise = _noise(problem, residuals) if scale is None else scale
+        met, inner, pull = _normal(problem, residuals, slopes, shares, noise, loss)
+        move, promised = _step(problem, z, free, inner, pull, damping)
+        if promised < 0.0:
+            # The bounds have cut it wrongly.
+            damping *= _MORE
+            continue
+        if promised < enough:
+            return z, residuals, slopes, True
+        there = problem.residuals(z + move)
+        sums = [minus_twice_likelihood(each, shares, problem.groups) for each in (met, _counted(there, noise, loss)[0])]
+        gained = sums[0] - sums[1]
+        taken, served = gained > _TAKEN * promised, abs(gained - promised) < _SERVED * promised + feigned
+        if bending:
+            served = gained > _SERVED * promised - feigned
+        if taken:
+            before = residuals
+            z, residuals, failed, damping = z + move, there, 0, max(damping * _LESS, _DAMPING)
+        elif fresh:
+            failed, damping = failed + 1, damping * _MORE
+        if failed > (_FAILS if promised > hidden else 0):
+            return z, residuals, slopes, promised <= hidden
+        if not taken and promised < feigned:
+            return z, residuals, slopes, True
+        if not served and (taken or not fresh):
+            slopes, fresh = problem.slopes(z), True
+        elif taken:
+            slopes, fresh = _bent(problem, slopes, move, before, there) if bending else slopes, False
+    return z, residuals, slopes, False
+
+
+def _bent(
+    problem: Problem, slopes: Sequence[Array], move: Array, before: Sequence[Array], after: Sequence[Array]
+) -> list[Array]:
+    """Return the slopes that agree with a step, and change the least (Broyden)."""
+    low, high = problem.box
+    way = move / (high - low) ** 2
+    way /= move @ way
+    return [j + np.outer(b - a - j @ move, way) for j, a, b in zip(slopes, before, after, strict=True)]
+
+
+def _normal(
+    problem: Problem, residuals: Sequence[Array], slopes: Sequence[Array], shares: Array, scale: Array, loss: str
+) -> tuple[Sequence[Array], Array, Array]:
+    """Return the weighed residuals, and half of the curvature and slope of minus twice the likelihood there."""
+    met, growth = _counted(residuals, scale, loss)
+    factors = shares / _noise(problem, met) ** 2
+    grown = [each[:, None] * j for each, j in zip(growth, slopes, strict=True)]
+    inner = sum(f * j.T @ j for f, j in zip(factors, grown, strict=True))
+    pull = sum(f * j.T @ e for f, j, e in zip(factors, grown, met, strict=True))
+    return met, np.asarray(inner), np.asarray(pull)
+
+
+def _step(
+    problem: Problem, z: Array, free: NDArray[np.bool_], inner: Array, pull: Array, damping: float
+) -> tuple[Array, float]:
+    """Return a step within the bounds, and the fall of minus twice the likelihood with it to second order."""
+    low, high = problem.box
+    width = high - low
+    size = np.diag(inner) * width**2
+    damped = inner + np.diag(damping * np.maximum(size, 1e-12 * np.max(size)) / width**2)
+    move = np.zeros(len(z))
+    loose = free & ~((z <= low) & (pull > 0.0)) & ~((z >= high) & (pull < 0.0))
+    while loose.any():
+        rest = pull[loose] + inner[np.ix_(loose, ~loose)] @ move[~loose]
+        scaled = damped[np.ix_(loose, loose)] * np.outer(width[loose], width[loose])
+        move[loose] = -width[loose] * (np.linalg.pinv(scaled, rcond=1e-14, hermitian=True) @ (width[loose] * rest))
+        beyond = loose & ((z + move < low) | (z + move > high))
+        move = np.clip(z + move, low, high) - z if beyond.any() else move
+        if not beyond.any():
+            break
+        loose &= ~beyond
+    move *= min(1.0, _FARTHEST / max(float(np.max(np.abs(move) / width, initial=0.0)), 1e-300))
+    move = problem.feasible(z + move, free) - z
+    return move, -float(2.0 * pull @ move + move @ inner @ move)
+
+
+def _counted(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[Array], list[Array]]:
+    """Return the weighed residuals, the sum of their squares, and their derivatives by the residuals."""
+    if loss == "linear":
+        return list(residuals), [np.ones(len(e)) for e in residuals]
+    rho, growth = LOSSES[loss]
+    counted, factors = [], []
+    for e, n in zip(residuals, scale, strict=True):
+        u = np.maximum((e / n) ** 2, 1e-12)
+        ratio = np.sqrt(rho(u) / u)
+        counted.append(ratio * e)
+        factors.append(growth(u) / ratio)
+    return counted, factors
+
+
+def best_of(problem: Problem, fits: Sequence[Fit]) -> Fit:
+    """Return the minimum at which the recordings are met best, all samples counted alike."""
+    alike = np.ones(len(problem.signals))
+    return min(fits, key=lambda each: minus_twice_likelihood(each.residuals, alike, problem.groups))
+
+
+def information(problem: Problem, found: Fit) -> Array:
+    """Return the Fisher information of z at a minimum, shape (p, p)."""
+    slopes = problem.slopes(found.z)
+    factors = found.weights / found.noise**2
+    total: Array = sum(f * j.T @ j for f, j in zip(factors, slopes, strict=True))
+    return total
+
+
+def _noise(problem: Problem, residuals: Sequence[Array]) -> Array:
+    """Return the rms of the residuals of every output, never less than its rounding."""
+    groups = problem.groups
+    count, square = pooled(residuals, np.ones(len(residuals)), groups)
+    rms = np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
+    least = [1e-9 * max(float(np.max(np.abs(s.measured), initial=0.0)), 1e-9) for s in problem.signals]
+    return np.maximum(rms, least)
+
+
+def _independent(problem: Problem, residuals: Sequence[Array]) -> tuple[Array, Array]:
+    """Return the correlation of neighbouring residuals of every output, and the share that is independent."""
+    groups, rho = problem.groups, np.zeros(len(residuals))
+    for group in np.unique(groups):
+        places = np.flatnonzero(groups == group).tolist()
+        own = [k for k in places if problem.signals[k].ordered and len(residuals[k]) > 2]
+        size = sum(float(residuals[k] @ residuals[k]) for k in own)
+        together = sum(float(residuals[k][1:] @ residuals[k][:-1]) for k in own)
+        count = sum(len(residuals[k]) for k in own)
+        rho[groups == group] = np.clip(together / size, 0.0, 1.0 - 2.0 / count) if size > 0.0 else 0.0
+    return rho, (1.0 - rho) / (1.0 + rho)

@@ -1,0 +1,184 @@
+"""Identification: from recordings to the numbers of a scenario, with intervals."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from finger_pin.description.loading import ScenarioLike, load_bench
+from finger_pin.description.recordings.bench import IdentifySettings
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.identification.checkpoint import Checkpoint, digest
+from finger_pin.identification.comparison import other_laws
+from finger_pin.identification.estimate import LOSSES, fit
+from finger_pin.identification.motions import RecordedMotion, windows
+from finger_pin.identification.pipeline import FitPipeline, Progress, starting_points
+from finger_pin.identification.problem import Problem, RecordingModel, Stopped
+from finger_pin.identification.recordings import RecordedSignal, Recording, read_recording, unit_of
+from finger_pin.identification.results import results, write_results
+from finger_pin.identification.steady_data import SteadyReadings
+from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.studies.fingerprint import finger_digest
+from finger_pin.typing import Array
+
+Data = Mapping[str, Mapping[str, Any]]
+
+
+def identify(
+    bench: ScenarioLike,
+    *,
+    parameters: Mapping[str, Sequence[float]] | None = None,
+    recordings: Mapping[str, Mapping[str, Any]] | None = None,
+    compare: Mapping[str, Mapping[str, Any]] | None = None,
+    data: Data | None = None,
+    finger: FingerLike | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    output: str | Path | None = None,
+    starts: int = 3,
+    seed: int = 0,
+    loss: str = "linear",
+    restart: bool = False,
+    progress: Progress | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> xr.Dataset:
+    """Find the numbers with which a scenario fits its recordings, with intervals by the profile likelihood.
+
+    Every signal has a noise of its own, estimated with the parameters. Neighbouring residuals of a motion are
+    correlated: n of them count as n (1 - rho) / (1 + rho) (Bartlett). Parameters whose least value is positive are
+    searched for as logarithms, from the scenario's own numbers and from the best of a Latin hypercube.
+
+    Args:
+        bench: Name of a bench or scenario that ships, or path of a TOML file; its table ``[identify]`` says the rest.
+            Or a scenario: then `parameters` and `recordings` say it all.
+        parameters: By dotted key, the least and the greatest value; on top of the table's, as the next two.
+        recordings: By name, entries as in a file.
+        compare: By name, other laws: keys with a number that is held, or with bounds.
+        data: By name of a recording, columns by name, in place of its file.
+        finger: Replaces the finger that the scenario describes, as for `fp.simulate`; in steady readings its numbers
+            count.
+        overrides: Values by dotted key, as for `load_scenario`.
+        output: Folder for ``identification.nc``, ``identified.toml`` and ``identification.html``; work that is done is
+            kept there too, so that the same call goes on where another was stopped.
+        starts: From how many points to search.
+        seed: Of those points.
+        loss: ``linear``, or where outliers are to count less ``soft_l1``, ``huber``, ``cauchy`` or ``arctan``, as of
+            `scipy.optimize.least_squares`.
+        restart: Whether to forget what the folder holds of this.
+        progress: Called with what is being done, how much of it is finished, and how much there is.
+        stop: Asked now and then; when it returns true the best so far is returned, attribute ``unfinished``.
+
+    Returns:
+        Along ``parameter``: ``estimate``, ``lower`` and ``upper`` at 95 %, infinite where open, ``determined``,
+        ``units``, ``correlation``, profiles; along ``signal`` noise and correlation; along ``sample`` what was measured
+        and the residuals; along ``law`` what `compare` found. Attribute ``undetermined``: what the recordings leave
+        open, in words.
+
+    Raises:
+        InputError: If the table or a recording is wrong, there are fewer readings than parameters, or a parameter is
+            felt by no output.
+        OSError: If the folder cannot be written.
+    """
+    if loss not in LOSSES:
+        raise InputError("loss", f"must be one of {', '.join(LOSSES)}", loss)
+    given = {"parameters": parameters, "recordings": recordings, "compare": compare}
+    entries = {name: {key: _plain(each) for key, each in table.items()} for name, table in given.items() if table}
+    scenario, settings = load_bench(bench, overrides, entries)
+    own = resolve_finger(finger, scenario)
+    scenario = with_finger(scenario, own)
+    taken = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
+    problem = build_problem(scenario, settings, taken, own)
+    other_laws(problem, settings)  # Before any work: an entry that is wrong in them is refused now.
+    problem.stop = _latched(stop or (lambda: False))
+    asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
+    with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
+        work = FitPipeline(problem, ledger, loss, progress)
+        result = _work(problem, settings, starting_points(problem, starts, seed), starts, work)
+        result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
+        if output is not None:
+            write_results(result, Path(output), bench, problem)
+    return result
+
+
+def build_problem(
+    scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording], finger: Finger | None = None
+) -> Problem:
+    """Return the problem whose objective is to be minimised.
+
+    Raises:
+        InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
+    """
+    models: list[RecordingModel] = []
+    signals: list[RecordedSignal] = []
+    for recording in taken:
+        if recording.settings.kind == "steady":
+            models.append(SteadyReadings(recording, scenario))
+            parts = [np.arange(len(recording.speed))]
+        else:
+            parts = list(windows(recording))
+            models += [RecordedMotion(recording, scenario, rows, k, finger) for k, rows in enumerate(parts)]
+        signals += [
+            _signal(recording, name, values, rows) for rows in parts for name, values in recording.outputs.items()
+        ]
+    low, high = np.array(list(settings.parameters.values()), dtype=float).T
+    count = sum(len(signal.measured) for signal in signals)
+    if count <= len(low):
+        raise InputError("identify.recordings", f"have {count} readings for {len(low)} parameters: more are needed")
+    return Problem(scenario, tuple(settings.parameters), low, high, models, signals, {})
+
+
+def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.intp]) -> RecordedSignal:
+    later = recording.time[rows] - recording.time[rows[0]] >= recording.settings.settle
+    there = np.flatnonzero(np.isfinite(values[rows]) & (later | (recording.settings.kind == "steady")))
+    at = rows[there]
+    steady = recording.settings.kind == "steady"
+    loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
+    load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
+    instant = np.arange(len(values), dtype=float) if steady else recording.time
+    given = np.stack([*recording.inputs.values(), recording.speed, recording.time], axis=1)
+    alike = np.unique(given[at], axis=0, return_inverse=True)[1].ravel()
+    return RecordedSignal(
+        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], alike, ordered=not steady
+    )
+
+
+def _work(
+    problem: Problem, settings: IdentifySettings, places: Sequence[Array], starts: int, work: FitPipeline
+) -> xr.Dataset:
+    unfinished = ""
+    try:
+        work.search(work.screen_starts(places, starts))
+        work.profile_all(work.best)
+        work.compare(settings)
+    except Stopped:
+        unfinished = "interrupted: the best so far, and the intervals that are finished"
+        problem.stop = lambda: False
+        if not work.fits:
+            reached = problem.best[1] if len(problem.best[1]) else problem.start
+            work.fits.append(fit(problem, reached, held=dict(enumerate(reached))))
+    return results(problem, work.fits, work.best, work.sides, work.spread, work.comparison, unfinished)
+
+
+def _latched(stop: Callable[[], bool]) -> Callable[[], bool]:
+    """Return a stop that stays true once it has been: threads end together."""
+    told = threading.Event()
+
+    def asked() -> bool:
+        if not told.is_set() and stop():
+            told.set()
+        return told.is_set()
+
+    return asked
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, tuple | np.ndarray) else value

@@ -1,0 +1,147 @@
+"""Intervals by the profile likelihood, and the directions in which a recording leaves the parameters free."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.identification.estimate import Fit, fit, information
+from finger_pin.identification.problem import Problem
+from finger_pin.typing import Array
+
+#: 95 % of the chi-squared distribution with one degree of freedom.
+LEVEL = 3.841
+# Where the search for an end stops: so near to the level that the root of the rise is straight, or after so many fits.
+_NEAR, _MOST = 0.06, 8
+# How far below the minimum another one must be to count as one: more than a motion's own errors feign.
+_BELOW = 0.2
+# A direction is free where its standard deviation is this part of the range that was given, or more.
+_FREE = 0.25
+# Entries of a direction that are not worth a word, of the largest.
+_SMALL = 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileBound:
+    """One end of an interval.
+
+    Attributes:
+        end: z there; infinite where the recording does not close it within the bounds.
+        path: Points of the profile, shape (k, 2): z and the rise of minus twice the likelihood.
+        better: A minimum below the one that it started from, if one turned up.
+    """
+
+    end: float
+    path: Array
+    better: Fit | None = None
+
+
+def covariance(problem: Problem, found: Fit) -> Array:
+    """Return the linearised covariance of z, shape (p, p); a pseudo-inverse for free directions."""
+    low, high = problem.box
+    width = high - low
+    scaled = information(problem, found) * np.outer(width, width)
+    return np.asarray(np.linalg.pinv(scaled, rcond=1e-14, hermitian=True) * np.outer(width, width))
+
+
+def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss: str = "linear") -> ProfileBound:
+    """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841.
+
+    Args:
+        problem: The problem that was fitted.
+        found: Its minimum.
+        k: Which parameter.
+        way: 1 for the upper end, -1 for the lower.
+        spread: Covariance of z.
+        loss: As for `fit`.
+    """
+    low, high = problem.box
+    limit = high[k] if way > 0 else low[k]
+    room = abs(limit - found.z[k])
+    deviation = math.sqrt(max(spread[k, k], 0.0))
+    tilt = spread[:, k] / spread[k, k] if spread[k, k] > 0.0 else np.zeros(len(found.z))
+    path = [(float(found.z[k]), 0.0)]
+    reach = min(room, max(math.sqrt(LEVEL) * deviation, 1e-6 * (high[k] - low[k])))
+    inner, outer = (0.0, 0.0), (math.inf, math.inf)
+    slopes: Sequence[Array] = problem.slopes(found.z)
+    there, end = found, math.inf * way
+    for _ in range(_MOST if room > 1e-9 * (high[k] - low[k]) else 0):
+        at = found.z[k] + way * reach
+        guess = np.clip(there.z + tilt * (at - there.z[k]), low, high)
+        same = {"weights": found.weights, "scale": found.noise}
+        there = fit(problem, guess, held={k: at}, loss=loss, slopes=slopes, **same)
+        slopes, rise = there.slopes or slopes, there.objective - found.objective
+        path.append((at, rise))
+        if rise < -_BELOW:
+            return ProfileBound(end, np.array(path), there)
+        if rise >= LEVEL:
+            outer = (reach, math.sqrt(rise))
+        else:
+            inner = (reach, math.sqrt(max(rise, 0.0)))
+            if reach >= room * (1.0 - 1e-12):
+                break
+        crossing, near = _crossing(inner, outer), abs(rise - LEVEL) < _NEAR * LEVEL
+        if near or math.isfinite(outer[0]):
+            end = found.z[k] + way * min(crossing, room)
+        if near:
+            break
+        further = 0.0 if math.isfinite(outer[0]) else max(1.2 * inner[0], 1e-6 * room)
+        reach = min(room, max(crossing, further))
+    return ProfileBound(end, np.array(path))
+
+
+def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
+    """Return the crossing of the rise's root, nearly straight, with the level's, from points on either side."""
+    target = math.sqrt(LEVEL)
+    if math.isinf(outer[1]) and math.isfinite(outer[0]):
+        return 0.5 * (inner[0] + outer[0])
+    if math.isinf(outer[0]):
+        return inner[0] * min(4.0, target / max(inner[1], 1e-3))
+    return inner[0] + (target - inner[1]) / (outer[1] - inner[1]) * (outer[0] - inner[0])
+
+
+def free_directions(problem: Problem, found: Fit) -> list[tuple[str, list[int]]]:
+    """Return the combinations that the recordings leave open, in words and with their parameters; sorted."""
+    low, high = problem.box
+    width = high - low
+    values, vectors = np.linalg.eigh(information(problem, found) * np.outer(width, width))
+    found_free = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if 1.0 / math.sqrt(max(value, 1e-300)) >= _FREE:
+            direction = vector * width
+            size = np.abs(direction) / np.max(np.abs(direction))
+            shown = [k for k in range(len(size)) if size[k] > _SMALL]
+            found_free.append((_in_words(problem, direction, shown), shown))
+    return found_free
+
+
+def _in_words(problem: Problem, direction: Array, shown: list[int]) -> str:
+    """Return a direction of z in words."""
+    size = np.abs(direction) / np.max(np.abs(direction))
+    names = [problem.keys[k] for k in shown]
+    if len(shown) == 1:
+        return f"{names[0]} is not determined: the recording hardly feels it"
+    if len(shown) == 2 and all(problem.logarithmic[shown]) and min(size[shown]) > 0.8:
+        alike = direction[shown[0]] * direction[shown[1]] > 0.0
+        what = "quotient" if alike else "product"
+        return f"of {names[0]} and {names[1]} only the {what} is determined"
+    return (
+        f"only a combination of {_listed(names)} is determined: {_example(problem, direction, shown)} changes nothing"
+    )
+
+
+def _example(problem: Problem, direction: Array, shown: Sequence[int]) -> str:
+    first = shown[0]
+    step = direction / direction[first] * (math.log(1.1) if problem.logarithmic[first] else 1.0)
+    parts = []
+    for k in shown:
+        change = f"times {math.exp(step[k]):.3g}" if problem.logarithmic[k] else f"plus {step[k]:.3g}"
+        parts.append(f"{problem.keys[k]} {change}")
+    return " with ".join(parts)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"

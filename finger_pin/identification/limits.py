@@ -1,0 +1,100 @@
+"""What the numbers of a scenario allow each other within bounds, such as a stiction that is not below Coulomb's."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
+
+# How near to the edge, over the way to a corner; of how many numbers all corners are tried.
+_NEAR_EDGE, _FEW = 1e-9, 8
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Bounds of numbers, and the scenarios that they make.
+
+    Attributes:
+        family: The scenarios.
+        low: Least values, shape (p,).
+        high: Greatest values, shape (p,).
+    """
+
+    family: ParametrisedScenario
+    low: Array
+    high: Array
+
+    @classmethod
+    def checked(cls, family: ParametrisedScenario, low: Array, high: Array) -> Limits:
+        """Return limits; refuse a bound outside its own range, and all of them if no values within them go together.
+
+        Raises:
+            InputError: Naming the key, its bound and what is wrong with it.
+        """
+        self = cls(family, low, high)
+        keys, middle = family.keys, 0.5 * (self.low + self.high)
+        anywhere = any(self.refusal(each) is None for each in self._corners(middle, np.ones(len(keys), dtype=bool)))
+        for k, key in enumerate(keys):
+            alone = ParametrisedScenario(self.family.scenario, (key,))
+            for bound in (self.low[k], self.high[k]):
+                try:
+                    alone.with_values([float(bound)])
+                except InputError as error:
+                    at, free = middle.copy(), np.arange(len(keys)) != k
+                    at[k] = bound
+                    found = {self.refusal(each) for each in (at, *self._corners(at, free))}
+                    # What is wrong with it alone is the same beside any others.
+                    between = len(found) > 1 or any(each and each[0] in keys and each[0] != key for each in found)
+                    if not (between and anywhere):
+                        allowed = error.allowed if error.entry == key else f"with it {error.entry} {error.allowed}"
+                        raise InputError(f"identify.parameters.{key}", allowed, float(bound)) from None
+        return self
+
+    def refusal(self, values: Array) -> tuple[str, str] | None:
+        """Return the entry that does not go with the others, and what it must be; None if all are allowed."""
+        try:
+            self.family.with_values(values.tolist())
+        except InputError as error:
+            return error.entry, error.allowed
+        return None
+
+    def nearest(self, values: Array, free: NDArray[np.bool_] | None = None) -> Array:
+        """Return allowed values on the way to a corner of the bounds, to a near one first; the same if there are none.
+
+        Args:
+            values: Shape (p,).
+            free: Which of them may change; all by default.
+        """
+        if self.refusal(values) is None:
+            return values
+        corners = self._corners(values, np.ones(len(values), dtype=bool) if free is None else free)
+        corner = next((each for each in corners if self.refusal(each) is None), None)
+        if corner is None:
+            return values
+        out, into = 0.0, 1.0
+        while into - out > _NEAR_EDGE:
+            middle = 0.5 * (out + into)
+            allowed = self.refusal(values + middle * (corner - values)) is None
+            out, into = (out, middle) if allowed else (middle, into)
+        return values + into * (corner - values)
+
+    def _corners(self, values: Array, free: NDArray[np.bool_]) -> Iterator[Array]:
+        """Yield values with one number at a bound, the nearest first, then those of a few with all of them there."""
+        places = np.flatnonzero(free)
+        ends = [(k, end) for k in places for end in (self.low[k], self.high[k])]
+        ends.sort(key=lambda each: abs(each[1] - values[each[0]]) / (self.high[each[0]] - self.low[each[0]]))
+        for k, end in ends:
+            corner = values.copy()
+            corner[k] = end
+            yield corner
+        for both in itertools.product((False, True), repeat=len(places)) if len(places) <= _FEW else ():
+            corner = values.copy()
+            corner[places] = np.where(both, self.high[places], self.low[places])
+            yield corner

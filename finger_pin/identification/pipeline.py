@@ -1,0 +1,266 @@
+"""The search, piece by piece: its starts, its ends, and their intervals; finished pieces are kept."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+import scipy
+
+from finger_pin.core.threads import in_threads
+from finger_pin.description.recordings.bench import IdentifySettings
+from finger_pin.exceptions import InputError
+from finger_pin.identification.checkpoint import Checkpoint
+from finger_pin.identification.comparison import LawComparison, compare_laws
+from finger_pin.identification.estimate import Fit, best_of, fit
+from finger_pin.identification.intervals import ProfileBound, covariance, profile
+from finger_pin.identification.problem import Problem, minus_twice_likelihood
+from finger_pin.typing import Array
+
+# Directions that samples tell so much more surely than means over cycles do, and how many of them are looked along.
+_SURER, _MOST = 4.0, 2
+# How far, in deviations by the means and at the most in those by the samples, and how closely.
+_FAR, _FARTHEST, _APART = 3.0, 30.0, 3.0
+# What keeps directions that nothing tells from being divided by.
+_LITTLE, _LEAST = 1e-4, 1e-12
+
+#: Called with what is being done, how much of it is finished, and how much there is.
+Progress = Callable[[str, int, int], None]
+_Found = TypeVar("_Found")
+# So many places are tried for each further search, by one evaluation each; by how much minus twice the likelihood jumps
+# where the motion hunts, for a change of this part of the bounds.
+_TRIED, _JUMP, _TINY = 4, 10.0, 1e-5
+# By how much more than the best a rough search misses the recordings that is given up.
+_HOPELESS = 100.0
+# From how many valleys beside the best place searches go on, and how much deeper one must be.
+_VALLEYS, _DEEPER = 2, 1.0
+
+
+class FitPipeline:
+    """The work of an identification, piece by piece; pieces that are finished when it is stopped count."""
+
+    def __init__(self, problem: Problem, ledger: Checkpoint, loss: str, progress: Progress | None) -> None:
+        """Begin; nothing is done yet."""
+        self.problem, self.ledger, self.loss = problem, ledger, loss
+        self.tell = progress or (lambda words, done, total: None)
+        self.fits: list[Fit] = []
+        self.middle: Fit | None = None
+        self.sides: dict[tuple[int, int], ProfileBound] = {}
+        self.spread: Array | None = None
+        self.comparison: LawComparison | None = None
+
+    @property
+    def best(self) -> Fit:
+        """The start of the profiles; before them, the place of the best fit."""
+        return self.middle or best_of(self.problem, self.fits)
+
+    def screen_starts(self, places: Sequence[Array], count: int) -> list[Array]:
+        """Return the first place, and those of the others with the best fit.
+
+        Where the motion hunts there are no slopes to follow: such places come last.
+        """
+
+        def misfit(problem: Problem, z: Array) -> float:
+            return _met(problem, problem.residuals(z))
+
+        problem, others = self.problem.rough() if self._moves else self.problem, len(places) - 1
+        found = self._side_by_side("trying starts", lambda item: misfit(item[1], places[1 + item[0]]), others, problem)
+        order = np.argsort(found, kind="stable").tolist()
+        tiny = _TINY * np.subtract(*self.problem.box)
+
+        def hunts(item: tuple[int, Problem]) -> bool:
+            k = order[item[0]]
+            return not abs(misfit(item[1], places[1 + k] + tiny) - found[k]) < _JUMP
+
+        near = order[: 2 * (count - 1)] if self._moves else []
+        hunting = dict(zip(near, self._side_by_side("trying starts", hunts, len(near), problem), strict=True))
+        return [places[0], *(places[1 + k] for k in sorted(order, key=lambda k: hunting.get(k, True))[: count - 1])]
+
+    def search(self, starts: Sequence[Array]) -> None:
+        """Search from all starts, of motions roughly first, and go on from the promising ends."""
+        given, starts, hopeless = starts, *self._roughly(starts)
+        found: dict[int, Fit] = {}
+
+        def one(item: tuple[int, Problem]) -> None:
+            k, twin = item
+            work = partial(fit, twin, self.ledger.reached(f"start {k}", starts[k]), loss=self.loss)
+            found[k] = self.ledger.fit(f"start {k}", twin, work)
+
+        try:
+            self._side_by_side("searching", one, len(starts))
+        finally:
+            self.fits += [found[k] for k in sorted(found)]
+        self.fits += [fit(self.problem, z, held=dict(enumerate(z))) for z in hopeless]
+        if not np.isfinite(self.best.objective):
+            raise InputError(
+                "identify.recordings", "the motion fails wherever the search starts; narrow the parameters"
+            )
+        _check_felt(self.problem, self.fits, given)
+        if self._moves:
+            self._cross()
+
+    def _roughly(self, starts: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
+        """Return the ends of rough searches: those that may be near the best place, and the others."""
+        if not self._moves:
+            return starts, []
+        rough, found = self.problem.rough(), dict[int, Fit]()
+
+        def one(item: tuple[int, Problem]) -> None:
+            k, twin = item
+            work = partial(fit, twin, self.ledger.reached(f"rough {k}", starts[k]), loss=self.loss)
+            found[k] = self.ledger.fit(f"rough {k}", twin, work)
+
+        self._side_by_side("searching roughly", one, len(starts), rough)
+        met = {k: _met(rough, found[k].residuals) for k in sorted(found)}
+        near = [k for k in met if met[k] <= min(met.values()) + _HOPELESS]
+        return [found[k].z for k in near], [found[k].z for k in met if k not in near]
+
+    def _cross(self) -> None:
+        """Go on from the best place to a deeper valley beside it, as long as there is one."""
+        words = "looking beside the best place"
+        for turn in itertools.count():
+            best, number = self.best, self.fits.index(self.best)
+            lines = beside(self.problem, best.z)
+            places = [place for line in lines for place in line]
+
+            def misfit(item: tuple[int, Problem], places: Sequence[Array] = places) -> float:
+                return _met(item[1], item[1].residuals(places[item[0]]))
+
+            found = lowest(lines, self._side_by_side(words, misfit, len(places)), _VALLEYS + 1)
+            near = [z for z in found if not np.array_equal(z, best.z)][:_VALLEYS]
+
+            def one(item: tuple[int, Problem], near: Sequence[Array] = near, turn: int = turn) -> Fit:
+                k, twin = item
+                return self.ledger.fit(f"valley {turn} {k}", twin, partial(fit, twin, near[k], loss=self.loss))
+
+            self.fits[number] = best_of(self.problem, [best, *self._side_by_side(words, one, len(near))])
+            if _met(self.problem, self.best.residuals) > _met(self.problem, best.residuals) - _DEEPER:
+                return
+
+    @property
+    def _moves(self) -> bool:
+        """Whether a recording is of a motion."""
+        return any(signal.ordered for signal in self.problem.signals)
+
+    def profile_all(self, place: Fit, turn: int = 0) -> None:
+        """Follow all profiles from near a place; from a lower minimum, if one turns up on the way, all over again."""
+        fine, number = self.problem.fine(), self.fits.index(self.best)
+        best = self.fits[number] = self.middle = fit(fine, place.z, loss=self.loss, slopes=place.slopes)
+        self.spread = covariance(fine, best)
+        self.problem.join(fine)
+        ends = [(k, way) for k in range(self.problem.asked) for way in (-1, 1)]
+
+        def one(item: tuple[int, Problem]) -> Fit | None:
+            (k, way), twin, spread = ends[item[0]], item[1], self.spread
+            assert spread is not None
+            work = partial(profile, twin, best, k, way, spread, self.loss)
+            side = self.ledger.side(f"side {k} {way} {turn}", work)
+            if side.better is None:
+                self.sides[k, way] = side
+            return side.better
+
+        found = self._side_by_side("following the likelihood", one, len(ends), fine)
+        better = [each for each in found if each is not None]
+        if better:
+            self.sides.clear()
+            self.profile_all(min(better, key=lambda each: each.objective), turn + 1)
+
+    def _side_by_side(
+        self, words: str, task: Callable[[tuple[int, Problem]], _Found], count: int, problem: Problem | None = None
+    ) -> list[_Found]:
+        """Do a task by number, each with a problem of its own; tasks with runs in threads."""
+        twins, finished = [(problem or self.problem).alone() for _ in range(count)], itertools.count(1)
+        self.tell(words, 0, count)
+
+        def one(item: tuple[int, Problem]) -> _Found:
+            found = task(item)
+            self.tell(words, next(finished), count)
+            return found
+
+        items = list(enumerate(twins))
+        try:
+            return in_threads(one, items) if self._moves else [one(item) for item in items]
+        finally:
+            for twin in twins:
+                self.problem.join(twin)
+
+    def compare(self, settings: IdentifySettings) -> None:
+        """Fit other laws, if there are any."""
+        if settings.compare:
+            self.tell("comparing laws", 0, 1)
+            work = partial(compare_laws, self.problem, settings, self.best)
+            self.comparison = self.ledger.comparison(work)
+
+
+def starting_points(problem: Problem, count: int, seed: int) -> list[Array]:
+    """Return the points to start from, in turn: the scenario's own numbers, and a Latin hypercube to choose from."""
+    low, high = problem.box
+    rng = np.random.default_rng(seed)
+    further = _TRIED * max(count - 1, 0)
+    cells = np.array([rng.permutation(further) for _ in low]).T + rng.uniform(size=(further, len(low)))
+    return [problem.start, *map(problem.feasible, low + (high - low) * cells / max(further, 1))]
+
+
+def _met(problem: Problem, residuals: Sequence[Array]) -> float:
+    """Return minus twice the likelihood, all samples counted alike; infinite if a motion fails."""
+    there = all(np.isfinite(each).all() for each in residuals)
+    return minus_twice_likelihood(residuals, np.ones(len(residuals)), problem.groups) if there else np.inf
+
+
+def _check_felt(problem: Problem, fits: Sequence[Fit], places: Sequence[Array]) -> None:
+    felt = np.zeros(len(problem.keys), dtype=bool)
+    known = (each.slopes or problem.slopes(each.z) for each in fits)
+    for by_signal in itertools.chain(known, map(problem.slopes, places)):
+        for signal, slopes in zip(problem.signals, by_signal, strict=True):
+            size = max(float(np.max(np.abs(signal.measured))), 1e-300)
+            low, high = problem.box
+            felt |= np.any(np.abs(slopes) * (high - low) > 1e-9 * size, axis=0)
+        if felt.all():
+            return
+    key = problem.keys[int(np.flatnonzero(~felt)[0])]
+    raise InputError(f"identify.parameters.{key}", "no output of any recording feels it; leave it out")
+
+
+def beside(problem: Problem, z: Array) -> list[Array]:
+    """Return lines of places through a minimum, shape (k, p) each, in directions that are known by cycles alone.
+
+    What cycles tell has a minimum for each of them; what means over cycles tell leaves so many of these open.
+    """
+    residuals, slopes = problem.residuals(z), problem.slopes(z)
+    low, high = problem.box
+    size = np.outer(high - low, high - low)
+    by_samples, by_means = (
+        size * sum(j.T @ j / max(float(np.mean(e * e)), 1e-300) for e, j in zip(*each, strict=True))
+        for each in ((residuals, slopes), (problem.averaged(residuals), problem.averaged(slopes)))
+    )
+    least = _LITTLE * by_samples + _LEAST * np.trace(by_samples) * np.eye(len(z))
+    values, vectors = scipy.linalg.eigh(by_samples, by_means + least)
+    lines = []
+    for value, vector in zip(values[-_MOST:], vectors.T[-_MOST:], strict=True):
+        if value < _SURER**2:
+            continue
+        one = (high - low) * vector / np.sqrt(vector @ by_samples @ vector)
+        count = int(min(_FAR * np.sqrt(value), _FARTHEST) / _APART)
+        places = z + _APART * np.arange(-count, count + 1)[:, None] * one
+        lines.append(places[np.all((places >= low) & (places <= high), axis=1)])
+    return lines
+
+
+def lowest(lines: Sequence[Array], met: Sequence[float], count: int) -> list[Array]:
+    """Return the places of lines, lowest first, from which it rises to either side: at their ends, to one.
+
+    Args:
+        lines: Places, shape (k, p) each.
+        met: How badly the recordings are met at all of them in turn.
+        count: Of how many at the most.
+    """
+    found, first = [], 0
+    for line in lines:
+        values = np.array([np.inf, *met[first : first + len(line)], np.inf])
+        first += len(line)
+        dips = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] < values[2:]))
+        found += [(values[1 + k], line[k]) for k in dips]
+    return [place for _, place in sorted(found, key=lambda each: each[0])[:count]]

@@ -1,0 +1,304 @@
+"""The problem of an identification: parameters, bounds, and residuals of its recordings."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.identification.limits import Limits
+from finger_pin.identification.recordings import RecordedSignal
+from finger_pin.typing import Array
+
+# Errors of what is computed finely and roughly, of those asked for; means of every output that roughly count.
+_FINER, _ROUGHER, _MEANS = 0.1, 10.0, 40
+#: What may be found of an output itself, besides the scenario's numbers.
+OF_OUTPUTS = ("offset", "scale", "delay")
+
+
+@dataclass(frozen=True)
+class NuisanceParameter:
+    """A number of a recording's own that is found beside the parameters, such as the start of a joint."""
+
+    key: str
+    low: float
+    high: float
+    start: float
+
+
+#: Maps values to a scenario, and to the numbers that belong to a recording, by key.
+At = Callable[[Array], tuple[Scenario, dict[str, float]]]
+
+
+class RecordingModel(Protocol):
+    """A recording, or a part of it, beside a scenario."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario with the recording's inputs."""
+
+    @property
+    def own(self) -> tuple[NuisanceParameter, ...]:
+        """The numbers to be found for it alone."""
+
+    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
+        """Return the computed values of every output, shape (m,) each."""
+
+    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
+        """Return the derivatives of that by the values, shape (m, p) each, by changes of given sizes."""
+
+    def tune(self, factor: float) -> None:
+        """Compute from now on with the errors asked for times a factor."""
+
+
+def own_number(own: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0) -> float:
+    """Return the offset, scale or delay of an output that is being found."""
+    return own.get(f"recordings.{recording}.{output}.{what}", default)
+
+
+class Stopped(Exception):
+    """Somebody asked for an end."""
+
+
+@dataclass(eq=False)
+class Problem:
+    """Recordings and the parameters to be found in them; positive ones are searched for as logarithms.
+
+    Attributes:
+        scenario: Scenario with all other numbers.
+        keys: Dotted keys.
+        low: Least values.
+        high: Greatest values.
+        models: A model for each recording.
+        signals: All outputs, in the order of the models.
+        held: Numbers that the scenario is given first, by key.
+        stop: Asked before every evaluation.
+        evaluations: Number of scenarios computed.
+        best: The least objective so far, and where.
+        finely: Whether the errors of what is computed are smaller than the scenario asks.
+        means: Of how many samples in a row, at the most, the mean is met in place of each, by signal; none: of one.
+    """
+
+    scenario: Scenario
+    keys: tuple[str, ...]
+    low: Array
+    high: Array
+    models: Sequence[RecordingModel]
+    signals: Sequence[RecordedSignal]
+    held: Mapping[str, float]
+    stop: Callable[[], bool] = lambda: False
+    evaluations: int = 0
+    best: tuple[float, Array] = (math.inf, np.zeros(0))
+    finely: bool = False
+    means: Sequence[int] = ()
+
+    def __post_init__(self) -> None:
+        """Check that every key allows its bounds; numbers of the recordings' own join the parameters."""
+        self.asked = len(self.keys)
+        self._slopes: tuple[Array, list[Array]] | None = None
+        further = [own for model in self.models for own in model.own if own.key not in self.keys]
+        self.keys = (*self.keys, *(own.key for own in further))
+        self.low = np.append(self.low, [own.low for own in further])
+        self.high = np.append(self.high, [own.high for own in further])
+        outputs = {f"{s.recording}.{s.name}" for s in self.signals}
+        self._numbers = np.array([k for k, key in enumerate(self.keys) if not key.startswith("recordings.")], dtype=int)
+        for key in self.keys[: self.asked]:
+            name, _, what = key.removeprefix("recordings.").rpartition(".")
+            if key.startswith("recordings.") and not (name in outputs and what in OF_OUTPUTS):
+                allowed = f"must be recordings.NAME.variable.label and .{', .'.join(OF_OUTPUTS)}; there are"
+                raise InputError(f"identify.parameters.{key}", f"{allowed} {', '.join(sorted(outputs))}")
+        keys = tuple(self.keys[k] for k in self._numbers)
+
+        def family(scenario: Scenario) -> ParametrisedScenario:
+            if self.held:
+                scenario = ParametrisedScenario(scenario, tuple(self.held)).with_values(list(self.held.values()))
+            return ParametrisedScenario(scenario, keys)
+
+        self._families = [family(model.scenario) for model in self.models]
+        self.logarithmic = self.low > 0.0
+        self._limits = Limits.checked(self._families[0], self.low[self._numbers], self.high[self._numbers])
+        known = dict(zip(keys, self._families[0].values, strict=True)) | {own.key: own.start for own in further}
+        neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
+        middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
+        own_values = [known.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
+        start = [float(v) if isinstance(v, int | float) else m for v, m in zip(own_values, middle, strict=True)]
+        self.start: Array = self.feasible(self.to_search(np.clip(start, self.low, self.high)))
+
+    def feasible(self, z: Array, free: NDArray[np.bool_] | None = None) -> Array:
+        """Return z, shape (p,), or a place near it whose values go together; only free ones change, all by default."""
+        values, places = self.values(z), self._numbers
+        found = self._limits.nearest(values[places], None if free is None else free[places])
+        changed = found != values[places]
+        values[places] = found
+        return self.to_search(values) if changed.any() else z
+
+    @property
+    def groups(self) -> NDArray[np.intp]:
+        """The number of the output that every signal is of: windows of one share its noise."""
+        names = [f"{signal.recording}.{signal.name}" for signal in self.signals]
+        order = list(dict.fromkeys(names))
+        return np.array([order.index(name) for name in names], dtype=np.intp)
+
+    def to_search(self, values: Array) -> Array:
+        """Return the search variables of values: logarithms of positive ones."""
+        safe = np.where(self.logarithmic, values, 1.0)
+        return np.where(self.logarithmic, np.log(safe), values)
+
+    def values(self, z: Array) -> Array:
+        """Return the values that are searched for at z."""
+        return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, z, 0.0)), z)
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """The bounds of the search."""
+        return self.to_search(self.low), self.to_search(self.high)
+
+    def residuals(self, z: Array) -> list[Array]:
+        """Return measured less computed of every signal, shape (m,) each; infinite where values do not go together."""
+        if self.stop():
+            raise Stopped
+        self.evaluations += 1
+        values = self.values(z)
+        try:
+            places = [at(values) for at in self._places()]
+        except InputError:
+            return self._smooth([np.full(len(s.measured), np.inf) for s in self.signals])
+        computed = [each for model, place in zip(self.models, places, strict=True) for each in model.compute(*place)]
+        residuals = self._smooth([s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)])
+        if not all(np.isfinite(e).all() for e in residuals):
+            return [np.full(len(e), np.inf) for e in residuals]
+        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.groups)
+        if objective < self.best[0]:
+            self.best = (objective, z.copy())
+        return residuals
+
+    def slopes(self, z: Array) -> list[Array]:
+        """Return the derivatives of the residuals by z, shape (m, p) each."""
+        if self._slopes is not None and np.array_equal(self._slopes[0], z):
+            return self._slopes[1]
+        if self.stop():
+            raise Stopped
+        values = self.values(z)
+        sizes = np.where(self.logarithmic, values, self.high - self.low)
+        found = [
+            each
+            for model, at in zip(self.models, self._places(), strict=True)
+            for each in model.slopes(at, values, sizes)
+        ]
+        self.evaluations += 2 * len(z)
+        stretch = np.where(self.logarithmic, values, 1.0)
+        slopes = self._smooth([-each[s.rows] * stretch for each, s in zip(found, self.signals, strict=True)])
+        self._slopes = (z.copy(), slopes)
+        return slopes
+
+    def alone(self) -> Problem:
+        """Return the same problem with a memory of its own, for another thread."""
+        twin = copy.copy(self)
+        twin.models, twin.evaluations, twin.best = (
+            [copy.copy(model) for model in self.models],
+            0,
+            (math.inf, np.zeros(0)),
+        )
+        return twin
+
+    def fine(self) -> Problem:
+        """Return the same problem, computed with smaller errors: those of runs make the likelihood jump from z to z.
+
+        Where thousands of samples tell a number, it jumps by as much as a quarter of what ends an interval.
+        """
+        twin = self._tuned(_FINER)
+        twin.finely = True
+        return twin
+
+    def rough(self) -> Problem:
+        """Return the same problem for means over some cycles of motions, computed with larger errors.
+
+        Where something rings, a likelihood of samples has a minimum for every cycle by which a model is late; that of
+        means over some cycles has few.
+        """
+        twin = self._tuned(_ROUGHER)
+        twin.means = self._stretches()
+        return twin
+
+    def averaged(self, values: Sequence[Array]) -> list[Array]:
+        """Return the means that count roughly of residuals of every signal, or of their slopes."""
+        return _means(values, self._stretches())
+
+    def _stretches(self) -> list[int]:
+        """Return the number of samples in a row whose mean counts in rough searches, by signal."""
+        groups, count = self.groups, [len(signal.measured) for signal in self.signals]
+        size = np.bincount(groups, count)[groups]
+        share = np.minimum(size / max(_MEANS, 2 * len(self.keys)), count)
+        return [max(int(n), 1) if s.ordered else 1 for s, n in zip(self.signals, share, strict=True)]
+
+    def _tuned(self, factor: float) -> Problem:
+        twin = self.alone()
+        twin._slopes = None
+        for model in twin.models:
+            model.tune(factor)
+        return twin
+
+    def _smooth(self, values: list[Array]) -> list[Array]:
+        """Return means of as many samples in a row as are asked for."""
+        return _means(values, self.means) if self.means else values
+
+    def join(self, twin: Problem) -> None:
+        """Add the evaluations of a twin, and take its best point if that is better, or if there is none yet."""
+        self.evaluations += twin.evaluations
+        if list(twin.means) != list(self.means):
+            self.best = self.best if len(self.best[1]) else (math.inf, twin.best[1])
+            return
+        self._slopes = twin._slopes or self._slopes
+        self.best = min(self.best, twin.best, key=lambda each: each[0])
+
+    def _places(self) -> list[At]:
+        def of(family: ParametrisedScenario) -> At:
+            def at(values: Array) -> tuple[Scenario, dict[str, float]]:
+                numbers = {key: float(v) for key, v in zip(self.keys, values, strict=True) if key[:11] == "recordings."}
+                return family.with_values(values[self._numbers].tolist()), numbers
+
+            return at
+
+        return [of(family) for family in self._families]
+
+    def subset(self, kept: Sequence[NDArray[np.bool_]]) -> Problem:
+        """Return the problem with some of the samples of every signal."""
+        signals = [
+            RecordedSignal(
+                s.recording, s.name, s.unit, s.measured[k], s.rows[k], s.instant[k], s.load[k], s.alike[k], s.ordered
+            )
+            for s, k in zip(self.signals, kept, strict=True)
+        ]
+        asked = slice(0, self.asked)
+        bounds = (self.keys[asked], self.low[asked], self.high[asked])
+        return Problem(self.scenario, *bounds, self.models, signals, self.held, self.stop)
+
+
+def _means(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
+    """Return means of so many samples in a row."""
+    pairs = zip(values, counts, strict=True)
+    return [e[: len(e) // n * n].reshape(-1, n, *e.shape[1:]).mean(axis=1) for e, n in pairs]
+
+
+def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Return the number of independent samples of every group of signals, and their mean square."""
+    count, squares = np.zeros((2, int(groups.max(initial=-1)) + 1))
+    for e, w, group in zip(residuals, weights, groups, strict=True):
+        count[group] += w * len(e)
+        squares[group] += w * float(e @ e)
+    return count, squares / np.maximum(count, 1e-300)
+
+
+def minus_twice_likelihood(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> float:
+    """Return the sum of w n log(SSE / n), minus twice the log-likelihood; a noise for each group of signals."""
+    count, square = pooled(residuals, weights, groups)
+    there = count > 0.0
+    return float(np.sum(count[there] * np.log(np.maximum(square[there], 1e-300))))

@@ -1,0 +1,117 @@
+"""The next experiment: of given motions the one that narrows the intervals most, from sensitivities alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.description.loading import ScenarioLike, load_scenario
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import FingerLike
+from finger_pin.simulation.prepared import prepare
+from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.typing import Array
+
+
+def propose(
+    scenario: ScenarioLike,
+    candidates: Mapping[str, Mapping[str, Any]],
+    parameters: Mapping[str, Sequence[float]],
+    outputs: Mapping[str, float],
+    *,
+    overrides: Mapping[str, Any] | None = None,
+    finger: FingerLike | None = None,
+    known: Mapping[str, float] | None = None,
+    rate: float = 100.0,
+) -> xr.Dataset:
+    """Rank motions by their information on the parameters: D-optimal, the greatest determinant first.
+
+        fp.propose("canal", {"slow": {...}, "fast": {...}}, {"finger.tendon_friction.coulomb": (0.01, 1.0)},
+                   {"tendon_tension.T1": 0.05})
+
+    Args:
+        scenario: The scenario to identify, its name, or the path of a file.
+        candidates: By name, the entries in which the motion of each differs.
+        parameters: By dotted key, the least and the greatest value; sure to that much without any motion.
+        outputs: Signals that would be measured, by variable.label, and their noise, SI, rms.
+        overrides: Entries of all of them, such as what is known by now.
+        finger: Replaces the finger that the scenario describes, as for `fp.simulate`.
+        known: By key, standard deviations that earlier recordings have left, in units of the parameter.
+        rate: Of independent samples, Hz: of a model at 1 kHz only some are.
+
+    Returns:
+        Along ``candidate``, the best first: ``log_determinant``, and by ``parameter`` the ``deviation`` that the motion
+        would leave, together with what is known.
+
+    Raises:
+        InputError: If there are no candidates, parameters or outputs, or one names nothing that there is; if bounds are
+            not in order, or a noise or what is known is not positive.
+    """
+    _check(candidates, parameters, outputs, known or {})
+    keys = list(parameters)
+    low, high = np.array(list(parameters.values()), dtype=float).T
+    # The least that is known: a parameter lies within its bounds.
+    before = np.array([(known or {}).get(key, (b - a) / 4.0) for key, a, b in zip(keys, low, high, strict=True)])
+    variables = tuple(dict.fromkeys(name.partition(".")[0] for name in outputs))
+    found: dict[str, tuple[float, Array]] = {}
+    for name, changed in candidates.items():
+        entries = {**(overrides or {}), "simulation.sample_rate": rate, **changed}
+        run = prepare(load_scenario(scenario, entries), keys, variables, finger=finger).run(sensitivities=True)
+        information = np.diag(1.0 / before**2)
+        for output, noise in outputs.items():
+            slopes = _slopes(run, output)
+            until = run.time < run.attrs["sensitivities_lost"]
+            information = information + slopes[:, until] @ slopes[:, until].T / noise**2
+        scaled = information * np.outer(before, before)
+        found[name] = (float(np.linalg.slogdet(scaled)[1]), np.sqrt(np.diag(np.linalg.inv(scaled))) * before)
+    order = sorted(found, key=lambda name: -found[name][0])
+    long_name = "of the information over that without it"
+    return xr.Dataset(
+        {
+            "log_determinant": (
+                "candidate",
+                [found[name][0] for name in order],
+                {"units": "1", "long_name": long_name},
+            ),
+            "deviation": (("candidate", "parameter"), [found[name][1] for name in order]),
+        },
+        {"candidate": order, "parameter": keys},
+    )
+
+
+def _check(
+    candidates: Mapping[str, Any],
+    parameters: Mapping[str, Sequence[float]],
+    outputs: Mapping[str, float],
+    known: Mapping[str, float],
+) -> None:
+    for entry, table in (("candidates", candidates), ("parameters", parameters), ("outputs", outputs)):
+        if not table:
+            raise InputError(entry, "must have at least one entry")
+    for key, bounds in parameters.items():
+        pair = np.shape(bounds) == (2,) and all(isinstance(each, Real) for each in bounds)
+        if not (pair and -np.inf < bounds[0] < bounds[1] < np.inf):
+            raise InputError(f"parameters.{key}", "must be the least and the greatest value", bounds)
+    for entry, numbers in (("outputs", outputs), ("known", known)):
+        for key, value in numbers.items():
+            if not (isinstance(value, Real) and 0.0 < value < np.inf):
+                raise InputError(f"{entry}.{key}", "must be a number above 0", value)
+    for key in known:
+        if key not in parameters:
+            raise InputError(f"known.{key}", f"is none of the parameters {', '.join(parameters)}")
+
+
+def _slopes(run: RunArrays, output: str) -> Array:
+    """Return the derivatives of an output by the parameters, shape (p, m)."""
+    variable, _, label = output.partition(".")
+    slopes, dims = run.slopes[variable], run.variables[variable][0]
+    for axis, dim in reversed(list(enumerate(dims))[1:]):
+        labels = [str(each) for each in run[dim]]
+        if label not in labels:
+            raise InputError(f"outputs.{output}", f"there is no {label}; there are {', '.join(labels)}")
+        slopes = np.take(slopes, labels.index(label), axis=axis + 1)
+    return slopes

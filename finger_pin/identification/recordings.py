@@ -1,0 +1,140 @@
+"""Recordings: tables of numbers as they were written down, in SI, by the names that a result has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.recordings.bench import Column, RecordingSettings
+from finger_pin.description.recordings.columns import Table, read_columns
+from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
+from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
+
+#: SI units of what is recorded most; of anything else a column is in SI.
+VARIABLES = {
+    "tendon_command": "N",
+    "tendon_tension": "N",
+    "tendon_friction": "N",
+    "spool_tension": "N",
+    "passive_tension_proximal": "N",
+    "contact_force": "N",
+    "contact_normal_force": "N",
+    "fingertip_force": "N",
+    "fingertip_position": "m",
+    "tendon_velocity": "m/s",
+    "joint_position": "rad",
+    "joint_reference": "rad",
+    "joint_velocity": "rad/s",
+    "joint_torque": "N m",
+    "motor_position": "rad",
+    "motor_velocity": "rad/s",
+    "motor_current": "A",
+    "motor_voltage": "V",
+    "motor_torque": "N m",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSignal:
+    """An output of a recording.
+
+    Attributes:
+        recording: Name of the recording.
+        name: variable.label.
+        unit: SI unit.
+        measured: Shape (m,), those that are numbers.
+        rows: Which rows of the recording they are, shape (m,).
+        instant: Time of each, s; of steady readings its number.
+        load: Input of the model there; not a number where there are several.
+        alike: The number of the group of equal readings that each is of, shape (m,).
+        ordered: Whether its samples follow each other in time, so that neighbours may err alike.
+    """
+
+    recording: str
+    name: str
+    unit: str
+    measured: Array
+    rows: NDArray[np.intp]
+    instant: Array
+    load: Array
+    alike: NDArray[np.intp]
+    ordered: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording in SI; m rows.
+
+    Attributes:
+        name: Its name.
+        settings: As described.
+        inputs: By variable.label, shape (m,).
+        outputs: By variable.label, shape (m,); not a number where nothing was measured.
+        time: Of a motion, shape (m,), s, from zero.
+        speed: Of steady readings, shape (m,), m/s.
+    """
+
+    name: str
+    settings: RecordingSettings
+    inputs: dict[str, Array]
+    outputs: dict[str, Array]
+    time: Array
+    speed: Array
+
+
+def unit_of(name: str) -> str:
+    """Return the SI unit of ``variable.label``; empty for an unknown one."""
+    return VARIABLES.get(name.partition(".")[0], "")
+
+
+def read_recording(
+    name: str, settings: RecordingSettings, data: Mapping[str, Sequence[float] | Array] | None = None
+) -> Recording:
+    """Read a recording from its file, or from arrays by the names of columns.
+
+    Raises:
+        InputError: If the file cannot be read, a column is missing or not of numbers, or a unit does not fit.
+    """
+    entry = f"identify.recordings.{name}"
+    if data is None and settings.file is None:
+        raise InputError(f"{entry}.file", "is missing: the path of a CSV file")
+    path = Path(str(settings.file))
+    table = Table(entry, read_columns(f"{entry}.file {path.name}", path) if data is None else data)
+
+    time, speed = np.zeros(table.rows), np.zeros(table.rows)
+    if settings.time is not None:
+        time = table.times("time", settings.time)
+        time = time - time[0]
+    if isinstance(settings.speed, Column):
+        speed = table.column("speed", settings.speed, "m/s")
+        if np.any(speed == 0.0):
+            raise InputError(f"{entry}.speed", "must not be zero: friction has the sign of sliding")
+    elif settings.speed is not None:
+        speed = np.full(table.rows, settings.speed)
+    return Recording(
+        name,
+        settings,
+        {key: _signal(table, f"inputs.{key}", given) for key, given in settings.inputs.items()},
+        {key: _signal(table, f"outputs.{key}", given) for key, given in settings.outputs.items()},
+        time,
+        speed,
+    )
+
+
+def _signal(table: Table, key: str, given: Column) -> Array:
+    """Return a column in SI; cells of outputs may be empty, and angles of joints are asked about.
+
+    Raises:
+        InputError: As `Table.column`, and if an angle is beyond two turns.
+    """
+    group, _, name = key.partition(".")
+    values = table.column(key, given, unit_of(name), missing=group == "outputs")
+    if name.startswith("joint_position.") and np.nanmax(np.abs(values), initial=0.0) > MOST_ANGLE:
+        allowed = f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}"
+        raise InputError(f"{table.entry}.{key}", allowed, float(np.nanmax(np.abs(values))))
+    return values

@@ -1,0 +1,248 @@
+"""The result of an identification: a Dataset, a scenario with the numbers found, and a page."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+import xarray as xr
+
+from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
+from finger_pin.description.parametrised_scenario import ParametrisedScenario, split
+from finger_pin.description.scenario import Scenario
+from finger_pin.files import write_text
+from finger_pin.identification.comparison import LawComparison
+from finger_pin.identification.estimate import Fit
+from finger_pin.identification.intervals import LEVEL, ProfileBound, free_directions
+from finger_pin.identification.problem import Problem, minus_twice_likelihood
+from finger_pin.identification.recordings import RecordedSignal
+from finger_pin.simulation.netcdf import save
+from finger_pin.studies.keys import describe
+from finger_pin.typing import Array
+
+
+def results(
+    problem: Problem,
+    fits: Sequence[Fit],
+    best: Fit,
+    sides: Mapping[tuple[int, int], ProfileBound],
+    spread: Array | None,
+    comparison: LawComparison | None,
+    unfinished: str = "",
+) -> xr.Dataset:
+    """Return the Dataset of an identification; unfinished pieces are not a number."""
+    count, keys = problem.asked, problem.keys[: problem.asked]
+    free = free_directions(problem, best) if spread is not None else []
+    variables: dict[str, Any] = {
+        **_estimates(problem, best, sides, spread, [k for _, shown in free for k in shown if k < count]),
+        **_signals(problem, best),
+        "start_objective": ("start", [each.objective for each in fits], {"units": "1"}),
+        "start_estimate": (("start", "parameter"), [problem.values(each.z)[:count] for each in fits]),
+    }
+    coordinates: dict[str, Any] = {
+        "parameter": list(keys),
+        "other": list(keys),
+        "signal": list(dict.fromkeys(f"{signal.recording}.{signal.name}" for signal in problem.signals)),
+    }
+    if comparison is not None:
+        coordinates["law"] = comparison.law
+        for name in ("parameters", "bic", "rms", "held_out"):
+            variables[f"law_{name}"] = ("law", getattr(comparison, name), {"units": "1"})
+    # What is met as well as at the ends of the intervals is the same minimum.
+    met = [minus_twice_likelihood(each.residuals, best.weights, problem.groups) for each in fits]
+    least = minus_twice_likelihood(best.residuals, best.weights, problem.groups)
+    alike = sum(each < least + LEVEL for each in met)
+    attrs = {
+        "scenario": problem.scenario.name,
+        "undetermined": [words for words, _ in free],
+        "searches": len(fits),
+        "searches_alike": alike,
+        "evaluations": problem.evaluations,
+        "bic": least + count * math.log(max(float(best.weights @ [len(e) for e in best.residuals]), 1.0)),
+    }
+    attrs |= {"unfinished": unfinished} if unfinished else {}
+    return xr.Dataset(variables, coordinates, attrs)
+
+
+def _estimates(
+    problem: Problem,
+    best: Fit,
+    sides: Mapping[tuple[int, int], ProfileBound],
+    spread: Array | None,
+    undetermined: list[int],
+) -> dict[str, Any]:
+    """Return the variables along the parameters, some of which the recordings do not determine."""
+    count, keys = problem.asked, problem.keys[: problem.asked]
+    spread = None if spread is None else spread[:count, :count]
+    ends = np.full((2, count), np.nan)
+    for (k, way), side in sides.items():
+        z = best.z.copy()
+        z[k] = side.end if math.isfinite(side.end) else z[k]
+        ends[(way + 1) // 2, k] = problem.values(z)[k] if math.isfinite(side.end) else side.end
+    units = [_units(problem, key) for key in keys]
+    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0)) if spread is not None else np.full(count, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = spread / np.outer(deviation, deviation) if spread is not None else np.full((count, count), np.nan)
+    whole, wide = problem.values(best.z), np.zeros(len(best.z))
+    wide[:count] = deviation
+    estimate, linear = whole[:count], [problem.values(best.z + way * 1.96 * wide)[:count] for way in (-1.0, 1.0)]
+    profiles = _profiles(problem, best, sides)
+    closed = np.isfinite(ends).all(axis=0)
+    closed[undetermined] = False
+    return {
+        "estimate": ("parameter", estimate, {"long_name": "estimate; units in the variable units"}),
+        "lower": ("parameter", ends[0], {"long_name": "lower end of the 95 % interval; infinite where open"}),
+        "upper": ("parameter", ends[1], {"long_name": "upper end of the 95 % interval; infinite where open"}),
+        "determined": ("parameter", closed, {"long_name": "closed at both ends, by the recordings"}),
+        "units": ("parameter", units, {"long_name": "units of estimate, lower and upper"}),
+        "linear_lower": ("parameter", linear[0], {"long_name": "lower end by the slopes alone"}),
+        "linear_upper": ("parameter", linear[1], {"long_name": "upper end by the slopes alone"}),
+        "least": ("parameter", problem.low[:count], {"long_name": "least value that was allowed"}),
+        "greatest": ("parameter", problem.high[:count], {"long_name": "greatest value that was allowed"}),
+        "correlation": (("parameter", "other"), correlation, {"units": "1", "long_name": "of the estimates"}),
+        "profile_value": (("parameter", "point"), profiles[0], {"long_name": "held value of a parameter"}),
+        "profile_rise": (
+            ("parameter", "point"),
+            profiles[1],
+            {"units": "1", "long_name": "rise of minus twice the likelihood, the others fitted anew; 3.841 at 95 %"},
+        ),
+    }
+
+
+def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], ProfileBound]) -> tuple[Array, Array]:
+    """Return values and rises along every profile, ascending, filled up with NaN."""
+    rows: list[Array] = []
+    for k in range(problem.asked):
+        paths = [side.path for (j, _), side in sides.items() if j == k]
+        points = np.unique(np.concatenate([np.array([[best.z[k], 0.0]]), *paths]), axis=0)
+        values = np.array([problem.values(np.where(np.arange(len(best.z)) == k, z, best.z))[k] for z in points[:, 0]])
+        rows.append(np.stack([values, points[:, 1]]))
+    width = max((row.shape[1] for row in rows), default=1)
+    filled = np.full((2, len(rows), width), np.nan)
+    for k, row in enumerate(rows):
+        filled[:, k, : row.shape[1]] = row
+    return filled[0], filled[1]
+
+
+def _units(problem: Problem, key: str) -> str:
+    if not key.startswith("recordings."):
+        return describe(key)["units"]
+    name, _, what = key.removeprefix("recordings.").rpartition(".")
+    unit = next((s.unit for s in problem.signals if f"{s.recording}.{s.name}" == name), "1")
+    return {"offset": unit, "delay": "s"}.get(what, "1")
+
+
+def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
+    signals, groups = problem.signals, problem.groups
+    # The first of every output's windows stands for what they share.
+    first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
+    whole = {
+        "signal_index": np.repeat(groups, [len(s.measured) for s in signals]),
+        "instant": np.concatenate([s.instant for s in signals]),
+        "applied": np.concatenate([s.load for s in signals]),
+        "measured": np.concatenate([s.measured for s in signals]),
+        "residual": np.concatenate(best.residuals),
+    }
+    names = {
+        "signal_index": "which signal",
+        "instant": "time, s; number of a steady reading",
+        "applied": "what pulls, N",
+        "measured": "measured, in the unit of the signal",
+        "residual": "measured less computed, in the unit of the signal",
+    }
+    return {
+        "signal_units": ("signal", [signals[k].unit for k in first]),
+        "signal_steady": ("signal", [not signals[k].ordered for k in first]),
+        "noise": ("signal", best.noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
+        "replicate_noise": ("signal", [_replicates(signals[k]) for k in first], {"long_name": "rms of equal readings"}),
+        "signal_samples": ("signal", np.bincount(whole["signal_index"], minlength=len(first))),
+        "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
+        "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
+        **{name: ("sample", values, {"long_name": names[name]}) for name, values in whole.items()},
+    }
+
+
+def _replicates(signal: RecordedSignal) -> float:
+    """Return the rms by which readings of the same inputs differ from their mean, which no law can explain."""
+    groups = signal.alike
+    if signal.ordered or groups.max() + 1 == len(groups):
+        return math.nan
+    means = np.bincount(groups, signal.measured) / np.bincount(groups)
+    spread = np.sum((signal.measured - means[groups]) ** 2)
+    return float(np.sqrt(spread / (len(groups) - len(means))))
+
+
+def write_results(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> None:
+    """Write identification.nc and identified.toml.
+
+    Raises:
+        OSError: If they cannot be written.
+    """
+    save(result, folder / "identification.nc")
+    write_text(folder / "identified.toml", identified_toml(result, folder, bench, problem))
+
+
+def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> str:
+    """Return the text of a scenario with the numbers found and their intervals.
+
+    It extends the bench; where no file says all of it, as it was given as a Scenario or with overrides, it is whole.
+    """
+    recordings = ", ".join(dict.fromkeys(signal.recording for signal in problem.signals))
+    extended = not isinstance(bench, Scenario) and load_scenario(bench) == problem.scenario
+    lines = ["# What an identification has found; intervals at 95 %."]
+    if extended:
+        lines += [tomli_w.dumps({"extends": _from_folder(str(bench), folder)}).strip(), ""]
+    numbers: dict[str, float] = {}
+    for key, value, low, high, unit in zip(
+        problem.keys[: problem.asked],
+        *(result[each].values.tolist() for each in ("estimate", "lower", "upper", "units")),
+        strict=True,
+    ):
+        plain, index = split(key)
+        ends = f"{_end(low)} to {_end(high)}{'' if unit == '1' else f' {unit}'}"
+        if not key.startswith("recordings."):
+            numbers[key] = value
+        if not extended or key not in numbers:
+            lines.append(f"# {key} = {value:.6g}, {ends}, from {recordings}")
+            continue
+        where = "" if index is None else f"number [{index}], "
+        lines.append(f"{plain} = {_toml(problem, key, value)} # {where}{ends}, from {recordings}")
+    if not extended:
+        lines += [
+            "",
+            to_toml(
+                ParametrisedScenario(problem.scenario, tuple(numbers)).with_values(list(numbers.values()))
+            ).rstrip(),
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _from_folder(bench: str, folder: Path) -> str:
+    """Return the entry ``extends`` of a scenario in a folder: a name as it is, a path from the folder."""
+    path = Path(bench).expanduser()
+    if path.suffix != ".toml":
+        return bench
+    try:
+        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    except ValueError:
+        # Another drive.
+        return str(path.absolute())
+
+
+def _end(value: float) -> str:
+    return "not known" if math.isnan(value) else "open" if math.isinf(value) else f"{value:.4g}"
+
+
+def _toml(problem: Problem, key: str, value: float) -> str:
+    plain, index = split(key)
+    if index is None:
+        return repr(value)
+    held: Any = problem.scenario.model_dump(mode="python")
+    for part in plain.split("."):
+        held = held[part]
+    return str([value if k == index else each for k, each in enumerate(held)])

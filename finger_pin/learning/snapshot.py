@@ -1,0 +1,153 @@
+"""Variables of a result at one instant of worlds that go on, with worlds in place of instants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, cast
+
+import numpy as np
+
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.control.interface import ControlSignals
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.compiled_fingers import CompiledFingers
+from finger_pin.core.stepping.trajectory import Statistics, Trajectory
+from finger_pin.learning.action import Action
+from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.state import State
+from finger_pin.references.reference import ReferenceSignals
+from finger_pin.references.signal import Signal
+from finger_pin.simulation.quantity import Quantity
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.variables import RESIDUAL, variables
+from finger_pin.typing import Array
+
+_NOTHING, _EVER = Statistics(0, 0, 0, 0, 0.0), np.array([np.inf])
+# Of a reference and a controller, which do not act.
+_OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
+
+
+def snapshot(loop: ClosedLoop, time: float, x: Array) -> SampledTrajectory:
+    """Return the signals of a state, shape (size,), at a time, s."""
+    return SampledTrajectory(loop, Trajectory(_EVER, lambda _: x[None], _NOTHING), np.array([time]))
+
+
+# What a step changes in place, and views of it.
+_STAYING = {"loop", "times", "packed", "state", "_accelerated"}
+
+
+class BatchedSnapshot(SampledTrajectory):
+    """Worlds at the states that they have reached, and all that follows from these."""
+
+    def __init__(self, loop: BatchedLoop) -> None:
+        """Make room for the present times, shape (w,), s, and packed states, shape (w, size)."""
+        self.loop, self._accelerated, count = loop, loop.accelerated, len(loop.loops)
+        self.times, self.packed = np.zeros(count), np.zeros((count, loop.finger.layout.size))
+
+    def forget(self) -> None:
+        """Forget results of earlier states; views of the states remain."""
+        for name in vars(self).keys() - _STAYING:
+            delattr(self, name)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but views, which a copy makes of its own states."""
+        return {name: value for name, value in vars(self).items() if name in _STAYING and name != "state"}
+
+
+def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
+    """Return the variables that are known at an instant, by name."""
+    return {
+        name: each
+        for name, each in variables(loop).items()
+        # The account is of a whole run.
+        if each.booked is None and name not in (*_OF_CONTROLLERS, RESIDUAL)
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class BatchedLoop(ClosedLoop):
+    """Loops of worlds as one, each world at a time of its own.
+
+    Attributes:
+        loops: Of the worlds.
+        actions: Actions on them.
+        accelerated: Whether accelerations are wanted.
+    """
+
+    loops: list[ClosedLoop] = field(default_factory=list)
+    actions: list[Action] = field(default_factory=list)
+    accelerated: bool = False
+
+    @classmethod
+    def of(cls, loops: list[ClosedLoop], actions: list[Action], names: Sequence[str], *, apart: bool) -> BatchedLoop:
+        """Put worlds side by side.
+
+        Args:
+            loops: Of the worlds; of all the same where they have the same numbers.
+            actions: Actions on them.
+            names: Of the variables that will be asked for.
+            apart: Whether every world has numbers of its own.
+        """
+        first, accelerated = loops[0], "joint_acceleration" in names
+        own = {each.name: getattr(first, each.name) for each in fields(ClosedLoop)}
+        own["drives"] = None if actions[0].compiled is None else actions[0]
+        if apart:
+            own["dynamics"] = CompiledFingers([_compiled(each) for each in loops], accelerated=accelerated)
+            own["palm"] = first.palm and replace(first.palm, signal=cast(Signal, _PalmSignals(loops)))
+        return cls(**own, loops=loops, actions=actions, accelerated=accelerated)
+
+    def renew(self, index: int, loop: ClosedLoop, action: Action) -> None:
+        """Put another world in the place of one; all have loops of their own then."""
+        self.loops[index], self.actions[index] = loop, action
+        assert isinstance(self.dynamics, CompiledFingers)
+        self.dynamics.replace(index, _compiled(loop))
+
+    @property
+    def shared(self) -> bool:
+        """Whether all worlds have the same numbers."""
+        return not isinstance(self.dynamics, CompiledFingers)
+
+    def force(self, time: Array | float) -> Array:
+        """Return F in all worlds, shape (3,) or (w, 3), of several fingers (f, 3) or (w, f, 3), N."""
+        if self.shared:
+            return super().force(time)
+        return np.array([loop.force(each) for loop, each in zip(self.loops, np.asarray(time), strict=True)])
+
+    def evaluate(self, time: Array | float, x: Array, *, accelerated: bool = True) -> LoopSignals:
+        """Return all signals at times (w,) and states (w, size); the base's motion counts for accelerations alone."""
+        times, routing = np.asarray(time), self.finger.routing
+        command = np.array([action.held for action in self.actions])
+        tension = np.zeros((len(times), len(routing.tendons)))
+        tension[:, : routing.actuated] = command[:, : routing.actuated]
+        inputs = command[:, routing.actuated :]
+        control = ControlSignals(np.zeros((len(times), len(routing.joints))), tension, inputs=inputs)
+        if self.drives is not None:
+            voltages = [action.voltages(each) for action, each in zip(self.actions, times, strict=True)]
+            command[:, self.drives.channels] = voltages
+        base = None
+        if accelerated and (self.palm or self.guides):
+            base = np.array([loop.base(each) for loop, each in zip(self.loops, times, strict=True)])
+        evaluate = self.dynamics.evaluate if accelerated else self.dynamics.exerted
+        nothing = np.zeros((len(times), len(routing.joints)))
+        return LoopSignals(ReferenceSignals(nothing, nothing), control, evaluate(x, command, self.force(time), base))
+
+    def motion(self, time: Array, state: State) -> Motion:
+        """Return fingertips, base frame, at times (w,) and states; energies are those of a palm at rest."""
+        return self.dynamics.motion(state.position, state.velocity)
+
+
+class _PalmSignals:
+    """Paths of palms, each at a time of its own."""
+
+    def __init__(self, loops: Sequence[ClosedLoop]) -> None:
+        self._loops = loops
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Return values and rates at times (w,), shape (w, 6) each."""
+        found = [loop.palm.signal.at(each) for loop, each in zip(self._loops, time, strict=True) if loop.palm]
+        return np.array([value for value, _ in found]), np.array([rate for _, rate in found])
+
+
+def _compiled(loop: ClosedLoop) -> CompiledFinger:
+    return cast(CompiledFinger, loop.dynamics)

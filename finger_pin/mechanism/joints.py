@@ -1,0 +1,244 @@
+"""Friction, springs and stroke limiters of the joints: (9) with the reaction (17), and (2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
+from finger_pin.description.parameters import Spring
+from finger_pin.description.validation import expand
+from finger_pin.laws.bristle import PIN_FRICTION
+from finger_pin.laws.limiter import STROKE_LIMITER
+from finger_pin.laws.spring import HYSTERESIS, JOINT_SPRING, STIFFER, spring_torque
+from finger_pin.mechanism.rows import Energy, Rows
+from finger_pin.typing import Array
+
+#: Least levels of what tendons, N, and joints' springs, N m, hold, as those of their friction.
+OF_TENDONS, OF_JOINTS = 1e-4, 1e-7
+
+_SPRINGS = Energy("joint_springs", "joints' springs")
+
+_LIMITERS = Energy("limiter", "stroke limiters")
+# Farther than any joint gets, rad or m.
+_NEVER = 1e9
+
+#: What friction in the joints takes, in the order of its law.
+LOSSES = (
+    Energy("joint_coulomb", "joints sliding"),
+    Energy("joint_viscous", "joints viscous"),
+    Energy("joint_micro_damping", "joints' micro-damping"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class JointFriction:
+    """Friction of all joints.
+
+    Attributes:
+        loads: Shape (n, s), one where a strand loads a joint.
+        bearing: Whether each joint has a pin that rubs, shape (n,).
+        kinetic: M^d, shape (n,), m.
+        static: M^c, shape (n,), m.
+        stiffness: sigma_0, shape (n,), N m/rad.
+        viscous: b, shape (n,), N m s/rad.
+        stribeck_velocity: omega, shape (n,), rad/s.
+        floor: g_min, shape (n,), N m.
+        stribeck_exponent: 1 or 2, shape (n,).
+        lag: sigma_1 / sigma_0, shape (n,), s.
+    """
+
+    loads: Array
+    bearing: NDArray[np.bool_]
+    kinetic: Array
+    static: Array
+    stiffness: Array
+    viscous: Array
+    stribeck_velocity: Array
+    floor: Array
+    stribeck_exponent: Array
+    lag: Array
+
+    @classmethod
+    def from_description(cls, description: FingerDescription, loads: Array) -> JointFriction:
+        """Read one number per joint; ``loads`` comes from the routing."""
+        law, size = description.joint_friction, len(description.joints)
+        tree = description.tree
+        bearing = np.array([tree is None or tree.joints[name].bearing for name in description.joints])
+        return cls(
+            loads=bearing[:, None] * loads,
+            bearing=bearing,
+            kinetic=expand(law.coulomb, size),
+            static=expand(law.stiction, size),
+            **bristles(law, size),
+        )
+
+    def rows(
+        self,
+        names: tuple[str, ...],
+        drives: Mapping[str, Array],
+        actuated: int,
+        width: int,
+        canals: Mapping[str, Array] | None = None,
+    ) -> Rows:
+        """Return the table of the joints' friction.
+
+        Args:
+            names: Of the joints.
+            drives: Weights with which further tables pull the strands, as of `Tendons.pulled`; all of it adds up.
+            actuated: Number of driven tendons.
+            width: Number of coordinates.
+            canals: Weights with which canals of a tree, and what pulls through them, load the pins, shape (n, rows).
+        """
+        size = len(names)
+        # Strands beyond the actuated ones are halves of passive tendons.
+        loads = {"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]}
+        loads |= {group: self.loads @ weights for group, weights in drives.items()} | dict(canals or {})
+        return Rows(
+            group="joint_friction",
+            law=PIN_FRICTION,
+            names=names,
+            parameters=np.array([getattr(self, name) for name in PIN_FRICTION.parameters]),
+            arm=np.eye(size, width),
+            loads=loads,
+            pins=np.where(self.bearing, np.arange(size), -1),
+            stored=Energy("joint_bristles", "joint bristles"),
+            powers=LOSSES,
+        )
+
+
+def bristles(law: JointFrictionSettings | TendonFrictionSettings, size: int) -> dict[str, Array]:
+    """Return the numbers that friction of tendons and of joints share, by the laws' names, one for each of ``size``."""
+    names = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
+    found: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}
+    return found | {"lag": expand(law.micro_damping, size) / found["stiffness"]}
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeLimiter:
+    """Stroke limiters of all joints.
+
+    Attributes:
+        lower: Shape (n,), rad.
+        upper: Shape (n,), rad.
+        stiffness: k, shape (n,), N m/rad.
+        damping: c, shape (n,), s/rad.
+        limited: Whether each joint has limits, shape (n,).
+    """
+
+    lower: Array
+    upper: Array
+    stiffness: Array
+    damping: Array
+    limited: NDArray[np.bool_]
+
+    @classmethod
+    def from_description(cls, description: FingerDescription) -> StrokeLimiter:
+        """Read the ranges and the contact's stiffness and damping."""
+        ranges = np.array([joint.range for joint in description.joints.values()])
+        settings = description.stroke_limiter
+        size = len(ranges)
+        stiffness, damping = expand(settings.stiffness, size), expand(settings.damping, size)
+        limited = np.array([joint.limited for joint in description.joints.values()])
+        return cls(ranges[:, 0], ranges[:, 1], stiffness, damping, limited)
+
+    def rows(self, names: tuple[str, ...], width: int) -> Rows:
+        """Return the table of the limiters."""
+        lower, upper = np.where(self.limited, self.lower, -_NEVER), np.where(self.limited, self.upper, _NEVER)
+        return Rows(
+            group="limiter",
+            law=STROKE_LIMITER,
+            names=names,
+            parameters=np.array([lower, upper, self.stiffness, self.damping]),
+            arm=np.eye(len(names), width),
+            stored=_LIMITERS,
+            powers=(_LIMITERS,),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class JointSprings:
+    """The springs of all joints; all zero at a joint that has none.
+
+    Attributes:
+        stiffness: k, shape (n,), N m/rad.
+        rest: theta_0, shape (n,), rad.
+        damping: c, shape (n,), N m s/rad.
+        hysteresis: h, shape (n,).
+    """
+
+    stiffness: Array
+    rest: Array
+    damping: Array
+    hysteresis: Array
+
+    @classmethod
+    def from_description(cls, description: FingerDescription) -> JointSprings:
+        """Read the springs of the joints."""
+        springs = [joint.spring or Spring(stiffness=0.0) for joint in description.joints.values()]
+        return cls(*(np.array([getattr(each, name) for each in springs]) for name in cls.__annotations__))
+
+    @property
+    def present(self) -> bool:
+        """Whether any joint has a spring that does something."""
+        return bool(np.any(self.stiffness) or np.any(self.damping))
+
+    def torque(self, position: Array, velocity: Array) -> Array:
+        """Return tau^k, shape (..., n), N m."""
+        torque: Array = spring_torque(position, velocity, self.stiffness, self.rest, self.damping)
+        return torque
+
+    @property
+    def _sprung(self) -> NDArray[np.intp]:
+        return np.flatnonzero((self.stiffness != 0.0) | (self.damping != 0.0))
+
+    def rows(self, names: tuple[str, ...], width: int) -> Rows:
+        """Return the table of the springs, of those joints that have one."""
+        sprung = self._sprung
+        return Rows(
+            group="joint_springs",
+            law=JOINT_SPRING,
+            names=tuple(names[joint] for joint in sprung),
+            parameters=np.array([self.stiffness, self.rest, self.damping])[:, sprung],
+            arm=np.eye(len(names), width)[sprung],
+            stored=_SPRINGS,
+            powers=(_SPRINGS,),
+        )
+
+    def hysteresis_rows(self, names: tuple[str, ...], width: int) -> list[Rows]:
+        """Return the table of the springs' hysteresis, of those that have some; no table without any."""
+        springs = self.rows(names, width)
+        return hysteresis_rows("spring_hysteresis", springs, self.hysteresis[self._sprung], OF_JOINTS, _SPRINGS)
+
+
+def hysteresis_rows(group: str, springs: Rows, shares: Array, floor: float, lost: Energy) -> list[Rows]:
+    """Return the table of springs' hysteresis, of those that have some; no table without any.
+
+    Args:
+        group: Its name.
+        springs: The table of the springs; its law has a ``stiffness``.
+        shares: h, shape (k,).
+        floor: Least level of their bristles.
+        lost: Entry of the account that its losses go to.
+    """
+    stiffness = springs.parameters[springs.law.parameters.index("stiffness")]
+    held = np.flatnonzero(shares * stiffness)
+    if not held.size:
+        return []
+    return [
+        Rows(
+            group=group,
+            law=HYSTERESIS,
+            names=tuple(springs.names[k] for k in held),
+            parameters=np.array([shares[held], STIFFER * stiffness[held], np.full(len(held), floor)]),
+            arm=springs.arm[held],
+            loads={springs.group: np.eye(springs.count)[held]},
+            stored=springs.stored,
+            powers=(lost,),
+            pulls=tuple(springs.pulls[k] for k in held if springs.pulls),
+        )
+    ]

@@ -1,0 +1,192 @@
+"""Pieces of paths through space: lengths, arms and turns that depend on the posture.
+
+A piece is a function of two points that bodies carry, seen from a frame that a third body carries: a straight stretch
+of a tendon, a wrap about a cylinder, the gap between two surfaces. Its columns are wrenches (moment about the base's
+origin, force) on the three bodies, which sum up to nothing; the arm of a row is the power that they take at unit
+velocity of every coordinate, and for a length it is the length's gradient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.typing import Array
+
+
+class PathShape(Protocol):
+    """The form of a piece, seen from its own frame: a span of a tendon, or a gap between surfaces.
+
+    Attributes:
+        parameters: Names of its numbers.
+        value: (y, p, out) fills what the points y give, six numbers, and three of a side point; see `spans`, `gaps`.
+        slopes: (y, p, out) fills its derivatives by y.
+        columns: Count of its wrenches: one along a span; normal and two tangents of a gap.
+    """
+
+    columns: ClassVar[int]
+
+    @property
+    def parameters(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    @property
+    def value(self) -> Callable[..., None]: ...  # noqa: D102
+
+    @property
+    def slopes(self) -> Callable[..., None]: ...  # noqa: D102
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point that a body carries.
+
+    Attributes:
+        joint: Index of the body's joint in Pinocchio's model, 0 for the base.
+        point: In the frame of the joint, shape (3,), m.
+    """
+
+    joint: int
+    point: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PathElement:
+    """A shape between bodies.
+
+    Attributes:
+        shape: The function.
+        parameters: Its numbers.
+        ends: The two points, and the side point of a wrap that another body carries than the wrap's.
+        joint: Of the body that carries the frame, 0 for the base.
+        frame: Placement of the frame in that joint's.
+        reach: Distance of both points' middle from the frame's origin beyond which a gap is open and not asked, m.
+        breadth: Half width of the first body's part across its points, m.
+        extent: Extent of the frame's body from the frame's origin, less the rounding that looks alike however it
+            turns, m; infinite for a half-space.
+    """
+
+    shape: PathShape
+    parameters: Array
+    ends: tuple[Place, ...]
+    joint: int = 0
+    frame: pin.SE3 = field(default_factory=pin.SE3.Identity)
+    reach: float = np.inf
+    breadth: float = 0.0
+    extent: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class PathTerm:
+    """The use of a piece by a row.
+
+    Attributes:
+        piece: The piece.
+        column: Which of its wrenches.
+        arm: Weight in the row's arm.
+        measure: Weight in the row's length; by default the arm's.
+        follows: Whether it begins where the row's leg before it ends: there the path turns.
+        bends: Whether its turn is one of the row's path; behind a pulley each branch has rows of its own.
+    """
+
+    piece: PathElement
+    column: int = 0
+    arm: float = 1.0
+    measure: float | None = None
+    follows: bool = False
+    bends: bool = True
+
+    @property
+    def length_weight(self) -> float:
+        """Weight in the row's length."""
+        return self.arm if self.measure is None else self.measure
+
+
+#: Of every row of a table, the legs of its path.
+Paths = Sequence[Sequence[PathTerm]]
+
+
+def moved(paths: Paths, shift: int) -> tuple[tuple[PathTerm, ...], ...]:
+    """Return paths in a model whose joints but the base are shifted by some places."""
+
+    @cache
+    def piece_there(piece: PathElement) -> PathElement:
+        ends = tuple(replace(end, joint=end.joint and end.joint + shift) for end in piece.ends)
+        return replace(piece, ends=ends, joint=piece.joint and piece.joint + shift)
+
+    return tuple(tuple(replace(leg, piece=piece_there(leg.piece)) for leg in legs) for legs in paths)
+
+
+@dataclass(frozen=True, eq=False)
+class PathKinematics:
+    """Lengths, arms and turns of paths for the rows of a table at one posture; k rows, N coordinates.
+
+    Attributes:
+        length: Shape (k,).
+        arm: Shape (k, N).
+        turn: Angle by which the paths turn, shape (k,), rad.
+        force: Unit wrench's force on the first body of each row's first leg, base frame, shape (k, 3).
+    """
+
+    length: Array
+    arm: Array
+    turn: Array
+    force: Array
+
+
+def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -> PathKinematics:
+    """Return lengths, arms and turns of paths for their rows at q, shape (nq,)."""
+    width = int(body.model.nv)
+    placements, twists = body.placements(q)
+
+    found = PathKinematics(
+        np.zeros(len(paths)), np.zeros((len(paths), coordinates)), np.zeros(len(paths)), np.zeros((len(paths), 3))
+    )
+    for k, legs in enumerate(paths):
+        before = np.zeros(3)
+        for number, leg in enumerate(legs):
+            piece = leg.piece
+            points = [placements[end.joint].act(np.asarray(end.point, dtype=float)) for end in piece.ends]
+            frame = placements[piece.joint] * piece.frame
+            out = _value(piece, frame, points)
+            rotation = frame.rotation
+            if piece.shape.columns == 1:
+                length, turn = out[0], out[1]
+                loads = [(rotation @ out[2:5], points[0]), (rotation @ out[5:8], points[1])]
+            else:
+                length, turn = (out[0] if leg.column == 0 else 0.0), 0.0
+                axis = (1, 7, 10)[leg.column]
+                loads = [(rotation @ out[axis : axis + 3], frame.act(out[4:7]))] if out[0] < 0.0 else []
+            arm = np.zeros(width)
+            for (force, point), end in zip(loads, piece.ends[:2], strict=False):
+                wrench = np.concatenate([force, pin.skew(point) @ force])
+                arm += wrench @ (twists[end.joint] - twists[piece.joint])
+            found.length[k] += leg.length_weight * length
+            found.arm[k, :width] += leg.arm * arm
+            if leg.bends:
+                found.turn[k] += turn + (_angle(before, -loads[0][0]) if leg.follows else 0.0)
+            if number == 0 and loads:
+                found.force[k] = loads[0][0]
+            before = loads[-1][0] if loads else before
+    return found
+
+
+def _value(piece: PathElement, frame: pin.SE3, points: Sequence[Array]) -> Array:
+    """Return the value of the shape; out of reach, a gap that is open."""
+    y = np.concatenate([frame.actInv(point) for point in points])
+    out = np.zeros(16)
+    beyond = np.linalg.norm(0.5 * (y[:3] + y[3:6])) - piece.reach
+    if beyond > 0.0:
+        out[0] = beyond
+    else:
+        piece.shape.value(y, piece.parameters, out)
+    return out
+
+
+def _angle(first: Array, second: Array) -> Any:
+    return np.arctan2(np.linalg.norm(pin.skew(first) @ second), first @ second)

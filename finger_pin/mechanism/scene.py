@@ -1,0 +1,259 @@
+"""Scene of a finger: objects, free ones as further bodies, and all contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.objects import Object
+from finger_pin.description.parameters import Link
+from finger_pin.exceptions import InputError
+from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.contacts import check_start, contact_rows
+from finger_pin.mechanism.evaluation import ContactPoints
+from finger_pin.mechanism.gaps import PRISM
+from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.rigid_body import RigidBody, Topology
+from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.solids import WORLD, add_free_objects, finger_solids, object_solids, pairs_within, tree_solids
+from finger_pin.mechanism.state import State
+from finger_pin.mechanism.tendon_paths import Placed
+from finger_pin.typing import Array, Indices
+
+#: Numbers of a free object's pose (position, quaternion), and of its velocity.
+POSE, VELOCITY = 7, 6
+
+
+def _links(description: FingerDescription) -> dict[str, Link]:
+    links: dict[str, Link] = {}
+    for name, joint in description.joints.items():
+        if joint.link is None:
+            raise InputError(f"finger.joints.{name}.link", "is needed for contacts, which take its size from there")
+        links[name] = joint.link
+    return links
+
+
+def _touching(
+    form: Topology,
+    objects: Mapping[str, Object],
+    description: FingerDescription,
+    _: RigidBody,
+    width: int,
+    placed: object,
+) -> tuple[object, ...]:
+    """Return all that contacts depend on: how heavy objects are, and where they move, is nothing to them."""
+    forms = (
+        (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.surface, *place)
+        for name, each in objects.items()
+        for place in [(each.position, each.orientation)]
+    )
+    carried = (joint.link for joint in description.joints.values())
+    links = ((link.length, link.width, link.offset) for link in carried if link)
+    hand = description.hand
+    pairs = hand and hand.fingers_touch, frozenset(pairs_within(description))
+    return (form, *pairs, width, *links, *forms)
+
+
+@memoised(lambda form, places, width: (form, places.tobytes(), width), most=1024)
+def _spread(form: Rows, places: Indices, width: int) -> Rows:
+    return form.spread(places, width)
+
+
+@memoised(lambda contacts, body, placed: (contacts, body.form, placed.tobytes()))
+def _check_start(contacts: Rows, body: RigidBody, placed: Array) -> None:
+    check_start(contacts, body, placed)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Objects around a finger.
+
+    Attributes:
+        objects: All objects, by name.
+        free: Objects that move, freely or along paths.
+        body: The finger's rigid body, and the free objects after its joints.
+        contacts: Between links and objects, links of different fingers, and objects.
+    """
+
+    objects: Mapping[str, Object]
+    free: Mapping[str, Object]
+    body: RigidBody
+    contacts: Rows
+
+    @classmethod
+    def of(
+        cls,
+        objects: Mapping[str, Object],
+        description: FingerDescription,
+        mechanism: Mechanism,
+        placed: Mapping[str | None, Placed] | None = None,
+    ) -> Scene:
+        """Put objects around a finger.
+
+        Args:
+            objects: By name.
+            description: The finger.
+            mechanism: The finger alone.
+            placed: Places of a tree's bodies; None for a finger that is made of links.
+
+        Raises:
+            InputError: If an object has the name of a joint or a shape, or a link has no size.
+        """
+        hand = description.hand
+        extended = add_free_objects(mechanism.body, objects, hand.palm if hand and mechanism.moved else None)
+        free = {name: each for name, each in objects.items() if extended.model.existJointName(f"{name}_attitude")}
+        for name, each in free.items():
+            if each.path and mechanism.moved:
+                raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
+        width = int(extended.model.nv) + len(mechanism.lumps)
+        contacts = cls._contacts(mechanism.body.form, objects, description, extended, width, placed)
+        return cls(objects, free, extended, contacts)
+
+    @staticmethod
+    @memoised(_touching)
+    def _contacts(
+        form: Topology,
+        objects: Mapping[str, Object],
+        description: FingerDescription,
+        extended: RigidBody,
+        width: int,
+        placed: Mapping[str | None, Placed] | None,
+    ) -> Rows:
+        """Return the contacts of links and objects."""
+        hand, tree = description.hand, description.tree
+        if tree is not None and placed is not None:
+            own = tree_solids(tree, placed, extended)
+        else:
+            own = finger_solids(_links(description), extended)
+        if hand is not None and hand.fingers_touch is False:
+            own = [replace(each, group=hand.name) for each in own]
+        for name in objects:
+            for what, taken in (("joint", description.joints), ("shape", [each.name for each in own])):
+                if name in taken:
+                    raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
+        return contact_rows([*own, *object_solids(objects, extended)], width, pairs_within(description))
+
+    def same_but_for_paths(self, objects: Mapping[str, Object] | None) -> bool:
+        """Return whether some objects are the same but for the paths of theirs and of the palm."""
+        # A world that a moving palm sees has to be as wide as the palm's path.
+        if self.world or objects is None or [*objects] != [*self.objects]:
+            return False
+        pairs = [(each, objects[name]) for name, each in self.objects.items()]
+        return all(one is two or (one.moves == two.moves and one.updated(path=two.path) == two) for one, two in pairs)
+
+    def with_objects(self, objects: Mapping[str, Object]) -> Scene:
+        """Return the same around a finger with such objects."""
+        return replace(self, objects=objects, free={name: objects[name] for name in self.free})
+
+    def around(self, mechanism: Mechanism) -> Mechanism:
+        """Return the finger with its surroundings: free objects after the joints, contacts before all other rows.
+
+        What contacts exert loads the pins of joints, so they are evaluated first.
+        """
+        joints, bodies, lumps = int(mechanism.body.model.nv), int(self.body.model.nv), len(mechanism.lumps)
+        places = np.append(np.arange(joints), bodies + np.arange(lumps))
+        width = bodies + lumps
+        rows = []
+        for table in mechanism.rows:
+            form = _spread(table.form, places, width)
+            rows.append(form if table.form is table else form.numbered(table.parameters))
+        lumps_of = mechanism.lumps, mechanism.inertia
+        guided = np.full(bodies + lumps, -1)
+        guided[bodies - len(self.world) : bodies] = np.arange(len(self.world))
+        led = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
+        for number, first in enumerate(led):
+            guided[first : first + VELOCITY] = VELOCITY * number + np.arange(VELOCITY)
+        return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, guided)
+
+    @property
+    def world(self) -> tuple[str, ...]:
+        """Names of the joints of the world seen by a moving palm; none for an empty world."""
+        return WORLD if self.body.model.existJointName(WORLD[0]) else ()
+
+    def start(self) -> tuple[Array, Array]:
+        """Return poses and velocities of the free objects at t = 0, shapes (7 f,) and (6 f,)."""
+        poses = [each.pose for each in self.free.values()]
+        rates = [np.append(each.velocity, each.angular_velocity) for each in self.free.values()]
+        return np.array(poses).reshape(-1), np.array(rates).reshape(-1)
+
+    def check(self, state: State) -> None:
+        """Refuse a state in which bodies are deep in each other.
+
+        Raises:
+            InputError: Naming the pair.
+        """
+        placed = _placed(state)
+        # Many runs start alike.
+        _check_start(self.contacts, self.body, placed)
+
+    @property
+    def mass(self) -> Array:
+        """Of the free objects, shape (f,), kg."""
+        return np.array([each.mass or 0.0 for each in self.free.values()])
+
+    def energies(self, pose: Array, velocity: Array, base: Array | None = None) -> tuple[Array, Array]:
+        """Return kinetic and potential energy of the free objects, shape (...,), J.
+
+        With a base that moves, (..., 15) or more numbers of `base_motion`, they are those of the motion in the world,
+        where the base has no height.
+        """
+        lead = pose.shape[:-1]
+        poses, rates = pose.reshape(*lead, -1, POSE), velocity.reshape(*lead, -1, VELOCITY)
+        places, speeds, turns = poses[..., :3], rates[..., :3], rates[..., 3:]
+        gravity = np.asarray(self.body.model.gravity.linear)
+        if base is not None:
+            moved = base[..., None, :]
+            speeds = speeds + moved[..., 3:6] + np.cross(moved[..., :3], places)
+            # The base turns in its own axes, objects in theirs: R^T omega by the conjugate of the quaternion.
+            axis, scalar = -poses[..., 3:6], poses[..., 6:]
+            omega = np.broadcast_to(moved[..., :3], axis.shape)
+            across = 2.0 * np.cross(axis, omega)
+            turns = turns + omega + scalar * across + np.cross(axis, across)
+            gravity = moved[..., 12:15]
+        inertia = np.array([each.inertia for each in self.free.values()]).reshape(-1, 3)
+        kinetic = 0.5 * (np.sum(speeds**2, axis=-1) @ self.mass + np.sum(inertia * turns**2, (-2, -1)))
+        return kinetic, -np.sum(places * gravity, axis=-1) @ self.mass
+
+    def touching(self, state: State, force: Array) -> ContactPoints:
+        """Return forces, points and normals of contacts in space.
+
+        Args:
+            state: m states.
+            force: Along the contacts' three arms, shape (m, 3 c), N.
+        """
+        body, data, placed = self.body, self.body.model.createData(), _placed(state)
+        pieces = [legs[0].piece for legs in self.contacts.paths[:: CONTACT.arms]]
+        along = force.reshape(len(force), len(pieces), CONTACT.arms)
+        found, out = ContactPoints(*(np.zeros((len(force), len(pieces), 3)) for _ in range(3))), np.zeros(16)
+        for m in np.flatnonzero(np.any(along[..., 0], axis=1)):
+            pin.forwardKinematics(body.model, data, placed[m])
+            for c in np.flatnonzero(along[m, :, 0]):
+                piece = pieces[c]
+                frame = data.oMi[piece.joint] * piece.frame
+                y = np.concatenate([frame.actInv(data.oMi[end.joint].act(end.point)) for end in piece.ends])
+                PRISM.value(y, piece.parameters, out)
+                axes = frame.rotation @ out[[1, 2, 3, 7, 8, 9, 10, 11, 12]].reshape(3, 3).T
+                found.force[m, c] = -axes @ along[m, c]
+                found.normal[m, c] = axes[:, 0]
+                found.point[m, c] = frame.act(out[4:7])
+        return found
+
+
+def _placed(state: State) -> Array:
+    """Return the positions of the bodies of the surroundings, shape (..., nq)."""
+    parts = (state.position, state.object_pose, state.world_position)
+    return np.concatenate([each for each in parts if each is not None], axis=-1)
+
+
+def same_but_for_path(one: FingerDescription, other: FingerDescription) -> bool:
+    """Return whether two descriptions have the same parts, and hands with palms that both move or both rest."""
+    if one.hand is None or other.hand is None:
+        return one == other
+    parts = all(getattr(one, name) is getattr(other, name) for name in FingerDescription.model_fields)
+    moving = (one.hand.palm.path is None) == (other.hand.palm.path is None)
+    return parts and moving and one.hand.fingers_touch == other.hand.fingers_touch

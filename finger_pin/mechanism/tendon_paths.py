@@ -1,0 +1,202 @@
+"""The tendons of a tree as functions of the posture: sums of joint positions, or paths through space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.routing import Routing
+from finger_pin.description.tree import Tree
+from finger_pin.description.waypoints import Waypoint
+from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.rows import RowSignals, combined
+from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
+from finger_pin.mechanism.spans.span import ELSEWHERE
+from finger_pin.typing import Array
+
+
+@dataclass(frozen=True)
+class Placed:
+    """The place of a body.
+
+    Attributes:
+        joint: Index of the joint that carries it in Pinocchio's model, 0 for the base.
+        frame: Its placement in that joint's frame.
+    """
+
+    joint: int
+    frame: pin.SE3
+
+    def place(self, position: tuple[float, float, float]) -> Place:
+        """Return a point of the body."""
+        return Place(self.joint, np.array(self.frame.act(np.array(position))))
+
+
+@dataclass(frozen=True, eq=False)
+class TendonPath:
+    """The parts of a tendon's length; L = coefficients q + the lengths of its legs.
+
+    Attributes:
+        coefficients: Shape (n,).
+        legs: Of its path.
+        branches: Behind each pulley, the divisor and the legs of that part, undivided.
+    """
+
+    coefficients: Array
+    legs: tuple[PathTerm, ...]
+    branches: tuple[tuple[float, tuple[PathTerm, ...]], ...] = ()
+
+    def times(self, factor: float) -> TendonPath:
+        """Return the same with its length multiplied."""
+        legs = tuple(replace(leg, arm=factor * leg.arm) for leg in self.legs)
+        return TendonPath(factor * self.coefficients, legs)
+
+
+@dataclass(frozen=True, eq=False)
+class TendonPaths:
+    """All tendons of a tree; t tendons, n joints.
+
+    Attributes:
+        body: The rigid body.
+        routes: By name.
+        placed: Places of the tree's bodies, by name.
+        middles: Of the joints' ranges, by name, rad or m.
+    """
+
+    body: RigidBody
+    routes: Mapping[str, TendonPath]
+    placed: Mapping[str | None, Placed]
+    middles: Mapping[str, float]
+
+    @classmethod
+    def of(
+        cls, tree: Tree, body: RigidBody, placed: Mapping[str | None, Placed], middles: Mapping[str, float]
+    ) -> TendonPaths:
+        """Read the tendons of a tree whose bodies are placed, and whose joints' ranges have some middles."""
+        routes, joints = {}, list(tree.joints)
+        for name, tendon in tree.tendons.items():
+            coefficients = np.zeros(len(joints))
+            for joint, coefficient in (tendon.joints or {}).items():
+                coefficients[joints.index(joint)] = coefficient
+            routes[name] = _route(coefficients, tendon.path or {}, placed)
+        return cls(body, routes, placed, middles)
+
+    @property
+    def fixed(self) -> Array:
+        """The part of dL/dq that does not depend on the posture, shape (t, n)."""
+        rows = [route.coefficients for route in self.routes.values()]
+        return np.array(rows).reshape(-1, int(self.body.model.nv))
+
+    def length(self, q: Array) -> Array:
+        """Return the lengths at q, shape (..., n), as MuJoCo's ``ten_length``: shape (..., t), m."""
+        return self._reached(q)[0]
+
+    def arms(self, q: Array) -> Array:
+        """Return dL/dq at q, shape (..., n), as MuJoCo's ``ten_J``: shape (..., t, n), m."""
+        return self._reached(q)[1]
+
+    def turn(self, q: Array) -> Array:
+        """Return the angle by which each path turns at q, shape (..., n), before its first pulley: (..., t), rad."""
+        return self._reached(q)[2]
+
+    def _reached(self, q: Array) -> tuple[Array, Array, Array]:
+        q = np.asarray(q, dtype=float)
+        if q.ndim > 1:
+            each = [self._reached(one) for one in q]
+            length, arms, turn = (np.array(part) for part in zip(*each, strict=True))
+            return length, arms, turn
+        found = path_kinematics(self.body, q, [route.legs for route in self.routes.values()], len(q))
+        return found.length + self.fixed @ q, found.arm + self.fixed, found.turn
+
+
+def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> TendonPath:
+    """Return a tendon's route: only the turn before the first pulley is that of its own canal."""
+    parts: list[tuple[float, list[PathTerm]]] = [(1.0, [])]
+    before: Place | None = None
+    wrap: Waypoint | None = None
+    for each in path.values():
+        if each.kind == "pulley":
+            parts.append((each.divisor, []))
+            before = None
+        elif each.kind == "point":
+            here = placed[each.body].place(each.position)
+            if before is not None:
+                legs = parts[-1][1]
+                legs.append(PathTerm(_piece(before, here, wrap, placed), follows=bool(legs)))
+            before, wrap = here, None
+        else:
+            wrap = each
+    (_, trunk), *branches = parts
+    behind = [replace(leg, arm=1.0 / divisor, bends=False) for divisor, legs in branches for leg in legs]
+    divided = tuple((divisor, tuple(legs)) for divisor, legs in branches)
+    return TendonPath(coefficients, (*trunk, *behind), divided)
+
+
+def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[str | None, Placed]) -> PathElement:
+    if wrap is None:
+        return PathElement(STRAIGHT, np.zeros(0), (first, second))
+    body = placed[wrap.body]
+    frame = body.frame * pin.SE3(rotation(wrap.orientation), np.array(wrap.position))
+    side, elsewhere = (0.0, 0.0, 0.0) if wrap.side is None else wrap.side, wrap.side_point
+    inside = wrap.side is not None and float(np.linalg.norm(side)) < wrap.radius
+    known = ELSEWHERE if elsewhere else float(wrap.side is not None)
+    numbers = np.array([wrap.radius, *side, known, inside], dtype=float)
+    third = (placed[elsewhere.body].place(elsewhere.position),) if elsewhere else ()
+    shape = CYLINDER if wrap.kind == "cylinder" else SPHERE
+    return PathElement(shape, numbers, (first, second, *third), body.joint, frame)
+
+
+def rotation(quaternion: tuple[float, float, float, float]) -> Array:
+    """Return the rotation of a unit quaternion x, y, z, w, shape (3, 3)."""
+    matrix: Array = pin.Quaternion(np.array(quaternion)).normalized().matrix()
+    return matrix
+
+
+class Excursions:
+    """The excursions of all t tendons, which are zero in the joints' reference posture."""
+
+    def __init__(self, routing: Routing, description: FingerDescription, paths: TendonPaths | None) -> None:
+        """Find the tendons that go along paths.
+
+        Args:
+            routing: H_c.
+            description: Of the finger.
+            paths: The paths of its tree; None without a tree.
+        """
+        self._names, self._coupling, self._paths, self._rest = routing.tendons, routing.coupling, paths, np.zeros(0)
+        # Of every tendon that goes along a path, which one.
+        self._along: dict[int, int] = {}
+        if paths is not None and description.tree is not None:
+            self._rest = np.array([joint.reference for joint in description.tree.joints.values()])
+            names, tendons = list(paths.routes), enumerate(description.tendons.values())
+            self._along = {k: names.index(tendon.along) for k, tendon in tendons if tendon.along is not None}
+
+    def lengths(self, position: Array) -> Array:
+        """Return the excursions of the tendons at theta, shape (..., n): shape (..., t), m."""
+        drawn = np.asarray(position @ self._coupling.T)
+        if self._paths is not None:
+            lengths = self._paths.length(self._rest) - self._paths.length(position)
+            for k, path in self._along.items():
+                drawn[..., k] = lengths[..., path]
+        return drawn
+
+    def slopes(self, position: Array) -> Array:
+        """Return their derivatives by theta, shape (..., n): shape (..., t, n), m."""
+        coupling = np.broadcast_to(self._coupling, (*position.shape[:-1], *self._coupling.shape)).copy()
+        if self._paths is not None and self._along:
+            coupling[..., [*self._along], :] = -self._paths.arms(position)[..., [*self._along.values()], :]
+        return coupling
+
+    def torque(self, x: Array, pulling: RowSignals) -> Array:
+        """Return the torque of driven or elastic tendons at packed states, shape (..., size): shape (..., n), N m."""
+        joints = self._coupling.shape[1]
+        if not pulling.rows.routed:
+            return combined(pulling.force, pulling.rows.arm)[..., :joints]
+        places = [self._names.index(name) for name in pulling.rows.pulls or pulling.rows.names]
+        coupling = self.slopes(x[..., :joints])[..., places, :]
+        return np.asarray((pulling.force[..., None, :] @ coupling)[..., 0, :])

@@ -1,0 +1,253 @@
+"""URDF of a finger, and the Pinocchio model read from it."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.loading import DescriptionLike, describe
+from finger_pin.description.parameters import Link
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.rigid_body import RigidBody, Topology
+from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
+
+BASE_FRAME = "base"
+TIP_FRAME = "fingertip"
+
+#: Tension that the effort limits allow each tendon, N, and the velocity limit of each joint, rad/s.
+#: They are for readers of the URDF that want some; the simulation applies neither.
+TENSION_LIMIT = 100.0
+VELOCITY_LIMIT = 20.0
+
+# Names that the URDF or Pinocchio gives to something else, so that looking them up would be ambiguous.
+_RESERVED = (TIP_FRAME, f"{TIP_FRAME}_fixed", "universe")
+
+
+def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
+    """Return the URDF of a finger as text: Table I, inertias, joint ranges and shapes.
+
+    Links are named ``base``, ``<joint>_link`` and ``fingertip``. A link's frame is its joint's: the axis is z
+    and the link runs along x, its ``offset`` along the axis away. Numbers are written so that reading them gives the
+    same floats.
+
+    Args:
+        description: The finger, its name, the path of its file, or the scenario that has it; not a hand of several.
+        drawn: With shapes, and indented. Its motion needs neither.
+
+    Raises:
+        InputError: If it is no finger, it has a tree of bodies or a joint without a link, or a name that the URDF
+            needs itself.
+    """
+    description = exported(description)
+    if description.hand is not None:
+        allowed = "is a hand; write its fingers one by one: description.hand.built()"
+        raise InputError("finger", allowed, description.name)
+    links = _links(description)
+    shapes = _shapes(description, links) if drawn else {}
+    robot = ET.Element("robot", name=description.name)
+    for material, colour in (MATERIALS if drawn else {}).items():
+        ET.SubElement(ET.SubElement(robot, "material", name=material), "color", rgba=_numbers(*colour))
+    _add_link(robot, BASE_FRAME, shapes.get(BASE_FRAME, ()))
+    parent, place, twist = BASE_FRAME, (0.0, 0.0, 0.0), 0.0
+    for name, link in links.items():
+        child = f"{name}_link"
+        _add_link(robot, child, shapes.get(name, ()), inertia_of=link)
+        joint = _add_joint(robot, name, "revolute", parent, child, place, twist)
+        ET.SubElement(joint, "axis", xyz=_numbers(0, 0, 1))
+        lower, upper = description.joints[name].range
+        limits = {"lower": lower, "upper": upper, "effort": effort_limit(description, name)}
+        limits["velocity"] = VELOCITY_LIMIT
+        ET.SubElement(joint, "limit", {key: _numbers(value) for key, value in limits.items()})
+        parent, place, twist = child, (link.length, 0.0, link.offset), link.twist
+    _add_link(robot, TIP_FRAME, shapes.get(TIP_FRAME, ()))
+    _add_joint(robot, f"{TIP_FRAME}_fixed", "fixed", parent, TIP_FRAME, place, twist)
+    if drawn:
+        ET.indent(robot)
+    return ET.tostring(robot, encoding="unicode") + "\n"
+
+
+def exported(described: DescriptionLike | Scenario) -> FingerDescription:
+    """Return the description of a finger, or of a hand's fingers together, for a file of another program.
+
+    Raises:
+        InputError: If it is none of them, or has a tree of bodies.
+    """
+    described = describe(described.finger if isinstance(described, Scenario) else described)
+    if described.tree is not None:
+        allowed = "is not written: bodies in place of links; a model read from MuJoCo has its own MJCF"
+        raise InputError("finger.tree", allowed, described.name)
+    return described
+
+
+def effort_limit(description: FingerDescription, joint: str) -> float:
+    """Return the torque on a joint, N m, when the tendons on its stronger side all carry `TENSION_LIMIT`."""
+    crossings = [tendon.crossings.get(joint) for tendon in description.tendons.values()]
+    radii = [crossing.radius for crossing in crossings if crossing]
+    return TENSION_LIMIT * max(sum(r for r in radii if r > 0.0), -sum(r for r in radii if r < 0.0))
+
+
+def build_rigid_body(description: FingerDescription) -> RigidBody:
+    """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
+    return _build(description) if description.hand is None else build_hand(description.hand)
+
+
+def _linked(description: FingerDescription) -> tuple[object, ...]:
+    """Return all that a finger's body depends on; by value, as other numbers make new descriptions of its links."""
+    links = (joint.link for joint in description.joints.values())
+    values = (link and tuple(getattr(link, name) for name in Link.model_fields) for link in links)
+    return (description.name, description.gravity, *description.joints, *values)
+
+
+@memoised(_linked)
+def _build(description: FingerDescription) -> RigidBody:
+    model = _read(to_urdf(description, drawn=False)).copy()
+    model.gravity.linear[:] = description.gravity
+    body = RigidBody(model, TIP_FRAME)
+    places = [(name, each.length, each.offset, each.twist) for name, each in _links(description).items()]
+    body.form = _topology(*places)
+    return body
+
+
+@memoised(lambda *places: places)
+def _topology(*places: object) -> Topology:
+    """Return the topology of links of some lengths, offsets and twists, the same for the same ones."""
+    return Topology()
+
+
+@lru_cache(maxsize=16)
+def _read(text: str) -> pin.Model:
+    """Return the model of a URDF; a hand is read as a whole and finger by finger."""
+    return pin.buildModelFromXML(text)
+
+
+def build_hand(hand: HandSettings) -> RigidBody:
+    """Return the rigid body of a hand: its fingers in their places, in the palm's frame."""
+    pulled = {"gravity": hand.gravity}
+    parts = {name: build_rigid_body(finger.model_copy(update=pulled)) for name, finger in hand.built().items()}
+    placed = tuple((name, each.position, each.orientation) for name, each in hand.fingers.items())
+
+    return _weighed_hand(hand, placed, parts)
+
+
+@memoised(lambda hand, placed, parts: (hand.gravity, *placed, *parts.values()))
+def _weighed_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping[str, RigidBody]) -> RigidBody:
+    joined = _joined_hand(hand, placed, parts)
+    return joined.weighing([each for part in parts.values() for each in part.inertias], hand.gravity)
+
+
+@memoised(lambda hand, placed, parts: (*placed, *(part.form for part in parts.values())))
+def _joined_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping[str, RigidBody]) -> RigidBody:
+    places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
+    return join_bodies(parts, places)
+
+
+def _links(description: FingerDescription) -> dict[str, Link]:
+    links = {}
+    for name, joint in description.joints.items():
+        if name in _RESERVED:
+            raise InputError(f"finger.joints.{name}", f"a joint cannot be called {' or '.join(_RESERVED)}")
+        if joint.link is None:
+            raise InputError(f"finger.joints.{name}.link", "is needed to generate a URDF")
+        links[name] = joint.link
+    return links
+
+
+def _shapes(description: FingerDescription, links: dict[str, Link]) -> dict[str, list[Shape]]:
+    """Return the shapes of the links, by joint, of the palm and of the fingertip, by frame."""
+    first, last = next(iter(links)), next(reversed(links.values()))
+    palm, pad = palm_shapes(description, first, links[first]), pad_shapes(last)
+    return {BASE_FRAME: palm, **link_shapes(description, links), TIP_FRAME: pad}
+
+
+def _add_link(robot: ET.Element, name: str, shapes: Iterable[Shape], inertia_of: Link | None = None) -> None:
+    element = ET.SubElement(robot, "link", name=name)
+    if inertia_of is not None:
+        axial, transverse = inertia_of.inertia
+        inertial = ET.SubElement(element, "inertial")
+        ET.SubElement(
+            inertial, "origin", xyz=_numbers(inertia_of.mass_centre, 0, inertia_of.offset), rpy=_numbers(0, 0, 0)
+        )
+        ET.SubElement(inertial, "mass", value=_numbers(inertia_of.mass))
+        moments = {"ixx": axial, "ixy": 0.0, "ixz": 0.0, "iyy": transverse, "iyz": 0.0, "izz": transverse}
+        ET.SubElement(inertial, "inertia", {key: _numbers(value) for key, value in moments.items()})
+    for shape in shapes:
+        visual = _add_shape(element, "visual", shape)
+        ET.SubElement(visual, "material", name=shape.material)
+    for shape in shapes:
+        if shape.collides:
+            _add_shape(element, "collision", shape)
+
+
+def _add_shape(link: ET.Element, role: str, shape: Shape) -> ET.Element:
+    element = ET.SubElement(link, role)
+    ET.SubElement(element, "origin", xyz=_numbers(*shape.position), rpy=_numbers(*shape.rotation))
+    geometry = ET.SubElement(element, "geometry")
+    if shape.kind == "box":
+        ET.SubElement(geometry, "box", size=_numbers(*shape.size))
+    else:
+        sizes = zip(("radius", "length"), shape.size, strict=False)
+        ET.SubElement(geometry, shape.kind, {key: _numbers(value) for key, value in sizes})
+    return element
+
+
+def _add_joint(
+    robot: ET.Element, name: str, kind: str, parent: str, child: str, place: tuple[float, float, float], twist: float
+) -> ET.Element:
+    joint = ET.SubElement(robot, "joint", name=name, type=kind)
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=child)
+    ET.SubElement(joint, "origin", xyz=_numbers(*place), rpy=_numbers(twist, 0, 0))
+    return joint
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def join_bodies(parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | None = None) -> RigidBody:
+    """Return several bodies on one base; names of joints and tips begin with that of their part and a dot.
+
+    Args:
+        parts: By name.
+        places: Placements of the parts' base frames on the common base; there itself by default. Gravity is that
+            of the common base.
+
+    Raises:
+        InputError: If gravity is not the same for all.
+    """
+    model, tips = pin.Model(), []
+    axes, carriers = [np.array([1.0, 0.0, 0.0])], [0]
+    model.gravity = next(iter(parts.values())).model.gravity
+    for part, body in parts.items():
+        own, shift = body.model, model.njoints - 1
+        place = (places or {}).get(part, pin.SE3.Identity())
+        if own.gravity != model.gravity:
+            raise InputError(f"{part}.gravity", f"must be {model.gravity.linear}", own.gravity.linear)
+        for index in range(1, own.njoints):
+            parent = int(own.parents[index])
+            joint, placement = own.joints[index], own.jointPlacements[index]
+            placement = placement if parent else place * placement
+            at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{own.names[index]}")
+            # Appending bodies, or frames with theirs, would round.
+            model.inertias[at] = own.inertias[index]
+            at, moved = model.joints[at].idx_v, own.joints[index]
+            model.armature[at : at + moved.nv] = own.armature[moved.idx_v : moved.idx_v + moved.nv]
+        for tip in body.tips:
+            frame = own.frames[tip]
+            holder = frame.parentJoint and frame.parentJoint + shift
+            tips.append(f"{part}.{frame.name}")
+            held = frame.placement if holder else place * frame.placement
+            model.addFrame(pin.Frame(tips[-1], holder, 0, held, pin.FrameType.OP_FRAME), False)
+        along = zip(body.proximal_axes[1:], body.carriers[1:], strict=True)
+        axes += [axis if carrier else place.rotation @ axis for axis, carrier in along]
+        carriers += [carrier and carrier + shift for carrier in body.carriers[1:]]
+    joined = RigidBody(model, tips)
+    joined.proximal_axes, joined.carriers = axes, carriers
+    return joined

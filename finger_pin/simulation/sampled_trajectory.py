@@ -1,0 +1,122 @@
+"""A trajectory at the times that are saved, and all that follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.control.interface import ControlSignals
+from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.mechanism.evaluation import ContactPoints
+from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.state import State
+from finger_pin.references.reference import ReferenceSignals
+from finger_pin.simulation.account import Account, account
+from finger_pin.simulation.energy import Flows, energies, powers
+from finger_pin.typing import Array
+
+#: Variables that need states, plans and no more of the finger's signals than forces.
+_OF_FORCES = frozenset(
+    {
+        "joint_position",
+        "joint_velocity",
+        "joint_reference",
+        "tracking_error",
+        "joint_torque_command",
+        "joint_torque",
+        "tendon_command",
+        "tendon_tension",
+        "fingertip_position",
+    }
+)
+
+
+class SampledTrajectory:
+    """A trajectory at times, and all that follows from it, computed when it is first asked for.
+
+    The signals are recomputed from the states by the evaluation that the dynamics use.
+
+    Attributes:
+        loop: The system.
+        trajectory: Its solution.
+        times: Shape (m,), s, as far as the trajectory goes.
+    """
+
+    _forces_only = False
+
+    def __init__(
+        self, loop: ClosedLoop, trajectory: Trajectory, times: Array, names: Sequence[str] | None = None
+    ) -> None:
+        """Compute nothing yet.
+
+        Args:
+            loop: The system.
+            trajectory: Its solution.
+            times: Shape (m,), in order, s.
+            names: Names of `variables` that will be asked for; by default all.
+        """
+        self._accelerated = names is None or "joint_acceleration" in names
+        self._forces_only = names is not None and _OF_FORCES.issuperset(names)
+        self.loop, self.trajectory = loop, trajectory
+        self.times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
+
+    @cached_property
+    def packed(self) -> Array:
+        """The packed states, shape (m, size)."""
+        return self.trajectory.interpolate(self.times)
+
+    @cached_property
+    def state(self) -> State:
+        """The states by name."""
+        return self.loop.finger.layout.unpack(self.packed)
+
+    @cached_property
+    def reference(self) -> ReferenceSignals:
+        """The reference."""
+        return self.signals.reference if "signals" in vars(self) else self.loop.reference.at(self.times)
+
+    @cached_property
+    def control(self) -> ControlSignals:
+        """The commands."""
+        return self.signals.control
+
+    @cached_property
+    def signals(self) -> LoopSignals:
+        """All signals of the finger."""
+        if self._forces_only:
+            return self.loop.pulls(self.times, self.packed)
+        return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
+
+    @property
+    def finger(self) -> FingerSignals:
+        """Signals of the finger, by the names of the paper."""
+        return self.signals.finger
+
+    @cached_property
+    def touching(self) -> ContactPoints:
+        """Contacts in space."""
+        around, found = self.loop.finger.scene, self.finger.mechanism
+        assert around is not None
+        return found.touching or around.touching(self.state, found.rows[around.contacts.group].force)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Fingertips, and energies of the rigid body."""
+        return self.loop.motion(self.times, self.state)
+
+    @cached_property
+    def stored(self) -> dict[str, Array]:
+        """The energies by name, J."""
+        return energies(self.loop.finger, self.finger, self.motion)
+
+    @cached_property
+    def powers(self) -> Flows:
+        """Powers supplied and lost, W."""
+        return powers(self.finger)
+
+    @cached_property
+    def account(self) -> Account:
+        """The energy account."""
+        return account(self.loop, self.trajectory, self.times, self.signals, self.motion)

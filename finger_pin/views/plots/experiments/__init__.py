@@ -1,1 +1,0 @@
-"""Figures of experiments that span many runs: the conclusions of the paper, and controllers side by side."""

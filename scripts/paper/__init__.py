@@ -1,0 +1,1 @@
+"""Experiments of the paper: its figures, its conclusions, controllers compared, the error of its (17)."""
