@@ -82,7 +82,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _of_state(block: str, single: bool = False) -> Quantity:
-    """Return the variable of a block of the state, of a single number without a dimension of its own."""
+    """Return the variable of a block of the state; without a second dimension if ``single``."""
     of = BLOCKS[block]
 
     def value(motion: SampledTrajectory) -> Array:
