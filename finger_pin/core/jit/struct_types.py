@@ -7,7 +7,8 @@ function for each field of each table, by which the core takes half as long agai
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple, get_type_hints
+from collections.abc import MutableSequence
+from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, get_type_hints
 
 import numpy as np
 from numba import types
@@ -32,20 +33,24 @@ Matrix = Annotated[Array, Numbers("float64", 2)]
 Layers = Annotated[Array, Numbers("float64", 3)]
 IndexTable = Annotated[NDArray[np.int64], Numbers("int64", 2)]
 Indices = Annotated[NDArray[np.int64], Numbers("int64", 1)]
+#: Floats in memory, by index: an address to compiled code.
+Pointer: TypeAlias = MutableSequence[float]
+
+_Table = TypeVar("_Table", bound=tuple[Any, ...])
 
 _SCALARS = {int: types.int64, float: types.float64, bool: types.boolean}
 # Callers see another signature than numba's.
 _generated: Any = intrinsic
 
 
-class StructType(types.Record):  # type: ignore[misc]
+class StructType(types.Record, Generic[_Table]):  # type: ignore[misc]
     """The type of a table: a NamedTuple whose fields are arrays of the types above, numbers, or such tables.
 
     Attributes:
         kinds: By name, the types of fields: of numbers ``int``, ``float`` or ``bool``.
     """
 
-    def __init__(self, table: Any) -> None:
+    def __init__(self, table: type[_Table]) -> None:
         """Read the annotations. An array takes the words of its address and of its sizes, every number one word."""
         self.kinds: dict[str, Any] = {}
         fields: list[Any] = []
@@ -76,7 +81,7 @@ register_model(StructType)(models.OpaqueModel)
 
 
 @lower_getattr_generic(StructType)  # type: ignore[untyped-decorator]
-def _field(context: Any, builder: Any, table: StructType, value: Any, name: str) -> Any:
+def _field(context: Any, builder: Any, table: StructType[Any], value: Any, name: str) -> Any:
     """Load a field, marked as constant, so that the optimiser loads it once, whatever is stored meanwhile."""
     kind, place, found = table.kinds[name], table.offset(name), table.typeof(name)
     integer = context.get_value_type(types.int64)
@@ -107,11 +112,17 @@ def _field(context: Any, builder: Any, table: StructType, value: Any, name: str)
     return array._getvalue()
 
 
-@_generated
-def unpack(_typing: Any, address: Any, kind: Any) -> Any:
-    """Return the table at the address of a block that `pack` has filled."""
+class _Unpack(Protocol):
+    def __call__(self, address: int, kind: StructType[_Table], /) -> _Table: ...
 
+
+@_generated
+def _unpack(_typing: Any, address: Any, kind: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
     return kind.instance_type(types.int64, kind), generate
+
+
+#: Return the table at the address of a block that `pack` has filled.
+unpack: _Unpack = _unpack

@@ -47,7 +47,7 @@ class Block:
     __reduce__ = refuse_copy
 
 
-def pack(table: Any, kind: StructType) -> Block:
+def pack(table: _Table, kind: StructType[_Table]) -> Block:
     """Return a block that holds a table for `unpack`.
 
     Raises:
@@ -58,7 +58,7 @@ def pack(table: Any, kind: StructType) -> Block:
     return Block(table, words)
 
 
-def call(unit: CompiledFunction, table: Any, kind: StructType) -> int:
+def call(unit: CompiledFunction, table: _Table, kind: StructType[_Table]) -> int:
     """Call a unit with a table."""
     block = pack(table, kind)
     return unit(block.address)
@@ -175,7 +175,7 @@ def _address(array: Any) -> int:
     return int(array.ctypes.data)
 
 
-def _write(table: Any, kind: StructType, words: list[int]) -> None:
+def _write(table: tuple[Any, ...], kind: StructType[Any], words: list[int]) -> None:
     for value, own in zip(table, kind.kinds.values(), strict=True):
         if isinstance(own, Numbers):
             fitting = isinstance(value, np.ndarray) and value.ndim == own.dimensions and value.flags.c_contiguous
