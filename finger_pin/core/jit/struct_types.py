@@ -7,10 +7,11 @@ function for each field of each table, by which the core takes half as long agai
 
 from __future__ import annotations
 
-from collections.abc import MutableSequence
+from collections.abc import Callable, MutableSequence, Sequence
 from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, get_type_hints
 
 import numpy as np
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, lower_getattr_generic, models, register_model
 from numpy.typing import NDArray
@@ -66,14 +67,14 @@ class StructType(types.Record, Generic[_Table]):  # type: ignore[misc]
         # Tables of the same layout stay apart.
         self.name = f"{table.__module__}.{table.__qualname__}"
 
-    def typeof(self, key: str) -> Any:
+    def typeof(self, key: str) -> types.Type:
         """Return the type that compiled code sees in a field."""
         kind = self.kinds[key]
         if isinstance(kind, Numbers):
             return types.Array(getattr(types, kind.dtype), kind.dimensions, "C")
         return _SCALARS.get(kind, kind)
 
-    def can_convert_to(self, typingctx: Any, other: Any) -> None:
+    def can_convert_to(self, typingctx: Any, other: types.Type) -> None:
         """Convert to no other table, though its first fields may be the same."""
 
 
@@ -81,15 +82,15 @@ register_model(StructType)(models.OpaqueModel)
 
 
 @lower_getattr_generic(StructType)  # type: ignore[untyped-decorator]
-def _field(context: Any, builder: Any, table: StructType[Any], value: Any, name: str) -> Any:
+def _field(context: Any, builder: ir.IRBuilder, table: StructType[Any], value: ir.Value, name: str) -> ir.Value:
     """Load a field, marked as constant, so that the optimiser loads it once, whatever is stored meanwhile."""
     kind, place, found = table.kinds[name], table.offset(name), table.typeof(name)
     integer = context.get_value_type(types.int64)
 
-    def at(offset: int) -> Any:
+    def at(offset: int) -> ir.Value:
         return builder.gep(value, [integer(offset)])
 
-    def load(offset: int, to: Any) -> Any:
+    def load(offset: int, to: ir.Type) -> ir.Value:
         loaded = builder.load(builder.bitcast(at(offset), to.as_pointer()))
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
@@ -117,8 +118,8 @@ class _Unpack(Protocol):
 
 
 @_generated
-def _unpack(_typing: Any, address: Any, kind: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+def _unpack(_typing: Any, address: types.Type, kind: Any) -> tuple[Any, Callable[..., ir.Value]]:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
     return kind.instance_type(types.int64, kind), generate

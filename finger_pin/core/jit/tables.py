@@ -18,7 +18,7 @@ _Table = TypeVar("_Table", bound=tuple[Any, ...])
 _DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
 
 
-def refuse_copy(holder: Any) -> NoReturn:
+def refuse_copy(holder: object) -> NoReturn:
     """Refuse to copy or pickle an object that holds addresses, as its method ``__reduce__``.
 
     A copy would lead compiled code to the memory of the original, which may be gone, or in another process. Owners that
@@ -39,7 +39,7 @@ class Block:
 
     __slots__ = ("_table", "_words", "address")
 
-    def __init__(self, table: Any, words: list[int]) -> None:
+    def __init__(self, table: tuple[Any, ...], words: list[int]) -> None:
         """Keep a table and its machine words."""
         self._table, self._words = table, np.array(words, dtype=np.int64)
         self.address = int(self._words.ctypes.data)
@@ -154,7 +154,7 @@ def taken(like: _Table, places: _Table, table: tuple[Any, ...], before: tuple[An
     return type(like)(*found)
 
 
-def _is_of_numbers(value: Any) -> bool:
+def _is_of_numbers(value: object) -> bool:
     return isinstance(value, np.ndarray) and value.dtype == float
 
 
