@@ -1,8 +1,8 @@
-"""Contacts that are asleep: open, at rest, and too far apart to close before they are looked at again.
+"""Conservative culling of contact pairs that cannot close within the next steps.
 
 Within a step the path of two bodies' relative motion is at most the sum, over the coordinates that move them against
 each other, of how far each goes to and fro times its lever. A polynomial goes no farther than its Bernstein
-coefficients do. One that is asleep keeps less than its gap, from which such paths are taken.
+coefficients do. A culled pair keeps a lower bound of its gap, from which such paths are taken.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _STRAIGHT = 1e-14
 
 @njit_always_inline
 def depart(tables: Tables, own: PathWork) -> None:
-    """Note the gaps of all contacts that are awake at the beginning of a step."""
+    """Record the gap of every active pair at the start of a step."""
     paths = tables.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
@@ -98,20 +98,20 @@ def widened(path: float, turned: float, far: float) -> float:
 
 @njit_inline
 def set_asleep(k: int, value: int, asleep: Indices) -> None:
-    """Let the rows of a contact sleep, or wake them."""
+    """Mark the rows of a contact as culled or active."""
     for m in range(k, k + 3):
         asleep[m] = value
 
 
 def wake_all(tables: Tables, own: PathWork) -> None:
-    """Wake all contacts, outside compiled code."""
+    """Activate all pairs, outside compiled code."""
     own.asleep[:], own.awake[:] = 0, np.arange(own.awake.size)
     own.awake_count[0] = tables.touching // COLUMNS
 
 
 @njit_inline
 def list_awake(tables: Tables, own: PathWork) -> None:
-    """List the contacts that are awake."""
+    """List the active pairs."""
     awake = 0
     for e in range(tables.touching // COLUMNS):
         if own.asleep[tables.paths.row[e]] == 0:
@@ -136,7 +136,7 @@ def wake(tables: Tables, own: PathWork) -> None:
 
 @njit_always_inline
 def arrive(tables: Tables, own: PathWork) -> None:
-    """Note the gaps of contacts that are awake at the end of a way that was traced."""
+    """Record the gap of every active pair at the end of a bounded motion."""
     paths = tables.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
@@ -156,7 +156,7 @@ def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
 
 @njit_inline
 def settle(tables: Tables, rows: Matrix, own: PathWork, states: Vector) -> bool:
-    """Let contacts fall asleep or wake up at the end of a step, by bounds of their gaps there.
+    """Cull or activate pairs at the end of a step, by bounds of their gaps there.
 
     Returns:
         Whether any did.
@@ -182,7 +182,7 @@ def settle(tables: Tables, rows: Matrix, own: PathWork, states: Vector) -> bool:
 
 @njit_inline
 def rouse(tables: Tables, work: Work) -> None:
-    """Wake all contacts, of which nothing is known."""
+    """Activate all pairs, before anything is known of them."""
     for k in range(tables.touching):
         work.paths.asleep[k] = 0
     for e in range(work.paths.path.size):
@@ -211,7 +211,7 @@ def wake_since(tables: Tables, work: Work, first: Matrix, second: Matrix, before
 
 @njit_inline
 def let_sleep(tables: Tables, work: Work, state: Vector, before: Vector) -> None:
-    """Let contacts that are far apart at a state sleep, and keep it, for `wake_since`."""
+    """Cull pairs that are far apart at a state, and keep the state for `wake_since`."""
     arrive(tables, work.paths)
     settle(tables, work.rows, work.paths, state[2 * work.torque.size :])
     for c in range(state.size):

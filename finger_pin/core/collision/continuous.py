@@ -116,7 +116,7 @@ def _clear(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> b
 
 @njit_inline
 def _look(integration: Integration, model: Model, e: int, share: float, seen: Vector) -> None:
-    """Note a gap and its slopes at a share of the step."""
+    """Record a gap and its slopes at a share of the step."""
     own, state = model.work.paths, model.state
     s, c = share, 1.0 - share
     w0, w1, w2, w3, w4 = c**4, 4.0 * c**3 * s, 6.0 * c * c * s * s, 4.0 * c * s**3, s**4

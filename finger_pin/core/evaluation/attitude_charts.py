@@ -79,7 +79,7 @@ def rechart(tables: Tables, x: Vector, attitude: Matrix, drift: Vector) -> None:
 
 @njit_inline
 def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, angles: Vector, rates: Vector) -> None:
-    """Replace small changes of angles and rates by those of the angles that begin anew, and of their rates."""
+    """Replace small changes of angles and rates by those after the angles are reset to zero."""
     sb, cb, sc, cc = np.sin(b), np.cos(b), np.sin(c), np.cos(c)
     # The angular velocity (x, y), as in `rechart`, and how it changes.
     x, y = da * cb * cc + db * sc, db * cc - da * cb * sc
@@ -96,7 +96,7 @@ def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, an
 
 @njit_inline
 def _turn(q: Vector, axis: int, angle: float) -> None:
-    """Replace a quaternion q by q times the turn about one of its own axes."""
+    """Replace a quaternion by its product with a turn about a body axis."""
     cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle)
     second, third = (axis + 1) % 3, (axis + 2) % 3
     own, scalar, along, across = q[axis], q[3], q[second], q[third]

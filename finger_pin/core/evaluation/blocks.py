@@ -1,4 +1,4 @@
-"""Blocks: the parts of a step's linear systems that are coupled, found anew for every step.
+"""Blocks: the coupled parts of a step's linear systems, found again at every step.
 
 Without contacts a mechanism falls into atoms, such as the fingers of a hand and what lies around. Contacts that are
 closed join atoms to blocks. One that is open is held open during the step: it exerts nothing, whatever moves, and

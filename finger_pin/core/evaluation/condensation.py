@@ -275,7 +275,7 @@ def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
 
 @njit_reassociate
 def solve(linear: Linear, r: Vector, u: Vector) -> None:
-    """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i. States of contacts asleep stay."""
+    """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i. States of culled contacts stay."""
     blocks, right, solution = linear.blocks, linear.right, linear.solution
     whole = linear.mass.shape[0]
     if blocks.touches.size == 0:

@@ -24,7 +24,7 @@ def measure(address: int, _time: float) -> int:
 
 @njit_always_inline
 def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
-    """Evaluate the contacts, which come before all other rows, but for those asleep, and add to A^T phi."""
+    """Evaluate the contacts that are not culled, which come before all other rows, and add to A^T phi."""
     rows, paths = work.rows, work.paths
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]

@@ -29,7 +29,7 @@ def _seen_from(axis: Vector, rotation: Matrix, point: Vector, weight: float, out
 
 @njit_inline
 def _changed(slopes: Vector, first: int, dy: Vector, rotation: Matrix, out: Vector) -> None:
-    """Fill a vector's change as the base sees it, from the three rows of slopes that begin somewhere."""
+    """Fill a vector's change in base axes, from three rows of slopes."""
     for r in range(3):
         out[r] = 0.0
     for i in range(3):

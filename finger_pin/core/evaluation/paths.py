@@ -33,7 +33,7 @@ def add_moment(point: Vector, force: Vector, out: Vector) -> None:
 
 @njit_always_inline
 def _frame(paths: Paths, e: int, work: Work) -> None:
-    """Place a piece's frame, its points, and its points as the frame sees them."""
+    """Place a piece's frame and its points, and express its points in the frame."""
     own = work.paths
     rotation, origin, ends = own.frame[e], own.origin[e], own.ends[e]
     body = paths.carriers[e, 2]
@@ -65,7 +65,7 @@ def _frame(paths: Paths, e: int, work: Work) -> None:
 
 @njit_inline
 def turn_out(rotation: Matrix, out: Vector, first: int, vector: Vector) -> None:
-    """Fill three numbers of a wrench with a vector that a frame sees."""
+    """Fill three numbers of a wrench with a vector given in a frame."""
     for r in range(3):
         vector[r] = rotation[r, 0] * out[first] + rotation[r, 1] * out[first + 1] + rotation[r, 2] * out[first + 2]
 
@@ -145,7 +145,7 @@ def look(address: int, piece: float) -> int:
 
 @njit_always_inline
 def measure_paths(tables: Tables, work: Work) -> None:
-    """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if awake."""
+    """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts only those not culled."""
     paths, own, first = tables.paths, work.paths, tables.touching
     closed = 0
     for index in range(own.awake_count[0]):
