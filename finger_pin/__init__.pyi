@@ -35,7 +35,7 @@ from .simulation.simulator import Simulator as Simulator
 from .simulation.simulator import step_many as step_many
 from .studies import optimise as optimise
 from .studies import sweep as sweep
-from .studies.many import simulate_many as simulate_many
+from .studies.batch import simulate_many as simulate_many
 from .version import __version__ as __version__
 from .views import plots as plots
 from .views.plots import plot_fig6 as plot_fig6

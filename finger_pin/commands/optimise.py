@@ -27,7 +27,8 @@ from finger_pin.commands.study import conduct
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.studies.runs import Progress, Stop
+    from finger_pin.core.stepping.trajectory import Stop
+    from finger_pin.studies.records import Progress
 
 _Over = Annotated[
     list[str],
@@ -84,9 +85,9 @@ def optimise(
     effort = {name: value for name, value in given.items() if value is not None}
     changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.studies import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
-    from finger_pin.studies.keys import Starting
+    from finger_pin.studies.keys import BaseScenario
 
-    name = Starting.load(scenario, changed).scenario.name
+    name = BaseScenario.load(scenario, changed).scenario.name
     goals = [*over, *minimise, *(f"max.{each}" for each in maximise), *constraint]
     goals += ["no-constraints"] * no_constraints + [f"{name}={value}" for name, value in effort.items()]
     folder = output or Path("results", folder_name(f"optimise-{name}", *settings, *goals))

@@ -11,7 +11,8 @@ from finger_pin.commands.console import Interrupts, noted, print_text, runs_bar,
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.studies.runs import Progress, Stop
+    from finger_pin.core.stepping.trajectory import Stop
+    from finger_pin.studies.records import Progress
 
 
 def conduct(

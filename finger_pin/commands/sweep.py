@@ -27,8 +27,9 @@ from finger_pin.commands.study import conduct
 if TYPE_CHECKING:
     import xarray as xr
 
+    from finger_pin.core.stepping.trajectory import Stop
     from finger_pin.studies.designs import Design
-    from finger_pin.studies.runs import Progress, Stop
+    from finger_pin.studies.records import Progress
 
 _Over = Annotated[
     list[str],
@@ -80,10 +81,10 @@ def sweep(
     changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.exceptions import StudyError
     from finger_pin.studies import DEFAULT_METRICS, sweep
-    from finger_pin.studies.keys import Starting
+    from finger_pin.studies.keys import BaseScenario
 
     points = build_design(design, over, samples, seed or 0)
-    name = Starting.load(scenario, changed).scenario.name
+    name = BaseScenario.load(scenario, changed).scenario.name
     chosen = [*over, *metric, *([] if design == "grid" else [design, f"{samples}", f"{seed or 0}"])]
     folder = output or Path("results", folder_name(f"sweep-{name}", *settings, *chosen))
 
@@ -131,8 +132,8 @@ def misses(result: xr.Dataset) -> bool:
 def build_design(kind: str, over: list[str], samples: int | None, seed: int) -> Design:
     """Return the design that the options describe."""
     from finger_pin.exceptions import InputError
-    from finger_pin.studies import Grid, LatinHypercube, Listing
-    from finger_pin.studies.spelling import parse_range, parse_values
+    from finger_pin.studies import Grid, LatinHypercube, PointList
+    from finger_pin.studies.parsing import parse_range, parse_values
 
     parse_one: Any = parse_range if kind == "latin" else parse_values
     given: dict[str, Any] = {}
@@ -143,7 +144,7 @@ def build_design(kind: str, over: list[str], samples: int | None, seed: int) -> 
         given[key] = values
     if kind == "latin":
         return LatinHypercube(given, samples or 0, seed)
-    return Listing(given) if kind == "list" else Grid(given)
+    return PointList(given) if kind == "list" else Grid(given)
 
 
 def summary(result: xr.Dataset) -> str:

@@ -49,6 +49,24 @@ OF_FINGER = (
         "has no effect without a joint that has a bearing",
     ),
     Rule(
+        "joint_friction",
+        ("stiction", "stribeck_velocity", "stribeck_exponent", "micro_damping"),
+        lambda _, friction: friction.law not in ("dahl", "coulomb"),
+        'has no effect with law = "dahl" or "coulomb"',
+    ),
+    Rule(
+        "joint_friction",
+        ("stiffness", "floor"),
+        lambda _, friction: friction.law != "coulomb",
+        'has no effect with law = "coulomb"',
+    ),
+    Rule(
+        "joint_friction",
+        ("reversal_speed",),
+        lambda _, friction: friction.law not in ("lugre", "dahl"),
+        'is for law = "coulomb", or one of your own',
+    ),
+    Rule(
         "stroke_limiter",
         (),
         lambda finger, _: any(each.limited for each in finger.joints.values()),

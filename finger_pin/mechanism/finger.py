@@ -115,7 +115,9 @@ class Finger:
         around = None if objects is None else Scene.of(objects, description, mechanism, placed)
         self.scene = around
         self.mechanism = mechanism if around is None else around.around(mechanism)
-        self.layout = state_layout(self.tendons, self.actuators, last, around, before, canals.tables)
+        self.layout = state_layout(
+            self.tendons, self.joint_friction, self.actuators, last, around, before, canals.tables
+        )
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""

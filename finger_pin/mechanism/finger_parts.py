@@ -135,13 +135,14 @@ def _pins(parts: Parts, drives: tuple[Rows, ...], pulled: dict[str, Array], load
 
 def state_layout(
     tendons: Tendons,
+    friction: JointFriction,
     motors: Actuators,
     rows: Sequence[Rows] = (),
     scene: Scene | None = None,
     of_tree: Sequence[Rows] = (),
     canals: Sequence[Rows] = (),
 ) -> Layout:
-    """Return the layout of tendons, motors, extra rows, drives among them, and a scene."""
+    """Return the layout of tendons, joints, motors, extra rows, drives among them, and a scene."""
     routing = tendons.routing
     drives, further = (further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
 
@@ -166,7 +167,7 @@ def state_layout(
         "drives": [name for name, _ in drives],
         "tendon_stiction": routing.tendons,
         "canal_stiction": [name for table in canals if table.states for name in table.names],
-        "joint_stiction": routing.joints,
+        "joint_stiction": () if friction.law.scale is None else routing.joints,
         "gearbox_stiction": motors.names,
         "further": [name for name, _ in further],
     }

@@ -1,18 +1,17 @@
 """Studies: many runs of a scenario, measured and kept; sweeps over its entries, and searches for better ones.
 
-From the question to the answer: ``keys`` of a scenario; ``designs`` (and how a command line does the ``spelling``)
-or the ``problem`` of a ``search``; ``metrics``; ``runs``, and the ``fingerprint`` that they are found by; ``executing``
-them in threads or elsewhere; the ``folder`` that keeps them; the ``dataset`` of all. ``sweeping`` and ``optimising``
-put these together. ``many`` returns whole runs instead of metrics. ``comparison`` and ``conclusions`` are studies of
-their own.
+From the question to the answer: ``keys`` of a scenario; ``designs`` (and the ``parsing`` of a command line) or the
+``problem`` of a ``search``; ``metrics``; ``records`` of runs, and the ``fingerprint`` that they are found by; the
+``executor`` in threads or elsewhere; the ``store`` that keeps them; the ``dataset`` of all. ``sweeping`` and
+``optimising`` put these together. ``batch`` returns whole runs instead of metrics.
 """
 
-from finger_pin.studies.designs import Grid, LatinHypercube, Listing, Range
+from finger_pin.studies.designs import Grid, LatinHypercube, PointList, Range
 from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric
 from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
 from finger_pin.studies.problem import Variable, radii
+from finger_pin.studies.records import ExecutorError
 from finger_pin.studies.response import Run
-from finger_pin.studies.runs import ExecutorError
 from finger_pin.studies.sweeping import sweep
 
 __all__ = [
@@ -24,8 +23,8 @@ __all__ = [
     "ExecutorError",
     "Grid",
     "LatinHypercube",
-    "Listing",
     "Metric",
+    "PointList",
     "Range",
     "Run",
     "Variable",

@@ -1,4 +1,4 @@
-"""The Dataset of a sweep: metrics over the varied keys, and the failed runs with their reasons."""
+"""Dataset of a sweep: metrics over the varied keys, and the failed runs with their reasons."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from finger_pin.studies.designs import SAMPLE, Design
 from finger_pin.studies.fingerprint import versions
 from finger_pin.studies.keys import describe
 from finger_pin.studies.metrics import Metric
-from finger_pin.studies.runs import FAILED, RunRecord
+from finger_pin.studies.store import FAILED, RunRecord
 
 MISSING = "missing"
 
@@ -64,7 +64,7 @@ def assemble(
 
 
 def checked(result: xr.Dataset, interrupted: bool) -> xr.Dataset:
-    """Return a result, which is none if every run failed, or Ctrl-C ended the study.
+    """Return a complete result, or raise if every run failed or Ctrl-C ended the study.
 
     Raises:
         Interrupted: After Ctrl-C.

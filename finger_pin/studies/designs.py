@@ -1,6 +1,6 @@
-"""Designs: which points a sweep runs.
+"""Designs: the points of a sweep.
 
-A `Grid` has a dimension per key. A `Listing` and a `LatinHypercube` are lists of points: they have one dimension,
+A `Grid` has a dimension per key. A `PointList` and a `LatinHypercube` are lists of points: they have one dimension,
 ``sample``, along which every key has its coordinate.
 """
 
@@ -44,7 +44,7 @@ class Design(Protocol):
 
 @dataclass(frozen=True)
 class Grid:
-    """Every combination of the values of some keys.
+    """Full factorial: all combinations of the values of some keys.
 
     Attributes:
         values: By key.
@@ -80,7 +80,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Listing:
+class PointList:
     """A list of points: the first values of all keys together, then the second ones.
 
     Attributes:
@@ -149,7 +149,7 @@ class Range:
         return self.low + (self.high - self.low) * np.asarray(share)
 
     def share(self, value: float) -> float:
-        """Return the share of the way from low to high at which a value lies."""
+        """Return the share of the way from low to high of a value."""
         if self.logarithmic:
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
@@ -157,7 +157,7 @@ class Range:
 
 @dataclass(frozen=True)
 class LatinHypercube:
-    """Points spread over ranges so that each of ``samples`` equal slices of every range holds exactly one.
+    """Latin hypercube: each of ``samples`` equal slices of every range holds exactly one point.
 
     Drawn by `scipy.stats.qmc.LatinHypercube` (McKay, Beckman and Conover, Technometrics 21, 1979).
 
@@ -204,7 +204,7 @@ class LatinHypercube:
 
     def points(self) -> list[Point]:
         """Return the points."""
-        return Listing(self.values).points()
+        return PointList(self.values).points()
 
     def describe(self) -> dict[str, Any]:
         """Return the design as a table of a TOML file."""

@@ -1,20 +1,20 @@
-"""Digests of a run's dependencies besides its scenario: source, other packages, metrics, a finger of one's own."""
+"""Digests of a run's dependencies besides its scenario: source, other packages, metrics, a custom finger."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import hashlib
+import pickle
 import site
 import sys
 import sysconfig
-from collections.abc import Iterator
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from types import BuiltinFunctionType, CodeType, EllipsisType, FunctionType, MethodType, ModuleType
+from types import BuiltinFunctionType, CodeType, EllipsisType, FunctionType, MethodType, ModuleType, NoneType
 from typing import Any
 
+import joblib
 import numpy as np
 
 from finger_pin.mechanism.finger import Finger
@@ -23,12 +23,15 @@ from finger_pin.mechanism.finger import Finger
 PACKAGES = ("finger-pin", "numba", "numpy", "pin", "scipy", "xarray")
 # Imports point down, so nothing above the studies affects their results.
 _ABOVE = {"views", "commands"}
-# What a class has besides what is written in it.
-_OF_CLASSES = {"__dict__", "__weakref__", "__dataclass_fields__", "__dataclass_params__"}
+# What a class has besides what is written in it, what wrappers of functions hold, and what a name says enough of.
+_OF_CLASSES = {"__dict__", "__weakref__", "__dataclass_fields__", "__dataclass_params__", "__firstlineno__"}
+_PARTS = ("func", "args", "keywords", "__self__", "__func__", "fget", "fset")
+_NAMED = (type, BuiltinFunctionType, np.ufunc)
+_PLAIN = (NoneType, bool, int, float, complex, str, bytes, EllipsisType)
 
 
 class UnknownDependency(Exception):
-    """A dependency that cannot be compared with its earlier self; the message names it."""
+    """Dependency without a digest; the message names it."""
 
 
 @cache
@@ -39,34 +42,28 @@ def versions() -> dict[str, str]:
 
 @cache
 def source_digest() -> str:
-    """Return a digest of all source of this package that results can depend on, and of the versions of others."""
+    """Return a digest of this package's source and of the versions of others."""
     package = Path(__file__).parent.parent
-    digest = hashlib.sha256(repr(versions()).encode())
-    for path in sorted(package.rglob("*.py")):
-        if path.relative_to(package).parts[0] not in _ABOVE:
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    files = [each for each in sorted(package.rglob("*.py")) if each.relative_to(package).parts[0] not in _ABOVE]
+    return str(joblib.hash((versions(), [each.read_bytes() for each in files])))
 
 
 def code_digest(function: Any) -> str:
-    """Return a digest of a function's code, of the values that it has enclosed, and of all of one's own that it uses.
+    """Return a digest of a function: its code, the values that it encloses, the user code that it calls.
 
     What is installed counts by its name and version. Files that a function reads are not seen.
 
     Raises:
-        UnknownDependency: If it depends on something that has no digest, such as an object of one's own class.
+        UnknownDependency: If it depends on something that has no digest, such as an object of a user's class.
     """
-    digest = hashlib.sha256()
     try:
-        for part in _parts(function, frozenset(), {}):
-            digest.update(part.encode(errors="backslashreplace") + b"\0")
-    except (ValueError, RecursionError) as error:
+        return str(joblib.hash(_content(function, frozenset(), {})))
+    except (ValueError, RecursionError, pickle.PicklingError) as error:
         raise UnknownDependency(str(error)) from None
-    return digest.hexdigest()[:16]
 
 
 def finger_digest(finger: Finger) -> str:
-    """Return a digest of a finger that a caller has built: description, rigid body, rows and their laws, objects.
+    """Return a digest of a custom finger: description, rigid body, rows and their laws, objects.
 
     Raises:
         UnknownDependency: If a law depends on something that has no digest.
@@ -77,37 +74,29 @@ def finger_digest(finger: Finger) -> str:
     return code_digest((finger.description.model_dump_json(), model, tuple(rows), described))
 
 
-def _parts(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Iterator[str]:
-    """Yield the marks of a thing; of a user's own module, only those of the parts used by one of some names."""
-    if thing is None or isinstance(thing, bool | int | float | complex | str | bytes | EllipsisType):
-        yield repr(thing)
-        return
-    yield type(thing).__name__
-    if (id(thing), names) in seen:
-        return
-    # Kept, so that no other thing gets its identity meanwhile.
-    seen[id(thing), names] = thing
+def _content(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Any:
+    """Return a thing in values that joblib can hash; of a user's module, only the parts used by one of some names."""
+    if isinstance(thing, FunctionType | type | ModuleType | CodeType):
+        # Pickle, and so joblib, knows these by their names alone.
+        if (id(thing), names) in seen:
+            return None
+        # Kept, so that no other thing gets its identity meanwhile.
+        seen[id(thing), names] = thing
     installed = _is_installed(getattr(thing, "__module__", None))
     inner: list[Any]
     match thing:
         case tuple() | list():
             inner = list(thing)
-        case dict():
-            inner = [each for item in thing.items() for each in item]
         case set() | frozenset():
             inner = sorted(thing, key=repr)
-        case np.ndarray() | np.generic() if thing.dtype != object:
-            inner = [str(thing.dtype), thing.shape, thing.tobytes()]
+        case dict():
+            inner = [each for item in thing.items() for each in item]
         case CodeType():
             inner = [thing.co_code, thing.co_varnames, thing.co_names, *thing.co_consts]
         case ModuleType():
             inner = [thing.__name__, getattr(thing, "__version__", None)]
             if not _is_installed(thing.__name__):
                 inner += [vars(thing)[name] for name in sorted(names & vars(thing).keys())]
-        case functools.partial():
-            inner = [thing.func, thing.args, thing.keywords]
-        case MethodType():
-            inner = [thing.__self__, thing.__func__]
         case FunctionType():
             cells = [each.cell_contents for each in thing.__closure__ or ()]
             inner = [thing.__defaults__, thing.__kwdefaults__, *cells]
@@ -117,20 +106,19 @@ def _parts(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Iterator[
                 names = _names(thing.__code__)
                 used = sorted(names & thing.__globals__.keys())
                 inner += [thing.__code__, *(thing.__globals__[name] for name in used)]
+        case functools.partial() | MethodType() | staticmethod() | classmethod() | property():
+            inner = [getattr(thing, part, None) for part in _PARTS]
         case type() if not installed:
             inner = [thing.__bases__, {name: each for name, each in vars(thing).items() if name not in _OF_CLASSES}]
-        case staticmethod() | classmethod():
-            inner = [thing.__func__]
-        case property():
-            inner = [thing.fget, thing.fset]
         case _ if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
             inner = [type(thing), vars(thing)]
-        case type() | BuiltinFunctionType() | np.ufunc() if installed:
-            inner = [thing.__module__, thing.__qualname__]
+        case np.ndarray() | np.generic() if thing.dtype != object:
+            return thing
+        case _ if isinstance(thing, _PLAIN) or (installed and isinstance(thing, _NAMED)):
+            return thing
         case _:
             raise UnknownDependency(f"an object of type {type(thing).__name__}")
-    for each in inner:
-        yield from _parts(each, names, seen)
+    return [type(thing).__name__, *(_content(each, names, seen) for each in inner)]
 
 
 def _names(code: CodeType) -> frozenset[str]:
@@ -141,7 +129,7 @@ def _names(code: CodeType) -> frozenset[str]:
 
 @cache
 def _is_installed(module: str | None) -> bool:
-    """Return whether a module belongs to this package, to Python or to an installed package, not to the user."""
+    """Return true for modules of this package, of Python and of installed packages, not the user's."""
     top = (module or "").partition(".")[0]
     if top in sys.stdlib_module_names or top == "finger_pin":
         return True

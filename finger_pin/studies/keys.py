@@ -1,4 +1,4 @@
-"""Keys of a scenario: their values and meanings, and scenarios with other numbers or names there.
+"""Keys of a scenario: their values, units and names, and scenarios with other values.
 
 A key is dotted as in `load_scenario`, such as ``finger.joints.distal.link.length``. One number of a list has its index
 in brackets: ``environment.fingertip_force[2]``. A star stands for every name: ``finger.actuators.*.motor``.
@@ -25,8 +25,8 @@ Point = Mapping[str, Value]
 
 
 @dataclass(frozen=True)
-class Starting:
-    """The scenario that a study varies.
+class BaseScenario:
+    """Base scenario of a study, with a custom finger if there is one.
 
     Attributes:
         scenario: The scenario.
@@ -39,7 +39,7 @@ class Starting:
     @classmethod
     def load(
         cls, given: ScenarioLike, overrides: Mapping[str, Any] | None = None, finger: FingerLike | None = None
-    ) -> Starting:
+    ) -> BaseScenario:
         """Load a scenario.
 
         Raises:
@@ -64,7 +64,9 @@ class Starting:
         return None if self.finger is None else fitted(self.finger, self.scenario, scenario)
 
     def check(self, key: str, values: Sequence[Value], *, alone: bool = False) -> None:
-        """Raise unless a key can hold values of this kind; some may still be wrong, or not go with other keys.
+        """Raise unless a key can hold values of this kind.
+
+        Single values may still be wrong, or not go with other keys.
 
         Args:
             key: Key to vary.
@@ -103,7 +105,7 @@ class Starting:
             raise problem
 
     def number(self, key: str) -> float:
-        """Return the number that the scenario itself has at a key.
+        """Return the scenario's own number at a key.
 
         Raises:
             InputError: If it has none.
@@ -139,7 +141,7 @@ def _is_number(held: Any) -> bool:
 
 
 def _leaves(held: Any, key: str, numbers: bool) -> Iterator[str]:
-    """Give the keys below one that hold numbers, or the ones that hold anything."""
+    """Yield the keys below one, those of numbers or all."""
     if isinstance(held, Mapping):
         for name, below in held.items():
             yield from _leaves(below, f"{key}.{name}" if key else name, numbers)

@@ -1,4 +1,4 @@
-"""Metrics: the quality of a design, in a number each.
+"""Metrics: scalar measures of the quality of a design.
 
 Metrics of the motion are taken over the whole run, its start from rest included, and are means over time, not over
 samples.
@@ -31,7 +31,7 @@ FORCE_TENSION = 20.0
 
 @dataclass(frozen=True)
 class Metric:
-    """A measure of the quality of a run, in one number.
+    """Scalar measure of the quality of a run.
 
     Attributes:
         name: Name by which it is asked for.
@@ -46,8 +46,8 @@ class Metric:
     measure: Callable[[Run], float]
 
 
-def choose(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
-    """Return metrics by name; those given as such are kept.
+def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
+    """Return metrics by name; instances of `Metric` are kept.
 
     Raises:
         InputError: If there are none, one is unknown or comes twice, or cannot be sent to other processes.
@@ -92,7 +92,7 @@ def tension_mean(run: Run) -> float:
 
 
 def losses(run: Run) -> float:
-    """Return all energy that was lost but the heat in the windings, J, which is a metric of its own."""
+    """Return the energy lost, J, without the heat in the windings."""
     return sum(float(each[-1]) for each in entries(run.result, LOST).values()) - heat(run)
 
 
@@ -107,7 +107,7 @@ def losses_joints(run: Run) -> float:
 
 
 def slack_time(run: Run) -> float:
-    """Return the time during which a tendon, or one half of a passive one, has no tension at one of its ends, s."""
+    """Return the time with a tendon, or half of a passive one, without tension at an end, s."""
     delivered = [np.min(rows(run.result, "tendon_tension", "tendon"), axis=1)]
     if "spool_tension" in run.result:
         delivered.append(rows(run.result, "spool_tension", "tendon").min(axis=1))
@@ -129,12 +129,12 @@ def current_peak(run: Run) -> float:
 
 
 def locking_margin(run: Run) -> float:
-    """Return the factor by which the joints' stiction could be raised until the finger locks on its reference."""
+    """Return the ratio of critical to actual stiction of the joints, at which the finger locks on its reference."""
     return self_locking_margin(run.scenario).margin
 
 
 def fingertip_force(run: Run) -> float:
-    """Return the force that the fingertip can exert whichever way its joints move it, N.
+    """Return the largest fingertip force that is possible in every direction, N.
 
     It is the radius of the largest ball around zero in the polytope of forces, without friction, at the mean posture
     of the reference, with tensions up to `FORCE_TENSION`; of a hand that of its weakest finger.

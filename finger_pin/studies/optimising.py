@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_table, write_text
@@ -19,10 +20,9 @@ from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
-from finger_pin.studies.designs import Listing
-from finger_pin.studies.executing import Crew
-from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
-from finger_pin.studies.keys import Point, Starting
+from finger_pin.studies.designs import PointList
+from finger_pin.studies.executor import open_executor
+from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric
 from finger_pin.studies.problem import (
     Constraint,
@@ -34,8 +34,9 @@ from finger_pin.studies.problem import (
     radii,
     start_of,
 )
-from finger_pin.studies.runs import DONE, Progress, RunRecord, Stop, evaluate
+from finger_pin.studies.records import Progress, evaluate
 from finger_pin.studies.search import HOPELESS, Search, nondominated
+from finger_pin.studies.store import DONE, RunRecord, Store, describe_study, open_store, write
 from finger_pin.typing import Array
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]
@@ -84,7 +85,7 @@ def optimise(
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> xr.Dataset:
-    """Search for designs that no other one is better than.
+    """Search for nondominated designs.
 
         fp.optimise("fig6", ["controller.gain=0.5:4"], minimise=["tracking_rms", "tension_peak"], constraints=[])
 
@@ -120,44 +121,40 @@ def optimise(
         ExecutorError: If the executor cannot go on.
     """
     effort = effort or Effort()
-    goals = Goals.of(minimise, maximise, constraints)
-    starting = Starting.load(scenario, overrides, finger)
-    given = radii(starting.scenario.finger) if over is None else over
+    goals = Goals.from_metrics(minimise, maximise, constraints)
+    base = BaseScenario.load(scenario, overrides, finger)
+    given = radii(base.scenario.finger) if over is None else over
     variables = [parse_variable(each) if isinstance(each, str) else each for each in given]
-    check_variables(variables, starting)
-    own = start_of(variables, starting)
-    search = Search(
-        len(variables), len(goals.objectives), len(goals.constraints), effort.population, effort.seed,
-        _shares(variables, own),
-    )  # fmt: skip
+    check_variables(variables, base)
+    own = start_of(variables, base)
+    search = Search(len(variables), len(goals.objectives), effort.population, effort.seed, _shares(variables, own))
     with ExitStack() as stack:
         asked_to_stop = stack.enter_context(CtrlC(stop))
-        crew = stack.enter_context(Crew(executor))
-        if output is None:
-            store = stack.enter_context(Store())
-        else:
+        pool = stack.enter_context(open_executor(executor))
+        store = Store()
+        if output is not None:
             described = [variable.describe() for variable in variables]
             asked = {"optimise": {**goals.describe(), **vars(effort), "variables": described}}
-            folder = StudyFolder(output, describe_study(starting, goals.metrics, asked), PRODUCTS, restart=restart)
-            store = stack.enter_context(folder).store
+            described_study = describe_study(base, goals.metrics, asked)
+            store = stack.enter_context(open_store(output, described_study, PRODUCTS, restart=restart))
         bar = progress or notebook_bar("runs")
-        course = _Course(starting, goals, variables, store, crew, effort, bar, asked_to_stop)
-        result = _assembled(starting, goals, *course.follow(own, search))
+        course = _Course(base, goals, variables, store, pool, effort, bar, asked_to_stop)
+        result = _assembled(base, goals, *course.follow(own, search))
         if output is not None:
             write(result, Path(output) / "optimise.nc")
-            _write_front(result, starting, Path(output))
+            _write_front(result, base, Path(output))
     return checked(result, asked_to_stop.pressed)
 
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """The course of a search."""
+    """Progress of a search, generation by generation."""
 
-    starting: Starting
+    base: BaseScenario
     goals: Goals
     variables: Sequence[Variable]
     store: Store
-    crew: Crew
+    executor: Executor
     effort: Effort
     progress: Progress | None
     stop: Stop | None
@@ -187,11 +184,11 @@ class _Course:
                 self.progress(len(earlier) + finished, failed + failures, total)
 
         return evaluate(
-            self.starting, points, self.goals.metrics, self.store, self.crew, progress=report, stop=self.stop
+            self.base, points, self.goals.metrics, self.store, self.executor, progress=report, stop=self.stop
         )
 
     def _judge(self, record: RunRecord) -> tuple[Array, Array]:
-        """Return objectives and excesses; those of a design that cannot be run are worse than all others."""
+        """Return objectives and excesses, `HOPELESS` for a design that cannot be run."""
         if record.status == DONE:
             values, excesses = self.goals.values(record.metrics), self.goals.excesses(record.metrics)
             if np.isfinite(values).all() and not np.isnan(excesses).any():
@@ -200,7 +197,7 @@ class _Course:
 
 
 def _shares(variables: Sequence[Variable], own: Mapping[str, float]) -> Array | None:
-    """Return the place of the scenario's own design in the unit cube, or None outside of it."""
+    """Return the coordinates of the scenario's own design in the unit cube, or None outside of it."""
     shares = []
     for variable in variables:
         first = own[variable.keys[0]]
@@ -213,9 +210,9 @@ def _shares(variables: Sequence[Variable], own: Mapping[str, float]) -> Array | 
     return np.array(shares)
 
 
-def _assembled(starting: Starting, goals: Goals, points: list[Point], records: list[RunRecord | None]) -> xr.Dataset:
-    listing = Listing({key: [point[key] for point in points] for key in points[0]})
-    result = assemble(starting.scenario, listing, goals.metrics, records)
+def _assembled(base: BaseScenario, goals: Goals, points: list[Point], records: list[RunRecord | None]) -> xr.Dataset:
+    listing = PointList({key: [point[key] for point in points] for key in points[0]})
+    result = assemble(base.scenario, listing, goals.metrics, records)
     measured = [(row, r.metrics) for row, r in enumerate(records) if r is not None and r.status == DONE]
     feasible, front = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=int)
     if measured:
@@ -235,7 +232,7 @@ def _assembled(starting: Starting, goals: Goals, points: list[Point], records: l
     return result.assign_attrs({name: ", ".join(listed) for name, listed in goals.describe().items()})
 
 
-def _write_front(result: xr.Dataset, starting: Starting, folder: Path) -> None:
+def _write_front(result: xr.Dataset, base: BaseScenario, folder: Path) -> None:
     """Write ``front.csv`` and a scenario per design, ``front/01.toml`` and so on in the order of the table.
 
     Raises:
@@ -252,7 +249,7 @@ def _write_front(result: xr.Dataset, starting: Starting, folder: Path) -> None:
         row = result.isel(sample=int(np.flatnonzero(result["front"].values == number)[0]))
         name = f"{number:02d}"
         table.append([name, *(float(row[column]) for column in columns)])
-        scenario = starting.at({key: float(row[key]) for key in keys})
+        scenario = base.at({key: float(row[key]) for key in keys})
         title = f"design {name} of the front of a search on {scenario.name}"
         changed = scenario.updated(name=f"{scenario.name[:50]}_front_{name}", title=title)
         write_text(scenarios / f"{name}.toml", to_toml(changed))

@@ -14,9 +14,9 @@ from finger_pin.description.parameters import Tendon
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.studies.designs import Range
-from finger_pin.studies.keys import Point, Starting
-from finger_pin.studies.metrics import Metric, choose
-from finger_pin.studies.spelling import parse_range
+from finger_pin.studies.keys import BaseScenario, Point
+from finger_pin.studies.metrics import Metric, resolve_metrics
+from finger_pin.studies.parsing import parse_range
 from finger_pin.typing import Array
 
 #: Least winding radius that a search of radii tries, m: a thinner pulley bends a tendon too sharply.
@@ -26,7 +26,7 @@ _CONSTRAINT = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*(?P<sense>[<>]=)\s*(?P<bo
 
 @dataclass(frozen=True)
 class Variable:
-    """A number that a search varies.
+    """Variable of a search.
 
     Attributes:
         keys: The keys that hold it.
@@ -93,8 +93,8 @@ def radii(finger: FingerLike) -> list[Variable]:
     return made
 
 
-def check_variables(variables: Sequence[Variable], starting: Starting) -> None:
-    """Raise unless there are variables, and every one of their keys can hold a number of its range.
+def check_variables(variables: Sequence[Variable], base: BaseScenario) -> None:
+    """Raise unless there are variables, and each of their keys can hold a number of its range.
 
     Raises:
         InputError: Naming the key.
@@ -108,7 +108,7 @@ def check_variables(variables: Sequence[Variable], starting: Starting) -> None:
             if key in seen:
                 raise InputError(key, "must not come twice")
             seen.add(key)
-            starting.check(key, [sign * float(variable.range.at(share)) for share in (0.5, 0.0, 1.0)])
+            base.check(key, [sign * float(variable.range.at(share)) for share in (0.5, 0.0, 1.0)])
 
 
 def point_at(variables: Sequence[Variable], shares: Sequence[float]) -> Point:
@@ -116,9 +116,9 @@ def point_at(variables: Sequence[Variable], shares: Sequence[float]) -> Point:
     return {key: value for v, share in zip(variables, shares, strict=True) for key, value in v.at(share).items()}
 
 
-def start_of(variables: Sequence[Variable], starting: Starting) -> Mapping[str, float]:
-    """Return the numbers that the scenario itself has at the keys."""
-    return {key: starting.number(key) for variable in variables for key in variable.keys}
+def start_of(variables: Sequence[Variable], base: BaseScenario) -> Mapping[str, float]:
+    """Return the scenario's own numbers at the keys."""
+    return {key: base.number(key) for variable in variables for key in variable.keys}
 
 
 def _shape(tendon: Tendon) -> Any:
@@ -127,7 +127,7 @@ def _shape(tendon: Tendon) -> Any:
 
 @dataclass(frozen=True)
 class Objective:
-    """A metric to be made small or large.
+    """Objective: a metric to be minimised or maximised.
 
     Attributes:
         name: Of the metric.
@@ -140,7 +140,7 @@ class Objective:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A bound that a metric has to keep.
+    """Bound of a metric.
 
     Attributes:
         name: Of the metric.
@@ -153,11 +153,11 @@ class Constraint:
     sign: int
 
     def excess(self, value: float) -> float:
-        """Return the excess of a value over the bound, over the bound's size; not above zero if it keeps it."""
+        """Return the relative excess of a value over the bound; at most zero if it is kept."""
         return self.sign * (value - self.bound) / (abs(self.bound) or 1.0)
 
     def __str__(self) -> str:
-        """Spell it as `parse_constraint` reads it."""
+        """Return its text for `parse_constraint`."""
         return f"{self.name}{'<=' if self.sign > 0 else '>='}{self.bound:g}"
 
 
@@ -179,7 +179,7 @@ def parse_constraint(text: str) -> Constraint:
 
 @dataclass(frozen=True)
 class Goals:
-    """Objectives and constraints, with the metrics that they need.
+    """Objectives and constraints, with their metrics.
 
     Attributes:
         objectives: At least one.
@@ -192,7 +192,7 @@ class Goals:
     metrics: tuple[Metric, ...]
 
     @classmethod
-    def of(
+    def from_metrics(
         cls,
         minimise: Iterable[str | Metric],
         maximise: Iterable[str | Metric],
@@ -211,12 +211,12 @@ class Goals:
             InputError: If there is no objective, a metric is unknown or comes twice among them.
         """
         small, large, bounds = list(minimise), list(maximise), list(constraints)
-        chosen = choose([*small, *large])
+        chosen = resolve_metrics([*small, *large])
         objectives = tuple(Objective(m.name, 1 if i < len(small) else -1) for i, m in enumerate(chosen))
         limits = tuple(each if isinstance(each, Constraint) else parse_constraint(each) for each in bounds)
         known = {metric.name: metric for metric in (*chosen, *further)}
         needed = {name: known.get(name, name) for name in (*(o.name for o in objectives), *(c.name for c in limits))}
-        return cls(objectives, limits, choose(needed.values()))
+        return cls(objectives, limits, resolve_metrics(needed.values()))
 
     def values(self, metrics: Mapping[str, float]) -> Array:
         """Return the objectives of a run, each to be made small."""

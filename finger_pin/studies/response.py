@@ -14,7 +14,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import with_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
-from finger_pin.studies.executing import quiet
+from finger_pin.studies.executor import quiet
 from finger_pin.typing import Array
 
 #: Parts of its travel in which the ways of a fingertip are compared.
@@ -88,7 +88,7 @@ def winding_temperature(run: Run) -> float:
 
 
 def fingertip_hysteresis(run: Run) -> float:
-    """Return the distance of the fingertip between the way out and the way back at the same reference, m.
+    """Return the largest distance of the fingertip on the way out from that on the way back, m.
 
     Way and place are those of the fingertip of the reference along the direction in which it moves most; the ways are
     compared in `HYSTERESIS_BINS` parts of its travel by the mean of the tip less that of the reference. Of a hand the
@@ -130,7 +130,7 @@ def settling_time(run: Run) -> float:
 
 
 def grip_margin(run: Run) -> float:
-    """Return the share of friction that contacts have left over the last tenth of the run.
+    """Return the friction margin of contacts over the last tenth of the run.
 
     1 - f^t / (what friction can be at that normal force), the least of all contacts that are closed and all times: 1
     where nothing rubs, 0 where something slides, and where nothing is touched.

@@ -1,12 +1,13 @@
-"""The search: NSGA-II of pymoo, a generation at a time, the same for the same seed.
+"""Search by NSGA-II of Optuna, a generation at a time, the same for the same seed.
 
 K. Deb, A. Pratap, S. Agarwal and T. Meyarivan, A fast and elitist multiobjective genetic algorithm: NSGA-II, IEEE
-Transactions on Evolutionary Computation 6(2), 2002; J. Blank and K. Deb, pymoo: Multi-Objective Optimization in Python,
-IEEE Access 8, 2020.
+Transactions on Evolutionary Computation 6(2), 2002; T. Akiba et al., Optuna: A Next-generation Hyperparameter
+Optimization Framework, KDD 2019.
 """
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from finger_pin.typing import Array
 
 # How far out a design is that cannot be run at all: farther than any that breaks a bound within reason.
 HOPELESS = 1e6
+# Distribution indices of simulated binary crossover and polynomial mutation.
+_CROSSOVER, _MUTATION = 15.0, 20.0
 
 
 class Search:
@@ -26,38 +29,47 @@ class Search:
     same course: one is continued by repeating it with recorded values.
     """
 
-    def __init__(self, size: int, objectives: int, constraints: int, population: int, seed: int, start: Array | None):
-        """Begin.
+    def __init__(self, size: int, objectives: int, population: int, seed: int, start: Array | None):
+        """Start with a Latin hypercube.
 
         Args:
             size: Number of variables.
             objectives: Number of objectives.
-            constraints: Number of constraints.
             population: Designs of a generation.
             seed: Of the random numbers.
-            start: A design to begin with, shape (size,), besides a Latin hypercube.
+            start: Replaces a design of the hypercube, shape (size,).
 
         Raises:
-            InputError: If pymoo is not installed.
+            InputError: If Optuna is not installed.
         """
         try:
-            from pymoo.algorithms.moo.nsga2 import NSGA2
-            from pymoo.core.problem import Problem
+            import optuna
+            from optuna.samplers import NSGAIISampler, nsgaii
         except ImportError:
-            raise InputError("optimise", "needs pymoo: python -m pip install pymoo") from None
+            raise InputError("optimise", "needs Optuna: python -m pip install 'optuna>=5'") from None
+        with warnings.catch_warnings(action="ignore", category=optuna.exceptions.ExperimentalWarning):
+            sampler = NSGAIISampler(
+                population_size=population,
+                seed=seed,
+                crossover=nsgaii.SBXCrossover(eta=_CROSSOVER),
+                mutation=nsgaii.PolynomialMutation(eta=_MUTATION),
+            )
+        verbosity = optuna.logging.get_verbosity()
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
+        self._study = optuna.create_study(directions=["minimize"] * objectives, sampler=sampler)
+        optuna.logging.set_verbosity(verbosity)
+        self._range: Any = {f"{number}": optuna.distributions.FloatDistribution(0.0, 1.0) for number in range(size)}
         first = qmc.LatinHypercube(size, rng=np.random.default_rng(seed)).random(population)
         if start is not None:
             first[0] = start
-        self._problem = Problem(n_var=size, n_obj=objectives, n_ieq_constr=constraints, xl=0.0, xu=1.0)
-        self._algorithm: Any = NSGA2(pop_size=population, sampling=first)
-        # It ends when it is no longer asked.
-        self._algorithm.setup(self._problem, termination=("n_gen", np.inf), seed=seed, verbose=False)
-        self._asked: Any = None
+        for design in first:
+            self._study.enqueue_trial(dict(zip(self._range, design.tolist(), strict=True)))
+        self._population, self._asked = population, list[Any]()
 
     def ask(self) -> Array:
         """Return the designs of the next generation, shape (population, size), each in the unit cube."""
-        self._asked = self._algorithm.ask()
-        return np.asarray(self._asked.get("X"), dtype=float)
+        self._asked = [self._study.ask(self._range) for _ in range(self._population)]
+        return np.array([[trial.params[name] for name in self._range] for trial in self._asked])
 
     def tell(self, values: Array, excesses: Array) -> None:
         """Take objectives and excesses of designs.
@@ -66,14 +78,13 @@ class Search:
             values: Objectives, to be made small, shape (population, objectives).
             excesses: Over the constraints, above zero where broken, shape (population, constraints).
         """
-        from pymoo.core.evaluator import Evaluator
-        from pymoo.problems.static import StaticProblem
-
-        Evaluator().eval(StaticProblem(self._problem, F=values, G=excesses), self._asked)
-        self._algorithm.tell(infills=self._asked)
+        for trial, objectives, over in zip(self._asked, values, excesses, strict=True):
+            for number, excess in enumerate(over.tolist()):
+                trial.set_constraint(f"{number}", excess)
+            self._study.tell(trial, objectives.tolist())
 
 
 def nondominated(values: Array) -> Any:
-    """Return a mask of the designs that no other is better than; objectives are to be made small, shape (m, k)."""
+    """Return a mask of the nondominated designs of objectives to be minimised, shape (m, k)."""
     better = (values[:, None] <= values[None]).all(axis=2) & (values[:, None] < values[None]).any(axis=2)
     return ~better.any(axis=0)

@@ -10,17 +10,18 @@ from typing import Any
 
 import xarray as xr
 
+from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
-from finger_pin.studies.executing import Crew
-from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
-from finger_pin.studies.keys import Starting, Value
-from finger_pin.studies.metrics import DEFAULT_METRICS, Metric, choose
-from finger_pin.studies.runs import Progress, Stop, evaluate
+from finger_pin.studies.executor import open_executor
+from finger_pin.studies.keys import BaseScenario, Value
+from finger_pin.studies.metrics import DEFAULT_METRICS, Metric, resolve_metrics
+from finger_pin.studies.records import Progress, evaluate
+from finger_pin.studies.store import Store, describe_study, open_store, write
 
 PRODUCTS = ["sweep.nc", "figures/sweep.png"]
 
@@ -75,29 +76,28 @@ def sweep(
         ExecutorError: If the executor cannot go on.
     """
     design = Grid(over) if isinstance(over, Mapping) else over
-    chosen = choose(metrics)
-    starting = Starting.load(scenario, overrides, finger)
+    chosen = resolve_metrics(metrics)
+    base = BaseScenario.load(scenario, overrides, finger)
     for key, values in design.values.items():
-        starting.check(key, values, alone=len(design.values) == 1)
+        base.check(key, values, alone=len(design.values) == 1)
     with ExitStack() as stack:
         asked_to_stop = stack.enter_context(CtrlC(stop))
-        crew = stack.enter_context(Crew(executor))
-        if output is None:
-            store = stack.enter_context(Store())
-        else:
-            asked = describe_study(starting, chosen, {"sweep": design.describe()})
-            store = stack.enter_context(StudyFolder(output, asked, PRODUCTS, restart=restart)).store
+        pool = stack.enter_context(open_executor(executor))
+        store = Store()
+        if output is not None:
+            asked = describe_study(base, chosen, {"sweep": design.describe()})
+            store = stack.enter_context(open_store(output, asked, PRODUCTS, restart=restart))
         records = evaluate(
-            starting,
+            base,
             design.points(),
             chosen,
             store,
-            crew,
+            pool,
             progress=progress or notebook_bar("runs"),
             stop=asked_to_stop,
             retry_failed=retry_failed,
         )
-        result = assemble(starting.scenario, design, chosen, records)
+        result = assemble(base.scenario, design, chosen, records)
         if output is not None:
             write(result, Path(output) / "sweep.nc")
     return checked(result, asked_to_stop.pressed)

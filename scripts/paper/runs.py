@@ -15,7 +15,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import JointReference
 from finger_pin.description.validation import Numbers, expand
 from finger_pin.exceptions import IntegrationError, ScenarioWarning, StudyError
-from finger_pin.studies.many import simulate_many
+from finger_pin.studies.batch import simulate_many
 from finger_pin.typing import Array
 
 Progress = Callable[[int], None]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.spelling import parse_range, parse_values
+from finger_pin.studies.parsing import parse_range, parse_values
 
 
 def test_a_grid_is_every_combination_with_the_last_key_fastest():
@@ -14,7 +14,7 @@ def test_a_grid_is_every_combination_with_the_last_key_fastest():
 
 
 def test_a_list_takes_the_values_of_all_keys_together():
-    listing = fp.studies.Listing({"a": [1.0, 2.0], "b": [5.0, 6.0]})
+    listing = fp.studies.PointList({"a": [1.0, 2.0], "b": [5.0, 6.0]})
     assert listing.dims == ("sample",)
     assert listing.points() == [{"a": 1.0, "b": 5.0}, {"a": 2.0, "b": 6.0}]
 
@@ -92,7 +92,7 @@ def test_wrong_ranges_are_told_in_one_line(text):
         lambda: fp.studies.Grid({"a": [None, None]}),
         lambda: fp.studies.Grid({"a": [[1.0], [2.0]]}),
         lambda: fp.studies.Grid({"a": range(1001), "b": range(1001)}),
-        lambda: fp.studies.Listing({"a": [1.0], "b": [1.0, 2.0]}),
+        lambda: fp.studies.PointList({"a": [1.0], "b": [1.0, 2.0]}),
         lambda: fp.studies.LatinHypercube({}, 3),
         lambda: fp.studies.LatinHypercube({"a": fp.studies.Range(0.0, 1.0)}, 0),
         lambda: fp.studies.LatinHypercube({"a": fp.studies.Range(0.0, 1.0)}, 3, -1),

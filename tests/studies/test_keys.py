@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.keys import Starting, describe
+from finger_pin.studies.keys import BaseScenario, describe
 
 RADIUS = "finger.tendons.T3.crossings.medial.radius"
 LENGTH = "finger.joints.distal.link.length"
@@ -12,7 +12,7 @@ LENGTH = "finger.joints.distal.link.length"
 
 @pytest.fixture(scope="module")
 def fig6():
-    return Starting.load("fig6")
+    return BaseScenario.load("fig6")
 
 
 def test_a_point_changes_its_keys_and_nothing_else(fig6):
@@ -31,13 +31,13 @@ def test_what_a_file_leaves_to_its_default_follows_a_length(fig6):
 def test_an_index_means_one_number_of_a_list(fig6):
     changed = fig6.at({"environment.fingertip_force[2]": -0.5, "environment.fingertip_force[0]": 0.1})
     assert changed.environment.fingertip_force == (0.1, 0.0, -0.5)
-    listed = Starting.load("fig6", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
+    listed = BaseScenario.load("fig6", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
     assert listed.at({"controller.gain[1]": 9.0}).controller.gain == (1.0, 9.0, 3.0, 4.0)
     assert listed.scenario.controller.gain == (1.0, 2.0, 3.0, 4.0)
 
 
 def test_a_whole_number_stays_one(fig6):
-    changed = Starting.load("fig6", {"finger.tendons.T5.mass_after": 1}).at({"finger.tendons.T5.mass_after": 2.0})
+    changed = BaseScenario.load("fig6", {"finger.tendons.T5.mass_after": 1}).at({"finger.tendons.T5.mass_after": 2.0})
     assert changed.finger.tendons["T5"].mass_after == 2
 
 
@@ -103,7 +103,7 @@ def test_a_name_that_a_key_cannot_hold_is_told_in_one_line(fig6, key, values, sa
 
 
 def test_a_reference_that_a_scenario_leaves_out_is_a_key():
-    still = Starting.load("fig6", {"reference.joints": {}})
+    still = BaseScenario.load("fig6", {"reference.joints": {}})
     still.check("reference.joints.medial.offset", [0.1])
     assert still.at({"reference.joints.medial.offset": 0.1}).reference.joints["medial"].offset == 0.1
 
@@ -123,7 +123,7 @@ def test_what_a_key_holds_has_unit_and_name():
 
 
 def test_a_star_stands_for_every_name_and_holds_what_the_first_one_holds():
-    servo = Starting.load("servo")
+    servo = BaseScenario.load("servo")
     motor, radius = "finger.actuators.*.motor", "finger.actuators.*.spool_radius"
     servo.check(motor, ["XC330-M288", "STS3215"])
     servo.check(radius, [0.004, 0.006])
@@ -131,4 +131,4 @@ def test_a_star_stands_for_every_name_and_holds_what_the_first_one_holds():
     changed = servo.at({motor: "STS3215", radius: 0.006}).finger.actuators.values()
     assert [(each.motor.voltage, each.spool_radius) for each in changed] == [(7.4, 0.006)] * 4
     with pytest.raises(fp.InputError, match=r"finger\.actuators\.\*\.spool_radius"):
-        Starting.load("fig6").check(radius, [0.004])
+        BaseScenario.load("fig6").check(radius, [0.004])

@@ -7,7 +7,7 @@ import xarray as xr
 import finger_pin as fp
 from finger_pin.analysis import largest_force
 from finger_pin.description.actuators import Winding
-from finger_pin.studies.metrics import FORCE_TENSION, METRICS, Metric, Run, choose
+from finger_pin.studies.metrics import FORCE_TENSION, METRICS, Metric, Run, resolve_metrics
 
 # Uneven times: means over samples would be others.
 TIME = np.array([0.0, 1.0, 2.0, 6.0])
@@ -98,12 +98,12 @@ def test_metrics_of_the_statics_simulate_nothing():
 
 def test_metrics_are_chosen_by_name_and_a_misspelt_one_is_told_the_nearest():
     own = Metric("own", "1", "of one's own", len)
-    assert choose(["losses", own]) == (METRICS["losses"], own)
+    assert resolve_metrics(["losses", own]) == (METRICS["losses"], own)
     with pytest.raises(fp.InputError, match="did you mean tracking_rms"):
-        choose(["tracking_rsm"])
+        resolve_metrics(["tracking_rsm"])
     for names in ([], ["losses", "losses"]):
         with pytest.raises(fp.InputError):
-            choose(names)
+            resolve_metrics(names)
 
 
 def test_a_design_beyond_self_locking_is_measured_without_a_warning():

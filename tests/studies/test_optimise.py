@@ -37,7 +37,7 @@ def test_a_constraint_is_broken_by_how_far_a_value_lies_beyond_it():
 
 
 def test_a_metric_to_be_made_large_is_turned_round():
-    goals = Goals.of(["losses"], ["fingertip_force"], ["slack_time<=1"])
+    goals = Goals.from_metrics(["losses"], ["fingertip_force"], ["slack_time<=1"])
     np.testing.assert_array_equal(goals.values({"losses": 2.0, "fingertip_force": 3.0}), [2.0, -3.0])
     assert [metric.name for metric in goals.metrics] == ["losses", "fingertip_force", "slack_time"]
 
@@ -48,7 +48,7 @@ def test_a_metric_to_be_made_large_is_turned_round():
 )
 def test_goals_that_are_none_are_refused(small, large, bounds):
     with pytest.raises(fp.InputError):
-        Goals.of(small, large, bounds)
+        Goals.from_metrics(small, large, bounds)
 
 
 def test_keys_that_go_together_are_spelt_with_their_signs():
@@ -84,7 +84,7 @@ def test_no_other_design_is_better_than_one_that_is_not_dominated():
 def test_a_search_finds_the_front_of_a_problem_whose_front_is_known():
     # Binh and Korn, 1997: minimise 4 x^2 + 4 y^2 and (x - 5)^2 + (y - 5)^2 for x in [0, 5], y in [0, 3], within two
     # circles. Its front is x = y up to 3, and y = 3 beyond.
-    search = Search(2, 2, 2, 40, 1, None)
+    search = Search(2, 2, 40, 1, None)
     kept = []
     for _ in range(40):
         x, y = search.ask().T * np.array([[5.0], [3.0]])
@@ -107,7 +107,7 @@ def test_a_search_finds_the_front_of_a_problem_whose_front_is_known():
 def test_a_search_that_is_told_the_same_takes_the_same_course():
     courses = []
     for seed in (1, 1, 2):
-        search = Search(3, 2, 1, 8, seed, None)
+        search = Search(3, 2, 8, seed, None)
         asked = []
         for _ in range(4):
             designs = search.ask()

@@ -5,8 +5,7 @@ import os
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.folder import Store, StudyFolder
-from finger_pin.studies.runs import RunRecord
+from finger_pin.studies.store import RunRecord, Store, open_store
 
 
 def record(key, value=1.0):
@@ -19,45 +18,44 @@ def path(tmp_path):
 
 
 def test_what_was_appended_is_read_again(path):
-    with Store(path) as store:
-        store.append(record("a", float("inf")))
-        store.append(record("b", 0.1 + 0.2))
-    with Store(path) as store:
-        assert store.records == {"a": record("a", float("inf")), "b": record("b", 0.1 + 0.2)}
+    store = Store(path)
+    store.append(record("a", float("inf")))
+    store.append(record("b", 0.1 + 0.2))
+    assert Store(path).records == {"a": record("a", float("inf")), "b": record("b", 0.1 + 0.2)}
 
 
 @pytest.mark.parametrize("left", [1, 20, -1])
-def test_a_torn_last_line_is_cut_off_and_written_anew(path, left):
-    with Store(path) as store:
-        store.append(record("a"))
-        kept = path.read_bytes()
-        store.append(record("b"))
+def test_a_broken_last_line_is_cut_off_told_and_written_anew(path, left):
+    store = Store(path)
+    store.append(record("a"))
+    kept = path.read_bytes()
+    store.append(record("b"))
     whole = path.read_bytes()
     path.write_bytes(whole[: len(kept) + left] if left > 0 else whole[:left])
-    with Store(path) as store:
-        assert set(store.records) == {"a"}
-        store.append(record("b"))
+    with pytest.warns(UserWarning, match=r"runs.jsonl: lines that are not whole, or no records: 1; their runs are"):
+        store = Store(path)
+    assert set(store.records) == {"a"}
+    store.append(record("b"))
     assert path.read_bytes() == whole
 
 
-def test_lines_that_are_no_records_do_not_count(path):
+def test_lines_that_are_no_records_do_not_count_and_are_told(path):
     path.write_text('nonsense\n{"key": "a"}\n[1]\n\n')
-    with Store(path) as store:
-        assert store.records == {}
+    with pytest.warns(UserWarning, match="no records: 4; their runs are done again"):
+        assert Store(path).records == {}
 
 
 def test_a_record_is_on_disk_before_append_returns(path, monkeypatch):
     synced = []
     monkeypatch.setattr(os, "fsync", lambda file: synced.append(path.read_bytes()))
-    with Store(path) as store:
-        store.append(record("a"))
+    Store(path).append(record("a"))
     assert synced == [f"{record('a').to_json()}\n".encode()]
 
 
 def test_a_store_without_a_file_keeps_records_for_itself():
-    with Store() as store:
-        store.append(record("a"))
-        assert set(store.records) == {"a"}
+    store = Store()
+    store.append(record("a"))
+    assert set(store.records) == {"a"}
 
 
 def asks(**entries):
@@ -65,24 +63,24 @@ def asks(**entries):
 
 
 def test_the_same_study_goes_on_and_another_one_is_refused_with_what_differs(tmp_path):
-    with StudyFolder(tmp_path / "a" / "b", asks(), ["sweep.nc"]) as folder:
-        folder.store.append(record("a"))
-    with StudyFolder(tmp_path / "a" / "b", asks(), ["sweep.nc"]) as folder:
-        assert set(folder.store.records) == {"a"}
+    with open_store(tmp_path / "a" / "b", asks(), ["sweep.nc"]) as store:
+        store.append(record("a"))
+    with open_store(tmp_path / "a" / "b", asks(), ["sweep.nc"]) as store:
+        assert set(store.records) == {"a"}
     before = {each: each.read_bytes() for each in (tmp_path / "a" / "b").iterdir()}
     other = asks(sweep={"values": {"controller.gain": [2.0]}})
     with pytest.raises(fp.InputError, match=r"sweep.values.controller.gain differs.*--restart"):
-        StudyFolder(tmp_path / "a" / "b", other, ["sweep.nc"]).__enter__()
+        open_store(tmp_path / "a" / "b", other, ["sweep.nc"]).__enter__()
     assert {each: each.read_bytes() for each in (tmp_path / "a" / "b").iterdir()} == before
 
 
 def test_a_restart_drops_what_was_made_and_nothing_else(tmp_path):
-    with StudyFolder(tmp_path, asks(), ["sweep.nc"]) as folder:
-        folder.store.append(record("a"))
+    with open_store(tmp_path, asks(), ["sweep.nc"]) as store:
+        store.append(record("a"))
     (tmp_path / "sweep.nc").touch()
     (tmp_path / "notes.txt").touch()
-    with StudyFolder(tmp_path, asks(more=1), ["sweep.nc"], restart=True) as folder:
-        assert not folder.store.records
+    with open_store(tmp_path, asks(more=1), ["sweep.nc"], restart=True) as store:
+        assert not store.records
     assert {each.name for each in tmp_path.iterdir()} == {"notes.txt", "runs.jsonl", "study.toml"}
     assert "more = 1" in (tmp_path / "study.toml").read_text()
 
@@ -92,17 +90,17 @@ def test_a_restart_drops_what_was_made_and_nothing_else(tmp_path):
 def test_files_that_no_study_wrote_are_left_alone(tmp_path, name, restart):
     (tmp_path / name).write_text("mine")
     with pytest.raises(fp.InputError, match="not of a study"):
-        StudyFolder(tmp_path, asks(), ["sweep.nc"], restart=restart).__enter__()
+        open_store(tmp_path, asks(), ["sweep.nc"], restart=restart).__enter__()
     assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [(name, "mine")]
 
 
 def test_one_study_at_a_time_works_in_a_folder_and_a_killed_one_is_not_in_the_way(tmp_path):
     # What a killed process leaves.
     (tmp_path / ".lock").touch()
-    with StudyFolder(tmp_path, asks(), []):
+    with open_store(tmp_path, asks(), []):
         with pytest.raises(fp.InputError, match="another process"):
-            StudyFolder(tmp_path, asks(), []).__enter__()
-    with StudyFolder(tmp_path, asks(), []):
+            open_store(tmp_path, asks(), []).__enter__()
+    with open_store(tmp_path, asks(), []):
         pass
     assert {each.name for each in tmp_path.iterdir()} == {"study.toml", "runs.jsonl"}
 
@@ -110,4 +108,4 @@ def test_one_study_at_a_time_works_in_a_folder_and_a_killed_one_is_not_in_the_wa
 def test_a_folder_that_cannot_be_made_is_told(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(fp.InputError, match="cannot be written"):
-        StudyFolder(tmp_path / "file" / "sub", asks(), []).__enter__()
+        open_store(tmp_path / "file" / "sub", asks(), []).__enter__()

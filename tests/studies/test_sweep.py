@@ -71,7 +71,7 @@ def test_variables_and_coordinates_have_units_and_names_and_the_dataset_its_orig
 
 def test_progress_begins_with_what_is_there_and_ends_with_all(grid):
     _, _, seen = grid
-    assert seen[0] == (3, 3, 6)
+    assert seen[0] == (0, 0, 6)
     assert seen[-1] == (6, 3, 6)
 
 
@@ -191,7 +191,7 @@ def test_another_source_of_the_package_does_all_anew(tmp_path, monkeypatch):
         fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], output=tmp_path, executor=TWO)
 
     run()
-    monkeypatch.setattr("finger_pin.studies.runs.source_digest", lambda: "another")
+    monkeypatch.setattr("finger_pin.studies.records.source_digest", lambda: "another")
     run()
     assert len(lines(tmp_path)) == 2
 

@@ -58,6 +58,7 @@ def test_a_sweep_writes_its_results_and_says_what_came_out(script, tmp_path, mon
     assert dict(fp.load(folder / "sweep.nc").sizes) == {"controller.gain": 2, radius: 2}
 
 
+@pytest.mark.filterwarnings("default:out/runs.jsonl")
 def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(script, tmp_path, monkeypatch, capsys):
     arguments = (
         "--over", "controller.gain=0.5:2:7", "--over", "finger.tendon_friction.coulomb=0.05,0.1", "--workers", "2",
@@ -75,7 +76,8 @@ def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(scr
         file.write(b'{"key": "torn')
     monkeypatch.chdir(tmp_path)
     assert script.main(list(arguments)) == 0
-    assert "14 runs: 14 done" in capsys.readouterr().out
+    printed = capsys.readouterr()
+    assert "14 runs: 14 done" in printed.out and "runs.jsonl: lines that are not whole" in printed.err
     whole = before[: before.rfind(b"\n") + 1]
     assert path.read_bytes().startswith(whole)
     assert len({line["key"] for line in lines(path)}) == len(lines(path)) == 14

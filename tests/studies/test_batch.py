@@ -12,7 +12,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.exceptions import IntegrationError, StudyError
-from finger_pin.studies import many
+from finger_pin.studies import batch
 
 SHORT = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0}
 
@@ -45,12 +45,12 @@ def test_runs_that_a_broken_pool_has_not_done_are_nan_and_say_why() -> None:
 
 
 def test_runs_that_all_fail_are_an_error_that_holds_what_was_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = many.simulate
+    real = batch.simulate
 
     def failing(scenario: fp.Scenario, **options: object) -> None:
         raise IntegrationError(0.02, "planted", "nothing", real(scenario).isel(time=slice(0, 5)))
 
-    monkeypatch.setattr(many, "simulate", failing)
+    monkeypatch.setattr(batch, "simulate", failing)
     with pytest.raises(StudyError, match=r"every run failed; the first one: .*planted") as caught:
         fp.simulate_many(scenarios(1.0, 2.0), workers=1)
     assert np.isfinite(caught.value.result.joint_position.values[:, :5]).all()
@@ -99,7 +99,7 @@ def test_scenarios_are_taken_by_path(tmp_path: Path) -> None:
 
 def test_a_failing_run_is_nan_from_where_it_stopped_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = scenarios(1.0, 2.0)
-    real = many.simulate
+    real = batch.simulate
 
     def failing(scenario: fp.Scenario, **options: object) -> object:
         result = real(scenario)
@@ -107,7 +107,7 @@ def test_a_failing_run_is_nan_from_where_it_stopped_and_says_why(monkeypatch: py
             raise IntegrationError(0.02, "planted", "nothing", result.isel(time=slice(0, 5)))
         return result
 
-    monkeypatch.setattr(many, "simulate", failing)
+    monkeypatch.setattr(batch, "simulate", failing)
     stacked = fp.simulate_many(runs, workers=1)
     assert "planted" in str(stacked.failure.values[1])
     assert np.isfinite(stacked.joint_position.values[0]).all()

@@ -28,7 +28,7 @@ from finger_pin.simulation.quantity import Quantity
 from finger_pin.simulation.recording import refuse_unknown
 from finger_pin.simulation.simulate import simulate
 from finger_pin.simulation.variables import variables as known_variables
-from finger_pin.studies.executing import Crew, Lost
+from finger_pin.studies.executor import FailedTask, compile_for, open_executor, run_tasks
 
 _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
 
@@ -79,12 +79,12 @@ def simulate_many(
     bindings: list[Bindings] = []
     run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables), bindings=bindings)
     progress = progress or notebook_bar("runs")
-    found: dict[int, xr.Dataset | Lost] = {}
+    found: dict[int, xr.Dataset | FailedTask] = {}
     texts = [""] * len(runs)
-    with CtrlC() as interrupted, Crew(executor, workers) as crew:
-        crew.compile(runs[0])
-        for index, result in crew.do(run, runs, interrupted):
-            if isinstance(result, Lost) and isinstance(result.error, InputError):
+    with CtrlC() as interrupted, open_executor(executor, workers) as pool:
+        compile_for(pool, lambda: runs[0])
+        for index, result in run_tasks(pool, run, runs, interrupted):
+            if isinstance(result, FailedTask) and isinstance(result.error, InputError):
                 raise result.error
             found[index] = result
             # Here this thread would wait for the others.
@@ -135,7 +135,7 @@ def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...], 
 
 
 def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:
-    """Return scenarios of which those with the same finger have the same object, which is then built once."""
+    """Return scenarios whose equal fingers are one object, so that it is built once."""
     first = runs[0]
     return [
         run.updated(finger=first.finger, environment=first.environment)
@@ -159,7 +159,7 @@ def _check_alike(runs: Sequence[Scenario]) -> None:
 
 
 def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | None) -> None:
-    """Raise unless every variable is one of at least one run."""
+    """Raise unless each variable exists in at least one run."""
     known: dict[str, Quantity] = {}
     for run in runs:
         if set(keep) <= set(known):
@@ -168,7 +168,7 @@ def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | 
     refuse_unknown("variables", keep, known)
 
 
-def _stack(runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | Lost], texts: Sequence[str]) -> xr.Dataset:
+def _stack(runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | FailedTask], texts: Sequence[str]) -> xr.Dataset:
     order, results = list(done), list(done.values())
     found = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
     longest = max(found.values(), key=lambda result: result.sizes["time"], default=xr.Dataset(coords={"time": []}))
@@ -201,7 +201,7 @@ def _stack(runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | Lost], text
     for name in _PER_RUN:
         numbers = [result.attrs.get(name, np.nan) if isinstance(result, xr.Dataset) else np.nan for result in results]
         stacked[name] = (("run",), np.array(numbers), {"long_name": name})
-    failures = [result.reason if isinstance(result, Lost) else result.attrs["failure"] for result in results]
+    failures = [result.reason if isinstance(result, FailedTask) else result.attrs["failure"] for result in results]
     stacked["failure"] = (("run",), np.array(failures, dtype=str), {"long_name": "failure"})
     described = np.array([texts[index] for index in order], dtype=str)
     stacked["scenario"] = (("run",), described, {"long_name": "resolved scenario, TOML"})
@@ -214,7 +214,7 @@ def _stack(runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | Lost], text
 
 
 def _labels(results: Iterable[xr.Dataset]) -> dict[str, list[str]]:
-    """Return the names along every dimension that has some, those of all results."""
+    """Return the union of all results' labels by dimension."""
     found: dict[str, dict[str, None]] = {}
     for result in results:
         for name in result.coords:

@@ -16,7 +16,7 @@ import planted
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.executing import Crew, Lost
+from finger_pin.studies.executor import FailedTask, open_executor, run_tasks
 
 
 def never():
@@ -33,27 +33,27 @@ class Serial:
 
 
 @pytest.fixture(params=[None, "threads", "processes", "own"])
-def crew(request):
+def executor(request):
     made = {"threads": ThreadPoolExecutor, "processes": ProcessPoolExecutor}.get(request.param)
-    executor = Serial() if request.param == "own" else made and made(2)
-    with Crew(executor) as crew:
-        yield crew
+    given = Serial() if request.param == "own" else made and made(2)
+    with open_executor(given) as executor:
+        yield executor
     if made:
-        executor.shutdown()
+        given.shutdown()
 
 
-def test_every_item_is_done_once_and_comes_with_its_index_by_any_executor(crew):
-    found = list(crew.do(planted.tripled, range(20), never))
+def test_every_item_is_done_once_and_comes_with_its_index_by_any_executor(executor):
+    found = list(run_tasks(executor, planted.tripled, range(20), never))
     assert sorted(found) == [(number, 3 * number) for number in range(20)]
     factor = 5
-    assert dict(crew.do(lambda number, stop: factor * number, [2], never)) == {0: 10}
+    assert dict(run_tasks(executor, lambda number, stop: factor * number, [2], never)) == {0: 10}
 
 
 def test_what_raises_is_told_in_one_line_and_the_others_go_on():
-    with Crew(workers=2) as crew:
-        (lost,) = dict(crew.do(planted.raises, [7], never)).values()
-        assert isinstance(lost, Lost) and lost.reason == "ArithmeticError: planted 7" and not lost.undone
-        assert dict(crew.do(planted.tripled, [7], never)) == {0: 21}
+    with open_executor(workers=2) as executor:
+        (failed,) = dict(run_tasks(executor, planted.raises, [7], never)).values()
+        assert isinstance(failed, FailedTask) and failed.reason == "ArithmeticError: planted 7" and not failed.undone
+        assert dict(run_tasks(executor, planted.tripled, [7], never)) == {0: 21}
 
 
 def test_a_stop_ends_what_runs_in_threads_and_leaves_the_rest():
@@ -65,10 +65,10 @@ def test_a_stop_ends_what_runs_in_threads_and_leaves_the_rest():
             time.sleep(0.001)
         ended.set()
 
-    with Crew(workers=1) as crew:
-        assert list(crew.do(endless, range(9), lambda: bool(begun))) == []
+    with open_executor(workers=1) as executor:
+        assert list(run_tasks(executor, endless, range(9), lambda: bool(begun))) == []
         assert ended.wait(10.0)
-        assert dict(crew.do(planted.tripled, [1], never)) == {0: 3}
+        assert dict(run_tasks(executor, planted.tripled, [1], never)) == {0: 3}
     assert begun == [0]
 
 
@@ -159,15 +159,18 @@ def test_an_executor_that_has_been_shut_down_is_named_in_one_line(study):
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_a_stop_ends_what_other_processes_run_and_no_more_is_begun(tmp_path, method):
+def test_a_stop_ends_what_other_processes_run_and_no_more_is_begun(tmp_path, method, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
     def marked(kind):
         return {each.name.removeprefix(kind) for each in tmp_path.glob(f"{kind}*")}
 
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(method)) as executor, Crew(executor) as crew:
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(method)) as executor:
         work = partial(planted.waits_to_be_stopped, folder=tmp_path)
-        assert list(crew.do(work, range(40), lambda: bool(marked("begun")))) == []
+        assert list(run_tasks(executor, work, range(40), lambda: bool(marked("begun")))) == []
     # The executor had fetched three more than the two that ran.
     assert 1 <= len(marked("begun")) <= 2 and marked("stopped") == marked("begun")
+    assert not marked("finger_pin-")
 
 
 SWEEP = """
