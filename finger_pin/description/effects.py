@@ -1,4 +1,4 @@
-"""What has no effect in a kind of model is refused: the table of what a key needs in order to act.
+"""Refusal of keys without effect: a table of the conditions under which keys act.
 
 Judged are values that a table gives and that differ from the default, so that a description written out in full can be
 read again. What is at a limit where it does nothing, such as a stiffness of zero, is no mistake: sweeps pass there.
@@ -13,7 +13,7 @@ from finger_pin.description.validation import Description, problem
 
 
 class Rule(NamedTuple):
-    """What entries of a table need.
+    """Condition under which entries of a table act.
 
     Attributes:
         table: Dotted name of the table, in which a star stands for every name; empty for the description itself.

@@ -104,7 +104,7 @@ def actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
 
 
 def joined_table(parts: Mapping[str, Any], group: str, table: type[_Table]) -> _Table:
-    """Return a table of all fingers, whose entries are lists of numbers in the order of the whole."""
+    """Return one table for all fingers, with lists of numbers in the order of the hand."""
     tables: list[_Table] = [getattr(part, group) for part in parts.values()]
     joined: _Table = _joined(table, tables, [_kinds(part, group) for part in parts.values()])
     return joined

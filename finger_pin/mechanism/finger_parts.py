@@ -1,4 +1,4 @@
-"""The parts of a finger and their tables of rows, made anew only for other numbers of their own."""
+"""Parts of a finger and their tables of rows, remembered by what they depend on."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from finger_pin.typing import Array
 
 
 class Parts(NamedTuple):
-    """The parts that a description makes, as `Finger` has them."""
+    """Parts of a finger, made from its description."""
 
     routing: Routing
     tendons: Tendons
@@ -68,7 +68,7 @@ class Parts(NamedTuple):
         drives: tuple[Rows, ...],
         pulled: dict[str, Array],
     ) -> tuple[list[Rows], Canals]:
-        """Return the tables of rows in the order of evaluation, as wide as there are coordinates, and the canals."""
+        """Return the tables of rows in the order of evaluation, and the canals."""
         joints, width = self.routing.joints, self.width
         pulling: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.names))
         if paths:
@@ -89,7 +89,7 @@ class Parts(NamedTuple):
 # Most changes of numbers leave most parts, and most tables, as they were.
 @memoised(lambda make, *given: (make.__self__, make.__name__, *given), most=1024)
 def _made(make: Any, *given: Any) -> Any:
-    """Return a method's result for a part and values, anew only if either differs."""
+    """Return a method's result, remembered by its part and arguments."""
     return make(*given)
 
 

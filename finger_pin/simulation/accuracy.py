@@ -182,7 +182,7 @@ def _difference(scenario: Scenario, one: Array, other: Array) -> float:
 
 
 def with_tighter(scenario: Scenario, factor: float) -> Scenario:
-    """Return a scenario with tolerances divided by a factor, as far as tolerances go."""
+    """Return a scenario with tolerances divided by a factor, within their bounds."""
     settings = scenario.simulation
     tighter = {name: max(getattr(settings, name) / factor, least) for name, least in TOLERANCES.items()}
     return scenario.updated(simulation=tighter)

@@ -1,4 +1,4 @@
-"""A run: from a scenario to its Dataset, judged."""
+"""Run a scenario, check accuracy and energy balance, and return the Dataset."""
 
 from __future__ import annotations
 
