@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.core.evaluation.law_code import SLOPES, widest
 from finger_pin.core.evaluation.rigid_body import SPATIAL_LAYERS, SQUARE_LAYERS
@@ -172,7 +173,7 @@ def build_blocks(tables: Tables, control: InputTable) -> Blocks:
             atom[island.coordinates], row_atom[island.rows] = index, index
         row_atom[tables.touch > 0] = -1
 
-    def room(size: int) -> Any:
+    def room(size: int) -> NDArray[np.int64]:
         return np.zeros(size, dtype=np.int64)
 
     return Blocks(

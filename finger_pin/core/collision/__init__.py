@@ -1,1 +1,1 @@
-"""Touches that no step misses: bounds of motion, contacts that are asleep, and looks within a step."""
+"""Detection of contacts within a step: bounds of motion, culling of pairs, and continuous detection."""

@@ -1,19 +1,19 @@
-"""Contacts that are asleep: open, at rest, and too far apart to close before they are looked at again.
+"""Conservative culling of contact pairs that cannot close within the next steps.
 
 Within a step the path of two bodies' relative motion is at most the sum, over the coordinates that move them against
 each other, of how far each goes to and fro times its lever. A polynomial goes no farther than its Bernstein
-coefficients do. One that is asleep keeps less than its gap, from which such paths are taken.
+coefficients do. A culled pair keeps a lower bound of its gap, from which such paths are taken.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import RATE
-from finger_pin.core.jit import njit_always_inline, njit_inline
-from finger_pin.core.path_tables import COLUMNS
+from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
+from finger_pin.core.path_tables import COLUMNS, Paths, PathWork
+from finger_pin.core.tables import Tables
 
 # A gap is known so well, m; and a contact is awake where so many steps as the last one might close it.
 KNOWN, _AHEAD = 1e-9, 3.0
@@ -22,8 +22,8 @@ _STRAIGHT = 1e-14
 
 
 @njit_always_inline
-def depart(tables: Any, own: Any) -> None:
-    """Note the gaps of all contacts that are awake at the beginning of a step."""
+def depart(tables: Tables, own: PathWork) -> None:
+    """Record the gap of every active pair at the start of a step."""
     paths = tables.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
@@ -31,7 +31,7 @@ def depart(tables: Any, own: Any) -> None:
 
 
 @njit_inline
-def distance(paths: Any, e: int, own: Any) -> Any:
+def distance(paths: Paths, e: int, own: PathWork) -> float:
     """Return the largest distance of the core of a gap's first body from the origin of its frame, m."""
     total = 0.0
     for c in range(3):
@@ -41,7 +41,7 @@ def distance(paths: Any, e: int, own: Any) -> Any:
 
 
 @njit_always_inline
-def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
+def trace(dense: Matrix, k: Matrix, x: Vector, end: Vector, size: int, own: PathWork) -> None:
     """Fill the Bernstein coefficients of the interpolant of a step, and the path of each of n coordinates."""
     last, control = k.shape[0] - 1, own.control
     for j in range(size):
@@ -59,7 +59,7 @@ def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
 
 
 @njit_always_inline
-def glide(x: Any, end: Any, size: int, own: Any) -> None:
+def glide(x: Vector, end: Vector, size: int, own: PathWork) -> None:
     """Fill the same for a motion along a straight line."""
     for j in range(size):
         for i in range(5):
@@ -68,7 +68,7 @@ def glide(x: Any, end: Any, size: int, own: Any) -> None:
 
 
 @njit_inline
-def path_of(tables: Any, e: int, own: Any) -> Any:
+def path_of(tables: Tables, e: int, own: PathWork) -> float:
     """Return a bound of the path of a contact's bodies against each other in the step that was traced, m."""
     paths, control = tables.paths, own.control
     endless = np.isinf(paths.extents[e])
@@ -89,7 +89,7 @@ def path_of(tables: Any, e: int, own: Any) -> Any:
 
 
 @njit_inline
-def widened(path: float, turned: float, far: float) -> Any:
+def widened(path: float, turned: float, far: float) -> float:
     """Return a path with that of a turn about a distant point, which is as far away as that and the path, m."""
     if turned == 0.0:
         return path
@@ -97,21 +97,21 @@ def widened(path: float, turned: float, far: float) -> Any:
 
 
 @njit_inline
-def set_asleep(k: int, value: int, asleep: Any) -> None:
-    """Let the rows of a contact sleep, or wake them."""
+def set_asleep(k: int, value: int, asleep: Indices) -> None:
+    """Mark the rows of a contact as culled or active."""
     for m in range(k, k + 3):
         asleep[m] = value
 
 
-def wake_all(tables: Any, own: Any) -> None:
-    """Wake all contacts, outside compiled code."""
+def wake_all(tables: Tables, own: PathWork) -> None:
+    """Activate all pairs, outside compiled code."""
     own.asleep[:], own.awake[:] = 0, np.arange(own.awake.size)
     own.awake_count[0] = tables.touching // COLUMNS
 
 
 @njit_inline
-def list_awake(tables: Any, own: Any) -> None:
-    """List the contacts that are awake."""
+def list_awake(tables: Tables, own: PathWork) -> None:
+    """List the active pairs."""
     awake = 0
     for e in range(tables.touching // COLUMNS):
         if own.asleep[tables.paths.row[e]] == 0:
@@ -121,7 +121,7 @@ def list_awake(tables: Any, own: Any) -> None:
 
 
 @njit_always_inline
-def wake(tables: Any, own: Any) -> None:
+def wake(tables: Tables, own: PathWork) -> None:
     """Wake the contacts that may close on the way that was traced; note the paths of all."""
     paths = tables.paths
     for e in range(paths.columns.size):
@@ -135,8 +135,8 @@ def wake(tables: Any, own: Any) -> None:
 
 
 @njit_always_inline
-def arrive(tables: Any, own: Any) -> None:
-    """Note the gaps of contacts that are awake at the end of a way that was traced."""
+def arrive(tables: Tables, own: PathWork) -> None:
+    """Record the gap of every active pair at the end of a bounded motion."""
     paths = tables.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
@@ -144,7 +144,7 @@ def arrive(tables: Any, own: Any) -> None:
 
 
 @njit_always_inline
-def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
+def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
     for m in range(k + 1, k + 3):
         if not abs(states[tables.state[m]]) < _STRAIGHT:
@@ -155,8 +155,8 @@ def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
 
 
 @njit_inline
-def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
-    """Let contacts fall asleep or wake up at the end of a step, by bounds of their gaps there.
+def settle(tables: Tables, rows: Matrix, own: PathWork, states: Vector) -> bool:
+    """Cull or activate pairs at the end of a step, by bounds of their gaps there.
 
     Returns:
         Whether any did.
@@ -181,8 +181,8 @@ def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
 
 
 @njit_inline
-def rouse(tables: Any, work: Any) -> None:
-    """Wake all contacts, of which nothing is known."""
+def rouse(tables: Tables, work: Work) -> None:
+    """Activate all pairs, before anything is known of them."""
     for k in range(tables.touching):
         work.paths.asleep[k] = 0
     for e in range(work.paths.path.size):
@@ -191,7 +191,7 @@ def rouse(tables: Any, work: Any) -> None:
 
 
 @njit_inline
-def wake_since(tables: Any, work: Any, first: Any, second: Any, before: Any, after: Any) -> None:
+def wake_since(tables: Tables, work: Work, first: Matrix, second: Matrix, before: Vector, after: Vector) -> None:
     """Wake the contacts that may have closed since a state, from its quaternions and numbers and from those of now."""
     for f in range(tables.charts.size):
         # What a free body has turned by: its angles count from its attitude.
@@ -210,8 +210,8 @@ def wake_since(tables: Any, work: Any, first: Any, second: Any, before: Any, aft
 
 
 @njit_inline
-def let_sleep(tables: Any, work: Any, state: Any, before: Any) -> None:
-    """Let contacts that are far apart at a state sleep, and keep it, for `wake_since`."""
+def let_sleep(tables: Tables, work: Work, state: Vector, before: Vector) -> None:
+    """Cull pairs that are far apart at a state, and keep the state for `wake_since`."""
     arrive(tables, work.paths)
     settle(tables, work.rows, work.paths, state[2 * work.torque.size :])
     for c in range(state.size):
