@@ -10,7 +10,6 @@ from typing import Protocol
 import numpy as np
 
 from finger_pin.core.stepping import rosenbrock as core
-from finger_pin.core.stepping.companion_motion import Companion
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part, failure
 from finger_pin.core.stepping.repetition import Steps
@@ -49,13 +48,12 @@ class Moving(Protocol):
 class _Recorder:
     """Carries one island forward and keeps its steps."""
 
-    def __init__(self, stepper: Stepper, index: int, chunk: int, judged: bool = False) -> None:
+    def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
         self._stepper, self._index = stepper, index
         part = self.part
         self.start = (part.time, part.x.copy(), part.attitude.copy())
         self.room, self._chunk = part.room(_ROOM), chunk
         self.taken = 0
-        self.companion = Companion(part) if judged else None
         self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
 
     def advance(self, end: float, chunks: int = -1) -> int:
@@ -65,8 +63,6 @@ class _Recorder:
             if self.taken == len(self.room.times):
                 self.room = self.room.doubled()
             status, self.taken = part.advance(end, self.room, slice(self.taken, self.taken + self._chunk))
-            if self.companion is not None:
-                self.companion.look()
             chunks -= 1
             if status != core.FULL or self.taken >= self.most:
                 return status
@@ -118,7 +114,7 @@ def integrate_compiled(
     # Of a controller that acts in between, the linearised flow knows nothing.
     known = held is None and not stepper.driven
     judged = known and stepper.judged and not stepper.repeats
-    recorders = [_Recorder(stepper, index, chunk, judged) for index in range(len(stepper.parts))]
+    recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     for recorder in recorders:
         # Compiling is no part of an integration's cost.
         recorder.part.ready(recorder.room)[1].compile()
@@ -152,7 +148,7 @@ def integrate_compiled(
         statistics=_statistics(recorders, time.perf_counter() - began),
         failure=reason,
         interrupted=interrupted,
-        estimated_error=_error(stepper, recorders) if judged else np.nan,
+        estimated_error=stepper.estimated_error if judged else np.nan,
         # Inputs that are held in between are not the core's own.
         islands=() if not known or stepper.held else tuple(steps),
         steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),
@@ -166,15 +162,6 @@ def _statistics(recorders: Sequence[_Recorder], wall_time: float) -> Statistics:
         int(sum(recorder.part.memory[at] for recorder in recorders)) for at in counters
     )
     return Statistics(sum(recorder.taken for recorder in recorders), evaluations, jacobians, factorisations, wall_time)
-
-
-def _error(stepper: Stepper, recorders: Sequence[_Recorder]) -> float:
-    """Return the estimated error of a run, rad or m rms; infinite if it has grown beyond all bounds."""
-    companions = [recorder.companion for recorder in recorders if recorder.companion is not None]
-    for companion in companions:
-        companion.look(1)
-    lost = any(companion.lost for companion in companions)
-    return np.inf if lost else stepper.estimated_error
 
 
 def joined(stepper: Stepper, steps: Sequence[Moving]) -> Callable[[Array], Array]:

@@ -246,8 +246,8 @@ class Part:
             steps = steps._replace(branches=np.zeros((len(steps.ends), 0)))
         self.steps = steps
 
-    def copy(self, judged: bool | None = None, tolerances: float = 1.0) -> Part:
-        """Return an independent part at a share of its tolerances; its error is estimated, if not told, as here."""
+    def copy(self, judged: bool | None = None) -> Part:
+        """Return an independent part; its error is estimated, if not told, as here."""
         pack = self._bound
         return Part(
             self.island,
@@ -257,8 +257,8 @@ class Part:
             pack.x.copy(),
             pack.attitude.copy(),
             pack.tableau,
-            pack.rtol * tolerances,
-            pack.atol * tolerances,
+            pack.rtol,
+            pack.atol.copy(),
             pack.memory.copy(),
             self.judged if judged is None else judged,
         )
