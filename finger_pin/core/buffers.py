@@ -137,7 +137,7 @@ class Blocks(NamedTuple):
         place: Of every coordinate in its block, shape (N,).
         state_place: Of every state in its block, shape (Z,).
         loose: For the states of contacts that are open, -dz'/dz, shape (Z,); zero for all others.
-        awake, awake_count: States of contacts that are awake, shape (Z,), and how many, shape (1,).
+        active_states, active_state_count: States of active contact pairs, shape (Z,), and how many, shape (1,).
         current: The block that is being condensed, shape (1,).
     """
 
@@ -156,8 +156,8 @@ class Blocks(NamedTuple):
     place: Indices
     state_place: Indices
     loose: Vector
-    awake: Indices
-    awake_count: Indices
+    active_states: Indices
+    active_state_count: Indices
     current: Indices
 
 
@@ -191,8 +191,8 @@ def build_blocks(tables: Tables, control: InputTable) -> Blocks:
         place=np.arange(width),
         state_place=np.arange(states),
         loose=np.zeros(states),
-        awake=room(states),
-        awake_count=room(1),
+        active_states=room(states),
+        active_state_count=room(1),
         current=room(1),
     )
 

@@ -199,8 +199,8 @@ def condense(address: int, g: float) -> int:
     """Fill the solution of (g - J) u = r for all r, after `linearise`; return 0 if g - J is singular, else 1."""
     model = unpack(address, MODEL)
     linear, blocks = model.linear, model.linear.blocks
-    for index in range(blocks.awake_count[0]):
-        s = blocks.awake[index]
+    for index in range(blocks.active_state_count[0]):
+        s = blocks.active_states[index]
         linear.loose[s] = 1.0 / (g + blocks.loose[s]) if blocks.loose[s] > 0.0 else 0.0
     for b in range(blocks.number[0]):
         if not _condense_block(model, address, g, b):
@@ -265,7 +265,7 @@ def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
 
 @njit_reassociate
 def solve(linear: Any, r: Any, u: Any) -> None:
-    """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i. States of contacts asleep stay."""
+    """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i. States of culled contacts stay."""
     blocks, right, solution = linear.blocks, linear.right, linear.solution
     whole = linear.mass.shape[0]
     if blocks.touches.size == 0:
@@ -276,8 +276,8 @@ def solve(linear: Any, r: Any, u: Any) -> None:
                 value += row[c] * r[c]
             u[i] = value
         return
-    for index in range(blocks.awake_count[0]):
-        s = blocks.awake[index]
+    for index in range(blocks.active_state_count[0]):
+        s = blocks.active_states[index]
         u[2 * whole + s] = linear.loose[s] * r[2 * whole + s]
     for b in range(blocks.number[0]):
         places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]

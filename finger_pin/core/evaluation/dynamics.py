@@ -125,8 +125,8 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
     rows, torque = work.rows, work.torque
     for e in range(tables.arm_start[tables.touching], tables.arm_at.size):
         torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
-    for index in range(work.paths.awake_count[0]):
-        k = tables.paths.row[work.paths.awake[index]]
+    for index in range(work.paths.active_pair_count[0]):
+        k = tables.paths.row[work.paths.active_pairs[index]]
         for m in range(k + 1, k + 3):
             rate[tables.state[m]] = rows[RATE, m]
     for i in range(2 * tables.touching // 3, tables.state_row.size):

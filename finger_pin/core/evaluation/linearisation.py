@@ -111,8 +111,8 @@ def linearise(address: int, time: float) -> int:
         if begin >= tables.touching:
             call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
             continue
-        for index in range(work.paths.awake_count[0]):
-            k = tables.paths.row[work.paths.awake[index]]
+        for index in range(work.paths.active_pair_count[0]):
+            k = tables.paths.row[work.paths.active_pairs[index]]
             if begin <= k < end:
                 call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, k, k + 3)
     for e in range(tables.bend.size):

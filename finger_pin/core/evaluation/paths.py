@@ -136,11 +136,11 @@ def look(address: int, piece: float) -> int:
 
 @njit_always_inline
 def measure_paths(tables: Any, work: Any) -> None:
-    """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if awake."""
+    """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if active."""
     paths, own, first = tables.paths, work.paths, tables.touching
     closed = 0
-    for index in range(own.awake_count[0]):
-        e = own.awake[index]
+    for index in range(own.active_pair_count[0]):
+        e = own.active_pairs[index]
         _measure(paths, e, work)
         if own.active[e]:
             own.closed[closed] = e

@@ -1,4 +1,4 @@
-"""From a stepper to a trajectory that can be evaluated anywhere."""
+"""Integration of a stepper to a trajectory that can be evaluated anywhere."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.island_motion import IslandMotion
-from finger_pin.core.stepping.island_stepper import Part, failure
+from finger_pin.core.stepping.island_stepper import IslandIntegrator, failure
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.trajectory import Statistics, Stop, Trajectory, Watch
@@ -46,7 +46,7 @@ class Moving(Protocol):
 
 
 class _Recorder:
-    """Carries one island forward and keeps its steps."""
+    """Integration of one island that keeps its steps."""
 
     def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
         self._stepper, self._index = stepper, index
@@ -69,7 +69,7 @@ class _Recorder:
         return core.DONE
 
     @property
-    def part(self) -> Part:
+    def part(self) -> IslandIntegrator:
         """The island; a stepper that is loaded on the way replaces it."""
         return self._stepper.parts[self._index]
 
@@ -113,7 +113,7 @@ def integrate_compiled(
         stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
     # Of a controller that acts in between, the linearised flow knows nothing.
     known = held is None and not stepper.driven
-    judged = known and stepper.judged and not stepper.repeats
+    estimate_error = known and stepper.estimate_error and not stepper.repeats
     recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     for recorder in recorders:
         # Compiling is no part of an integration's cost.
@@ -148,7 +148,7 @@ def integrate_compiled(
         statistics=_statistics(recorders, time.perf_counter() - began),
         failure=reason,
         interrupted=interrupted,
-        estimated_error=stepper.estimated_error if judged else np.nan,
+        estimated_error=stepper.estimated_error if estimate_error else np.nan,
         # Inputs that are held in between are not the core's own.
         islands=() if not known or stepper.held else tuple(steps),
         steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),
@@ -157,11 +157,11 @@ def integrate_compiled(
 
 def _statistics(recorders: Sequence[_Recorder], wall_time: float) -> Statistics:
     """Return the statistics of all islands together."""
-    counters = core.EVALUATIONS, core.JACOBIANS, core.FACTORISATIONS
-    evaluations, jacobians, factorisations = (
-        int(sum(recorder.part.memory[at] for recorder in recorders)) for at in counters
-    )
-    return Statistics(sum(recorder.taken for recorder in recorders), evaluations, jacobians, factorisations, wall_time)
+    steps, memories = sum(recorder.taken for recorder in recorders), [recorder.part.memory for recorder in recorders]
+    evaluations = int(sum(each.evaluations[0] for each in memories))
+    jacobians = int(sum(each.jacobians[0] for each in memories))
+    factorisations = int(sum(each.factorisations[0] for each in memories))
+    return Statistics(steps, evaluations, jacobians, factorisations, wall_time)
 
 
 def joined(stepper: Stepper, steps: Sequence[Moving]) -> Callable[[Array], Array]:
