@@ -178,7 +178,7 @@ class _Reader:
         return dict(zip(distinct("keyframe", [model.key(k).name for k in range(model.nkey)]), found, strict=True))
 
     def _bodies(self) -> list[int]:
-        """Return the bodies that move, that tendons pass or that carry these, parents first."""
+        """Return the bodies that move, are passed by tendons, or carry such bodies, parents first."""
         model = self.model
         # What lies around does not carry a tip.
         needed = self._passed() | {self._tip_body()[0]} | self.shapes.still()

@@ -21,7 +21,7 @@ class Rest:
     """
 
     def __init__(self, mujoco: Any, model: Any) -> None:
-        """Look at everything but equalities and actuators, which are looked at when they are read.
+        """Check all elements but equalities and actuators.
 
         Raises:
             InputError: If the model has muscles.
@@ -62,7 +62,7 @@ class Rest:
         return list(dict.fromkeys(self._moving))
 
     def add(self, line: str, moves: bool = True) -> None:
-        """List something, which moves or carries anything or not."""
+        """List an unsupported element and whether it moves or carries anything."""
         self._listed.append(line)
         if moves:
             self._moving.append(line)
@@ -79,7 +79,7 @@ class Rest:
                 raise InputError(f"actuator {model.actuator(i).name or i}", "is a muscle; muscles are not supported")
 
     def _every(self, what: str, attribute: str, has: str, by_dof: bool = False) -> None:
-        """List every element whose numbers of an attribute, which older versions lack, are not zero."""
+        """List every element with a nonzero attribute that older versions lack."""
         values = getattr(self.model, attribute, None)
         if values is None or not len(values):
             return

@@ -49,7 +49,7 @@ _WILD, _COARSE = 30.0, 1e-3
 
 
 class RecordedMotion:
-    """A motion, or a window of one, beside a scenario.
+    """Recorded motion, or a window of one, compared with a scenario.
 
     Attributes:
         recording: The recording.
@@ -95,7 +95,7 @@ class RecordedMotion:
         return computed
 
     def tune(self, factor: float) -> None:
-        """Integrate from now on with so much larger tolerances than the scenario asks for."""
+        """Multiply the scenario's tolerances by a factor from now on."""
         self._factor = factor
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
@@ -273,7 +273,7 @@ class RecordedMotion:
 
 
 def _tuned(scenario: Scenario, factor: float) -> Scenario:
-    """Return a scenario with so much larger tolerances."""
+    """Return a scenario with tolerances multiplied by a factor."""
     own = scenario.simulation
     rtol, atol = (
         min(max(factor * each, min(each, _FINEST)), max(each, _ROUGHEST)) for each in (own.rtol, own.atol_scale)

@@ -67,7 +67,7 @@ def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
 
 @dataclass(frozen=True, eq=False)
 class BatchedLoop(ClosedLoop):
-    """Loops of worlds as one, each world at a time of its own.
+    """Batched loop of worlds, each at its own time.
 
     Attributes:
         loops: Of the worlds.
@@ -138,7 +138,7 @@ class BatchedLoop(ClosedLoop):
 
 
 class _PalmSignals:
-    """Paths of palms, each at a time of its own."""
+    """Batched palm paths, each at its own time."""
 
     def __init__(self, loops: Sequence[ClosedLoop]) -> None:
         self._loops = loops

@@ -160,7 +160,7 @@ class World:
         return bool(self.reason) or self._step >= self.task.steps
 
     def reset(self, random: np.random.Generator) -> None:
-        """Begin an episode.
+        """Reset for an episode.
 
         Raises:
             InputError: If what is drawn is not allowed.
@@ -246,7 +246,7 @@ class World:
         return self.action.next_piece(self.stepper, self.now, end)
 
     def result(self, sample_rate: float) -> xr.Dataset:
-        """Return the episode so far, integrated again step by step, as a Dataset with its energy account."""
+        """Return the episode so far, repeated step by step, as a Dataset with its energy account."""
         if not self._step:
             raise InputError("result", "is of steps, and there are none yet: call step")
         stepper, end = self._stepper_at(self._begun), self.stepper.time

@@ -1,4 +1,4 @@
-"""Worlds of one scenario side by side, stepped and observed at once."""
+"""Batch of worlds of one scenario, stepped and observed together."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Worlds:
         self._variables = {name: known[name] for name in self.task.variables}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all but the functions of the variables, which have no names of their own."""
+        """Return the state without the functions of the variables, which cannot be pickled."""
         return {name: value for name, value in self.__dict__.items() if name != "_variables"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -73,7 +73,7 @@ class Worlds:
         return Box(-np.inf, np.inf, seen.shape[1:], np.float32), Box(low.astype(np.float32), high.astype(np.float32))
 
     def reset(self, places: Sequence[int], randoms: Sequence[np.random.Generator]) -> None:
-        """Begin episodes in some worlds.
+        """Reset some worlds.
 
         Args:
             places: Their numbers.

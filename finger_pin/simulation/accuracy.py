@@ -77,7 +77,7 @@ def judge_error(scenario: Scenario, trajectory: Trajectory, *, margin: float) ->
 
 
 def with_tighter(scenario: Scenario, factor: float) -> Scenario:
-    """Return a scenario with tolerances divided by a factor, as far as tolerances go."""
+    """Return a scenario with tolerances divided by a factor, within their bounds."""
     settings = scenario.simulation
     tighter = {name: max(getattr(settings, name) / factor, least) for name, least in TOLERANCES.items()}
     return scenario.updated(simulation=tighter)

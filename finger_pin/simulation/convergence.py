@@ -98,7 +98,7 @@ class Convergence:
 
 
 def tightened(scenario: Scenario, factor: float = FACTOR) -> Scenario:
-    """Return a scenario with tolerances divided by a factor, as far as tolerances go.
+    """Return a scenario with tolerances divided by a factor, within their bounds.
 
     Raises:
         InputError: If the factor is not above 1, or a tolerance is as tight as it can be.

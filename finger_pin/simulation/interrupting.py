@@ -55,7 +55,7 @@ class CtrlC:
 
 
 def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
-    """Return the result of a run, which is given a `Stop`.
+    """Return the result of a run that Ctrl-C or a `Stop` can end.
 
     Raises:
         Interrupted: After Ctrl-C or such a stop, with what the run has computed.

@@ -68,7 +68,7 @@ def prepare(
 
 
 class Prepared:
-    """A scenario that is run many times, also in several threads at once.
+    """Scenario prepared for many runs, also in several threads.
 
     Attributes:
         family: The scenario, and those that other values make of it.
@@ -173,7 +173,7 @@ class Prepared:
         return add_slopes(found, base, numbers, runs, changes)
 
     def _free_bindings(self) -> Bindings:
-        """Return bindings of an earlier run that no other run uses, if there are any."""
+        """Return unused bindings of an earlier run, or new ones."""
         try:
             return self._bindings.pop()
         except IndexError:

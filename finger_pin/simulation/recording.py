@@ -1,4 +1,4 @@
-"""Records of a motion: variables of it, as arrays or as a Dataset that is finite and fits into memory."""
+"""Recording of a motion's variables, as arrays or as a Dataset."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from finger_pin.typing import Array
 
 @dataclass(eq=False)
 class RunArrays:
-    """Variables of a run, as plain arrays.
+    """Variables of a run as plain arrays.
 
     Attributes:
         variables: Dimensions, of which time is the first, values and attributes, by name.

@@ -1,4 +1,4 @@
-"""Run a scenario, check its accuracy and energy account, and return the Dataset."""
+"""Run a scenario, check accuracy and energy balance, and return the Dataset."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def nearby(trajectory: Trajectory, others: Sequence[Setup]) -> list[Trajectory]:
 def add_slopes(
     run: RunArrays, base: RunArrays, values: Sequence[float], moved: Sequence[RunArrays], changes: Array
 ) -> RunArrays:
-    """Put the derivatives of all variables into a run, as `RunArrays.slopes`, and return it.
+    """Add the derivatives of all variables to a run, as `RunArrays.slopes`, and return it.
 
     Args:
         run: The run that is to have them.

@@ -1,4 +1,4 @@
-"""A finger in steps, for loops of one's own: controllers, learning, hardware in the loop."""
+"""Stepwise simulation of a finger, for custom loops: controllers, learning, hardware in the loop."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class Simulator:
         self._log = StepLog(self._stepper)
 
     def reset(self, initial: State | ArrayLike | None = None) -> State:
-        """Begin anew at time zero, with a new record; return the state then.
+        """Reset to time zero with a new record; return the state.
 
         Args:
             initial: The packed state, shape (size,), the state by name, or theta, shape (n,), rad, for rest there; by
@@ -252,7 +252,7 @@ class Simulator:
         return self._compiled.evaluate(self.x, self._tension, self._force)
 
     def clone(self) -> Simulator:
-        """Return an independent simulator in the same condition: both go on bit by bit alike."""
+        """Return an independent copy in the same state; both continue bit for bit alike."""
         twin = object.__new__(type(self))
         twin.__dict__ |= self.__dict__
         twin._compiled, twin._stepper = CompiledFinger(self.finger), self._stepper.copy()

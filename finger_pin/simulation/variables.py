@@ -63,7 +63,6 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         "joint_torque_command": Quantity(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
         "joint_torque": Quantity(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
         "joint_friction": Quantity(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
-        "joint_stiction": _of_state("joint_stiction"),
         "joint_reaction": Quantity(_JOINT, lambda of: of.finger.joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": Quantity(_JOINT, lambda of: of.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
         "fingertip_force": Quantity(tip, _fingertip_force, "N", "force on the fingertip", "6"),
@@ -73,6 +72,8 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         ),
         SHORTFALL: Quantity(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
+    if loop.finger.layout.names_of("joint_stiction"):
+        table["joint_stiction"] = _of_state("joint_stiction")
     table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _measured(loop) | _more(loop)
     for name, each in table.items():
         if frame := _frame(name, each):
@@ -81,7 +82,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _of_state(block: str, single: bool = False) -> Quantity:
-    """Return the variable of a block of the state, of a single number without a dimension of its own."""
+    """Return the variable of a block of the state; without a second dimension if ``single``."""
     of = BLOCKS[block]
 
     def value(motion: SampledTrajectory) -> Array:
