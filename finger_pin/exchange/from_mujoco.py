@@ -20,13 +20,12 @@ from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.exchange.mujoco_actuators import ActuatorReader
 from finger_pin.exchange.mujoco_equalities import read_equalities
-from finger_pin.exchange.mujoco_flags import apply_flags
 from finger_pin.exchange.mujoco_free import FreeBodies
 from finger_pin.exchange.mujoco_names import Names, Table, distinct, entry_name, quaternion
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
 from finger_pin.exchange.mujoco_tendons import STOP, TendonReader
-from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest
+from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest, apply_flags
 from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.typing import Array
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.exchange.mujoco_flags import disabled
 from finger_pin.exchange.mujoco_names import Table, quaternion
-from finger_pin.exchange.mujoco_unsupported import ElementReader
+from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 
 # How deep bodies may be in each other at the start, as contacts have it, m.
 _DEEPEST = 1e-3

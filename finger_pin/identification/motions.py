@@ -21,8 +21,7 @@ from finger_pin.identification.problem import At, NuisanceParameter, own_number
 from finger_pin.identification.recordings import Recording
 from finger_pin.mechanism.coerce import fitted
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.recording import recorded
-from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.recording import RunArrays, recorded
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.sensitivity import changed, nearby
 from finger_pin.simulation.setup import Setup

@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME
+from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME
 from finger_pin.typing import Array
 
 

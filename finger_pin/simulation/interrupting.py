@@ -12,7 +12,7 @@ import xarray as xr
 
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.exceptions import Interrupted
-from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.recording import RunArrays
 
 Found = TypeVar("Found", "xr.Dataset", RunArrays)
 

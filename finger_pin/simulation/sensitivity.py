@@ -16,7 +16,7 @@ import numpy as np
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.recording import RunArrays
 from finger_pin.simulation.setup import Setup
 from finger_pin.typing import Array
 

@@ -15,8 +15,7 @@ from finger_pin.mechanism.rows import LOST, Rows
 from finger_pin.mechanism.state import BLOCKS
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.energy import flows, stores
-from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME, Quantity
-from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory
 from finger_pin.typing import Array
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
