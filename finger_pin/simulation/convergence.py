@@ -176,9 +176,6 @@ def check_convergence(
         )
 
     first = run(scenario) if result is None else result
-    # A run whose account stayed open was repeated already.
-    taken = {name: first.attrs[name] for name in TOLERANCES}
-    tighter = tightened(scenario.updated(simulation=taken), factor)
     with warnings.catch_warnings():
         # The first run has said it.
         warnings.simplefilter("ignore", ScenarioWarning)

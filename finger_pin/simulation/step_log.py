@@ -38,14 +38,14 @@ class StepLog:
 
     def __init__(self, stepper: Stepper) -> None:
         """Create an empty log at the present time of a stepper."""
-        self._stepper, self._moments = stepper, stepper.moments
+        self._stepper, self._moments = stepper, stepper.state_snapshot
         self._numbers = array("d")
 
     @property
     def start(self) -> Stepper:
         """A copy of the stepper as it stood at the start."""
         start = self._stepper.copy()
-        start.resume(self._moments)
+        start.restore(self._moments)
         return start
 
     def add(self, end: float, inputs: Array, force: Array) -> None:

@@ -1,1 +1,1 @@
-"""Detection of contacts within a step: bounds of motion, culling of pairs, and continuous detection."""
+"""Collision detection within steps: bounds of motion, culling of contact pairs, and a search for missed contacts."""

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import KNOWN, distance, path_of, set_asleep, trace, widened
+from finger_pin.core.collision.broad_phase import KNOWN, bound_step_motion, distance, path_of, set_culled, widened
 from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
@@ -24,8 +24,8 @@ from finger_pin.core.tables import END, FIRST, KINK, Tables
 
 # Bernstein coefficients of a coordinate over a step.
 _Coefficients: TypeAlias = tuple[float, float, float, float, float]
-# Of a step in which all touches have been seen, and of one with a contact that slept meanwhile.
-NOTHING, UNSEEN = 2.0, 1.0
+# Of a step in which all touches have been seen, and of one in which a culled pair may have closed.
+NOTHING, MISSED_BY_CULLING = 2.0, 1.0
 # To this distances are computed, m; and bodies that part are followed until they are so far out, or have moved by so
 # many times their distance.
 _ROUNDING, _OUT, _TIMES = 1e-13, 1e-6, 4.0
@@ -62,7 +62,7 @@ def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> 
     endless = np.isinf(paths.extents[e])
     path = turned = moves = bends = turns = swing = curl = 0.0
     for s in range(paths.start[e], paths.start[e + 1]):
-        j, other, lever = paths.at[s], paths.against[s], paths.levers[s]
+        j, other, lever = paths.at[s], paths.opposing_coordinate[s], paths.motion_bounds[s]
         carries = paths.moves[s, 2] > paths.moves[s, 0] and tables.kinds[j] == 0
         if lever == 0.0 and not carries:
             continue
@@ -116,7 +116,7 @@ def _clear(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> b
 
 @njit_inline
 def _look(integration: Integration, model: Model, e: int, share: float, seen: Vector) -> None:
-    """Record a gap and its slopes at a share of the step."""
+    """Store a gap and its slopes at a share of the step."""
     own, state = model.work.paths, model.state
     s, c = share, 1.0 - share
     w0, w1, w2, w3, w4 = c**4, 4.0 * c**3 * s, 6.0 * c * c * s * s, 4.0 * c * s**3, s**4
@@ -185,27 +185,27 @@ def _pressed(tables: Tables, rows: Matrix, k: int) -> bool:
 
 
 @njit_always_inline
-def survey(integration: Integration, model: Model) -> float:
-    """Return the share of a step that was tried after which bodies touch, and part before its end; `NOTHING` for none.
+def detect_missed_contacts(integration: Integration, model: Model) -> float:
+    """Return the share of a tried step after which bodies touch and part again before its end, or `NOTHING`.
 
-    It is `UNSEEN` if a contact slept that is closed at the end, or may be: it is awake now.
+    It is `MISSED_BY_CULLING` if a culled pair is closed at the end, or may be: it is active now.
     """
     tables, own, rows, state = model.tables, model.work.paths, model.work.rows, model.state
     paths, size, first, woken = tables.paths, tables.parents.size, NOTHING, False
-    trace(integration.dense, integration.k, integration.x, state, size, own)
+    bound_step_motion(integration.dense, integration.k, integration.x, state, size, own)
     for e in range(paths.columns.size):
         if paths.columns[e] == 1:
             continue
         k, path = paths.row[e], path_of(tables, e, own)
         own.path[e] = path
-        if own.asleep[k]:
+        if own.culled[k]:
             own.ahead[e] = own.clear[e] - path
             if own.ahead[e] > 0.0:
                 continue
             share = _scan(integration, model, e, True)
             if share < NOTHING or own.ahead[e] < 0.0:
                 # Until it is listed again it exerts nothing, whatever else the step has met.
-                set_asleep(k, 0, own.asleep)
+                set_culled(k, 0, own.culled)
                 woken = True
         else:
             start, end = own.clear[e], own.out[e, 0]
@@ -220,4 +220,4 @@ def survey(integration: Integration, model: Model) -> float:
         first = min(first, share)
     for j in range(size):
         state[j] = own.control[j, 4]
-    return UNSEEN if woken else first
+    return MISSED_BY_CULLING if woken else first

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.chains import ROTATION
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.evaluation.rigid_body import ROTATION
 from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables import Tables
 from finger_pin.description.caching import memoised

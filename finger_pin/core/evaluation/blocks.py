@@ -57,14 +57,14 @@ def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
             for c in range(gain.shape[1]):
                 gain[k, c] = 0.0
     _join(tables, work, blocks)
-    coordinates = rows = touches = states = awake = 0
-    for index in range(work.paths.awake_count[0]):
-        k = paths.row[work.paths.awake[index]]
+    coordinates = rows = touches = states = active = 0
+    for index in range(work.paths.active_pair_count[0]):
+        k = paths.row[work.paths.active_pairs[index]]
         for m in range(1, 3):
-            blocks.awake[awake] = tables.state[k + m]
+            blocks.active_states[active] = tables.state[k + m]
             blocks.loose[tables.state[k + m]] = -work.slopes[at.R_LENGTH + 3 + m, k + m]
-            awake += 1
-    blocks.awake_count[0] = awake
+            active += 1
+    blocks.active_state_count[0] = active
     for b in range(blocks.number[0]):
         for j in range(blocks.atom.size):
             if blocks.label[blocks.atom[j]] == b:

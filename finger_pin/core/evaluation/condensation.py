@@ -209,8 +209,8 @@ def condense(address: int, g: float) -> int:
     """Fill the solution of (g - J) u = r for all r, after `linearise`; return 0 if g - J is singular, else 1."""
     model = unpack(address, MODEL)
     linear, blocks = model.linear, model.linear.blocks
-    for index in range(blocks.awake_count[0]):
-        s = blocks.awake[index]
+    for index in range(blocks.active_state_count[0]):
+        s = blocks.active_states[index]
         linear.loose[s] = 1.0 / (g + blocks.loose[s]) if blocks.loose[s] > 0.0 else 0.0
     for b in range(blocks.number[0]):
         if not _condense_block(model, address, g, b):
@@ -286,8 +286,8 @@ def solve(linear: Linear, r: Vector, u: Vector) -> None:
                 value += row[c] * r[c]
             u[i] = value
         return
-    for index in range(blocks.awake_count[0]):
-        s = blocks.awake[index]
+    for index in range(blocks.active_state_count[0]):
+        s = blocks.active_states[index]
         u[2 * whole + s] = linear.loose[s] * r[2 * whole + s]
     for b in range(blocks.number[0]):
         places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]

@@ -24,14 +24,14 @@ def measure(address: int, _time: float) -> int:
 
 @njit_always_inline
 def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
-    """Evaluate the contacts that are not culled, which come before all other rows, and add to A^T phi."""
+    """Evaluate the contacts, which come before all other rows, but for those culled, and add to A^T phi."""
     rows, paths = work.rows, work.paths
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
         if begin >= tables.touching:
             continue
-        for index in range(paths.awake_count[0]):
-            e = paths.awake[index]
+        for index in range(paths.active_pair_count[0]):
+            e = paths.active_pairs[index]
             k = tables.paths.row[e]
             if not begin <= k < end:
                 continue

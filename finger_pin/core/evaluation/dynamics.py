@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import Work
+from finger_pin.core.buffers import AXIS, Work
 from finger_pin.core.evaluation.inputs import inputs, tip_forces
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE
 from finger_pin.core.evaluation.paths import passes
-from finger_pin.core.evaluation.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
+from finger_pin.core.evaluation.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
@@ -124,8 +124,8 @@ def _drive(tables: Tables, work: Work, rate: Vector) -> None:
     rows, torque = work.rows, work.torque
     for e in range(tables.arm_start[tables.touching], tables.arm_at.size):
         torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
-    for index in range(work.paths.awake_count[0]):
-        k = tables.paths.row[work.paths.awake[index]]
+    for index in range(work.paths.active_pair_count[0]):
+        k = tables.paths.row[work.paths.active_pairs[index]]
         for m in range(k + 1, k + 3):
             rate[tables.state[m]] = rows[RATE, m]
     for i in range(2 * tables.touching // 3, tables.state_row.size):

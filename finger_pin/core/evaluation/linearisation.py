@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import Linear, Work
+from finger_pin.core.buffers import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, Linear, Work
 from finger_pin.core.evaluation.inputs import input_slopes, tip_forces
 from finger_pin.core.evaluation.paths import passes
-from finger_pin.core.evaluation.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
+from finger_pin.core.evaluation.rigid_body import inverse_dynamics
 from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, call_at, call_filling, njit_always_inline, unpack
@@ -110,8 +110,8 @@ def linearise(address: int, time: float) -> int:
         if begin >= tables.touching:
             call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
             continue
-        for index in range(work.paths.awake_count[0]):
-            k = tables.paths.row[work.paths.awake[index]]
+        for index in range(work.paths.active_pair_count[0]):
+            k = tables.paths.row[work.paths.active_pairs[index]]
             if begin <= k < end:
                 call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, k, k + 3)
     for e in range(tables.bend.size):

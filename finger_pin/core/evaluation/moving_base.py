@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from finger_pin.core.buffers import AXIS, AXIS_CURVE, FORCE, MOTION
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.evaluation.rigid_body import AXIS, AXIS_CURVE, FORCE, MOTION, inverse_dynamics
+from finger_pin.core.evaluation.rigid_body import inverse_dynamics
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.evaluation.time_functions import SignalTable, signal_derivative
 from finger_pin.core.jit import CompiledFunction, njit_inline, unpack

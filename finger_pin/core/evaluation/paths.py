@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import Work
+from finger_pin.core.buffers import AXIS, Work
 from finger_pin.core.evaluation.law_code import FORCE, SIDE
-from finger_pin.core.evaluation.rigid_body import AXIS, move
+from finger_pin.core.evaluation.rigid_body import move
 from finger_pin.core.evaluation.spatial import dot
 from finger_pin.core.jit import (
     CompiledFunction,
@@ -145,11 +145,11 @@ def look(address: int, piece: float) -> int:
 
 @njit_always_inline
 def measure_paths(tables: Tables, work: Work) -> None:
-    """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts only those not culled."""
+    """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if active."""
     paths, own, first = tables.paths, work.paths, tables.touching
     closed = 0
-    for index in range(own.awake_count[0]):
-        e = own.awake[index]
+    for index in range(own.active_pair_count[0]):
+        e = own.active_pairs[index]
         _measure(paths, e, work)
         if own.active[e]:
             own.closed[closed] = e

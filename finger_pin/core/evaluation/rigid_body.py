@@ -9,23 +9,23 @@ Inverse dynamics, composite inertias and bias are those of Featherstone, Rigid B
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from finger_pin.core.buffers import (
+    AXIS,
+    AXIS_RATE,
+    CHOLESKY,
+    FORCE,
+    MASS_MATRIX,
+    MOMENTUM,
+    MOTION,
+    SPATIAL_ACCELERATION,
+    Work,
+)
+from finger_pin.core.chains import ARMATURE, CENTRE, INERTIA, MASS, PRISMATIC, ROTATION, TRANSLATION
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
-
-if TYPE_CHECKING:
-    from finger_pin.core.buffers import Work
-    from finger_pin.core.tables import Tables
-
-# Columns of the table of bodies.
-ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, ARMATURE, BODY_COLUMNS = 0, 9, 12, 13, 16, 22, 23
-PRISMATIC = 1
-# Layers of work.spatial, one motion or force vector per body, and of work.square.
-AXIS, AXIS_RATE, AXIS_CURVE, MOTION, SPATIAL_ACCELERATION, FORCE, MOMENTUM, SPATIAL_LAYERS = range(8)
-MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
+from finger_pin.core.tables import Tables
 
 
 @njit_always_inline

@@ -6,8 +6,7 @@ Vector Algebra, IEEE RA-L 7 (2022), in the conventions of `rigid_body`.
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import Work
-from finger_pin.core.evaluation.rigid_body import (
+from finger_pin.core.buffers import (
     AXIS,
     AXIS_CURVE,
     AXIS_RATE,
@@ -17,6 +16,7 @@ from finger_pin.core.evaluation.rigid_body import (
     MOMENTUM,
     MOTION,
     SPATIAL_ACCELERATION,
+    Work,
 )
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline

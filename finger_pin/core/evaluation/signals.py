@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.buffers import Work
-from finger_pin.core.collision.broad_phase import let_sleep, rouse, wake_since
+from finger_pin.core.buffers import MOTION, Work
+from finger_pin.core.chains import ARMATURE
+from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.law_code import FORCE
 from finger_pin.core.evaluation.paths import turn_out
-from finger_pin.core.evaluation.rigid_body import ARMATURE, MOTION, move
+from finger_pin.core.evaluation.rigid_body import move
 from finger_pin.core.jit import (
     CompiledFunction,
     Layers,
@@ -103,8 +104,8 @@ def book(tables: Tables, work: Work, totals: Vector) -> None:
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
         if begin < tables.touching:
-            for index in range(work.paths.awake_count[0]):
-                k = tables.paths.row[work.paths.awake[index]]
+            for index in range(work.paths.active_pair_count[0]):
+                k = tables.paths.row[work.paths.active_pairs[index]]
                 if begin <= k < end:
                     call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, k, k + 3)
                     for i in range(tables.energies.shape[1]):
@@ -211,19 +212,19 @@ def evaluate_many(address: int, _time: float) -> int:
     many = unpack(address, STATES)
     model = unpack(many.model, MODEL)
     tables, work, before = model.tables, model.work, model.rate
-    # Signals have the gaps of all contacts; for powers alone those far apart sleep from state to state.
-    sleepy = tables.touching > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
-    rouse(tables, work)
+    # Signals have the gaps of all contacts; for powers alone those far apart are culled from state to state.
+    culling = tables.touching > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
+    activate_all_pairs(tables, work)
     for m in range(many.states.shape[0]):
         _set(many, model, m)
-        if sleepy and m > 0:
-            wake_since(tables, work, many.attitudes[m - 1], many.attitudes[m], before, model.state)
+        if culling and m > 0:
+            activate_since(tables, work, many.attitudes[m - 1], many.attitudes[m], before, model.state)
         _set_base(many.bases, m, tables, work)
         place_bodies(tables, many.attitudes[m])
         _evaluate(many, model, m)
         _keep(many, model, m)
-        if sleepy:
-            let_sleep(tables, work, model.state, before)
+        if culling:
+            cull_distant(tables, work, model.state, before)
     return 1
 
 

@@ -27,7 +27,7 @@ class Between(NamedTuple):
         start: State then, shape (size,).
         attitude: Quaternions of free bodies then, shape (f, 4).
         ends: Ends of the steps, shape (m,), s.
-        states: States there, before the angles of free bodies begin anew, shape (m, size).
+        states: States there, before the angles of free bodies are reset, shape (m, size).
         attitudes: Quaternions after that, shape (m, f, 4).
         dense: Coefficients of the steps' interpolants, shape (m, rows, size).
         charts: First of the three coordinates that turn each free body, shape (f,).
@@ -95,7 +95,7 @@ def begin_step(b: Any, step: int) -> None:
     for c in range(b.before.size):
         b.before[c] = b.start[c] if step == 0 else b.states[step - 1, c]
     if step > 0:
-        begin_anew(b.charts, b.width, b.before)
+        reset_angles(b.charts, b.width, b.before)
 
 
 @njit_inline
@@ -134,7 +134,7 @@ def interpolant(tableau: Any, k: Any, dense: Any) -> None:
 
 @njit_inline
 def cut(before: Any, after: Any, dense: Any, share: float) -> None:
-    """Let a step end after a share of it: the state at its end and its row of ``dense`` become those of that part."""
+    """Cut a step to a share: replace the state at its end and its row of ``dense`` by those of that part."""
     highest, inverse = share ** (dense.shape[0] + 1), 1.0 / share
     for c in range(before.size):
         bend, last, new, power = 0.0, 0.0, 0.0, highest
@@ -148,8 +148,8 @@ def cut(before: Any, after: Any, dense: Any, share: float) -> None:
 
 
 @njit_always_inline
-def begin_anew(charts: Any, width: int, x: Any) -> None:
-    """Let the angles of free bodies begin anew, as `rechart` does: their rates become the angular velocity."""
+def reset_angles(charts: Any, width: int, x: Any) -> None:
+    """Reset the angles of free bodies to zero, as `rechart` does: their rates become the angular velocity."""
     for f in range(charts.size):
         i = charts[f]
         b, c = x[i + 1], x[i + 2]
