@@ -11,7 +11,7 @@ import numpy as np
 
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, PluginFriction
-from finger_pin.mujoco.selection import RoutedFriction
+from finger_pin.mujoco.name_matching import RoutedFriction
 from finger_pin.typing import Array
 
 # Kinds of joints that have one coordinate.

@@ -12,8 +12,8 @@ import numpy as np
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.exchange.mujoco_friction import COUNT, GROUP, LEAST_LOSS, NAME, NO_INPUT, PLUGIN, PluginFriction
 from finger_pin.mujoco.frictions import add_branches, frictions, pulled
+from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose
 from finger_pin.mujoco.registration import register
-from finger_pin.mujoco.selection import JOINT, TENDON_KEYS, choose
 
 Keys = Mapping[str, Mapping[str, Any]]
 
