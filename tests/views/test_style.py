@@ -120,3 +120,11 @@ def test_figures_are_written_in_the_format_that_was_asked_for(tmp_path):
 
 def test_a_notebook_shows_a_figure_though_it_belongs_to_no_window():
     assert plot_friction_law()._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_png_is_drawn_once_and_the_figure_keeps_its_layout(tmp_path, monkeypatch):
+    figure = plots.plot_energy(synthetic(samples=5))
+    line, engine, drawn = figure.axes[0].lines[0], figure.get_layout_engine(), []
+    monkeypatch.setattr(line, "draw", drawn.append)
+    plots.save_figure(figure, tmp_path / "energy.png")
+    assert len(drawn) == 1 and figure.get_layout_engine() is engine
