@@ -53,7 +53,7 @@ def equilibrium(
     position: Sequence[float] | Array | None = None,
     fingertip_force: Sequence[float] | Array = (0.0, 0.0, 0.0),
 ) -> Equilibrium:
-    """Return the state at rest under given inputs, that which a finger without friction comes to.
+    """Return the frictionless equilibrium under given inputs.
 
     With friction there are many states at rest around it; this is the one in which no bristle is bent: tau = G, and
     the state's derivative is zero with friction and without. It lies where the potential energy falls to from a

@@ -93,7 +93,7 @@ def self_locking_margin(
     steps = np.flatnonzero(np.any(np.diff(directions[order], axis=0) != 0.0, axis=1))
     chosen = order[np.unique(np.concatenate([[0], steps, steps + 1, [samples - 1]]))]
     signs, sliding = directions[chosen, :size], directions[chosen, size:]
-    weights = signs * expand(scenario.finger.joint_friction.stiction, size)
+    weights = signs * expand(scenario.finger.joint_friction.break_away, size)
     gain = expand(scenario.controller.gain, size)
     # Without gain there is no lag that would say what passive tendons carry: they count as planned.
     gears = gear_shares(scenario.finger) if servos else np.ones((2, routing.actuated))

@@ -1,4 +1,4 @@
-"""Passivity of law (9), which micro-damping beyond the viscous friction takes from it."""
+"""Passivity of law (9): the limit of micro-damping beyond which friction can drive motion."""
 
 from __future__ import annotations
 

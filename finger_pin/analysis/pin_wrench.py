@@ -1,4 +1,4 @@
-"""The whole force and moment on the pin of every joint, which (17) approximates.
+"""Full force and moment on the pin of every joint, approximated by (17).
 
 Cut a joint open and free everything that it carries. On it act its weight, the fingertip force F, the tendons that
 cross the cut, each with its tension along its path, and the pin. Newton and Euler give what the pin must exert:

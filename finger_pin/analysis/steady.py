@@ -68,7 +68,7 @@ def steady_state(
 
 
 def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> Array:
-    """Return the motors' currents, A, shape (m, k), that hold the tendons' torque and slide the gears.
+    """Return the motor currents for a tendon torque while the gears slide, A, shape (m, k).
 
     With s the sign of the speed w and T the tendons' torque, tau = T + s level + b w and N = |tau + x T|; the level
     is linear in N, so that either sign of what N is made of gives a level, of which one keeps that sign. Where gears

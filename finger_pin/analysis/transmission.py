@@ -153,7 +153,7 @@ def flexion_postures(finger: FingerLike, samples: int = 41) -> Array:
 
 
 def transmission_in_motion(finger: FingerLike, result: xr.Dataset) -> TransmissionInMotion:
-    """Return the transmission of every tendon along a simulation, beside that of steady sliding.
+    """Return the transmission of every tendon along a simulation and that of steady sliding.
 
     Args:
         finger: The finger that was simulated.

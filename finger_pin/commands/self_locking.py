@@ -53,5 +53,7 @@ def scaled(name: str, scenario: Scenario, factor: float) -> Scenario:
 
     from finger_pin.description.loading import load_scenario
 
-    static = (factor * np.asarray(scenario.finger.joint_friction.stiction)).tolist()
-    return load_scenario(name, {f"finger.joint_friction.{key}": static for key in ("coulomb", "stiction")})
+    friction = scenario.finger.joint_friction
+    static = (factor * np.asarray(friction.break_away)).tolist()
+    keys = ("coulomb",) if friction.law in ("dahl", "coulomb") else ("coulomb", "stiction")
+    return load_scenario(name, {f"finger.joint_friction.{key}": static for key in keys})

@@ -226,7 +226,7 @@ class HandController(LoopController):
         return tuple(signal for each in self.controllers for signal in each.signals())
 
     def stateless(self) -> HandController | None:
-        """Return the controllers that remember nothing, side by side, if there is one of each."""
+        """Return the stateless controllers of all fingers; None if one has a state."""
         own = [each.stateless() for each in self.controllers]
         known = [each for each in own if each is not None]
         return HandController(known, self.routing) if len(known) == len(own) else None

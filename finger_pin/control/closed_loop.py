@@ -91,7 +91,7 @@ class ClosedLoop:
         fingertip_force: Samples | None = None,
         finger: Finger | None = None,
     ) -> ClosedLoop:
-        """Build the loop that a scenario describes, with a controller or reference of one's own if given.
+        """Build the loop of a scenario, with a custom controller or reference if given.
 
         Args:
             scenario: The scenario.

@@ -58,12 +58,12 @@ class Dynamics(Protocol):
     def exerted(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
-        """Return the same, if that is sooner without accelerations."""
+        """Return the same signals; accelerations may be left out."""
 
     def forces(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
-        """Return the same, if that is sooner with no more than forces."""
+        """Return the same signals; all but forces may be left out."""
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -75,7 +75,7 @@ class Dynamics(Protocol):
 
 
 class Loop(Protocol):
-    """A finger under control, as its sensors see it."""
+    """Finger under control, in the view of its sensors."""
 
     @property
     def finger(self) -> Finger:
@@ -182,7 +182,7 @@ class LoopController(ABC):
         return ()
 
     def stateless(self) -> LoopController | None:
-        """Return a controller without memory, which may be asked for the start; None if there is none."""
+        """Return the stateless controller for evaluating the start; None if there is none."""
         return None
 
     @classmethod

@@ -36,7 +36,7 @@ def readings(sensors: Sequence[SampledSensor], now: Instant) -> dict[str, Array]
 
 
 class JointEncoder(SampledSensor):
-    """Encoders of the joints, which read the nearest multiple of a resolution; exact without one."""
+    """Joint encoders with an optional resolution."""
 
     name, units, dimension = "joint_position", "rad", "joint"
 

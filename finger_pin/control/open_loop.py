@@ -85,7 +85,7 @@ class OpenLoopTensions(LoopController):
         )
 
     def as_control(self, reference: LoopReference, finger: Finger) -> InputTable:
-        """Return the schedule as inputs, but for motors in position drive, which pull as their loops say."""
+        """Return the schedule as an input table; motors in position drive follow their loops."""
         schedule, positioned = core_signal(self.signal), finger.actuators.positioned
         schedule.harmonics[positioned] = 0.0
         schedule.coefficients[..., positioned] = 0.0

@@ -38,7 +38,7 @@ class PassiveTensionLoop(LoopController):
     def __init__(
         self, controller: CompensatedController, wish: Array, proportional: float, integral: float, limit: float
     ) -> None:
-        """Begin with no correction."""
+        """Start with zero correction."""
         self.controller = controller
         self.wish = np.asarray(wish, dtype=float)
         self.proportional, self.integral, self.limit = proportional, integral, limit
@@ -46,7 +46,7 @@ class PassiveTensionLoop(LoopController):
         self._sum = np.zeros(len(self.wish))
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
-        """Take measured tensions, shape (t,), N, of which the passive ones count, and the time since the last, s."""
+        """Update from measured tensions, shape (t,), N, and the time since the last sample, s."""
         actuated = self.controller.routing.actuated
         error = self.wish - readings["tendon_tension"][actuated:]
         # Below its own f0 the desired tension has no effect; an integral that went there would take time to come back.

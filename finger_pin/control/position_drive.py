@@ -1,4 +1,4 @@
-"""Motors in position drive: every servo holds the angle of its spool by a sampled loop of its own.
+"""Motors in position drive: a sampled loop per servo holds the angle of its spool.
 
     theta_m^d = (l(q^d) + f^d / K - e0) / r,   U = V clip(k_p e + k_d e' + k_i int e, -1, 1)
 
@@ -47,7 +47,7 @@ class DriveSignals(Protocol):
 
 @dataclass(eq=False)
 class GivenVoltages:
-    """Voltages that a caller sets, as `Simulator.step` does, without planned tensions.
+    """Voltages set by a caller such as `Simulator.step`, without planned tensions.
 
     Attributes:
         channels: The inputs that are voltages, shape (m,).
@@ -105,7 +105,7 @@ class PositionDrives:
         self.compiled = build_drives(finger, goals)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
-        """Return the commands, in which the tensions of the goals replace those that errors ask for."""
+        """Return the commands with the tensions of the goals in place of those of the errors."""
         plan = self._controller.command(time, reference, reference.position, reference.velocity)
         if self._positioned.all():
             return plan

@@ -74,7 +74,7 @@ class ProportionalController(LoopController):
         return ControlSignals(torque, minimal + level * self.internal)
 
     def as_control(self, reference: LoopReference, finger: Finger) -> InputTable | None:
-        """Return it as inputs of a finger's mechanism, whose coordinates begin with the joints.
+        """Return the controller as the input table of a finger's mechanism.
 
         What it plans for tendons that motors in position drive pull is no input.
         """

@@ -50,7 +50,7 @@ class SampledController(LoopController):
         self._acting = 0
 
     def act(self, x: Array) -> Array:
-        """Sample, if it is time to, and return the tensions that act from this instant on, shape (a,)."""
+        """Sample if due, and return the tensions that act from now on, shape (a,)."""
         if self.instant == len(self._samples) * self.period:
             self._samples.append(self._sample(self.instant, x))
         while self._acting + 1 < len(self._samples) and self._arrival(self._acting + 1) <= self.instant:

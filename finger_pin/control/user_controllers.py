@@ -30,7 +30,7 @@ _LEAST = -1e-6
 
 
 class UserReference:
-    """A reference of one's own.
+    """Custom reference.
 
     Attributes:
         reference: Asked for one time, s, at a time.
@@ -84,7 +84,7 @@ class UserReference:
 
 
 class UserController(LoopController):
-    """A controller of one's own.
+    """Custom controller.
 
     It returns `ControlSignals`, or only the tensions: of all tendons, or of the actuated ones.
 

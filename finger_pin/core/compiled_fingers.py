@@ -167,7 +167,7 @@ class Bindings:
         method: str,
         rtol: float,
         atol_scale: float,
-        judged: bool = False,
+        estimate_error: bool = False,
     ) -> Stepper:
         """Return the stepper of a finger under inputs, from a packed state on.
 
@@ -179,9 +179,9 @@ class Bindings:
             method: One of `TABLEAUS`.
             rtol: Relative tolerance.
             atol_scale: Absolute tolerance over the scale of each kind of state.
-            judged: Whether the error will be asked for; of one finger after the other it is always, or never.
+            estimate_error: Whether the error will be asked for; of one finger after the other it is always, or never.
         """
         given = finger.mechanism, control, x, TABLEAUS[method](), rtol, atol_scale * finger.layout.scales(), force
         if self.stepper is None or not self.stepper.renew(*given):
-            self.stepper = Stepper(*given, judged=judged)
+            self.stepper = Stepper(*given, estimate_error=estimate_error)
         return self.stepper

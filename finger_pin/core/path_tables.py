@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains
-from finger_pin.core.collision.motion_bounds import Carrying, levers
+from finger_pin.core.collision.motion_bounds import Carrying, motion_bounds
 from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
@@ -36,9 +36,9 @@ class Paths(NamedTuple):
         start: First index of the coordinates that move a piece, shape (E + 1,).
         at: Coordinates, shape (entries,).
         moves: One where a coordinate moves the first, the second, and the frame's body, shape (entries, 3).
-        levers: Largest displacement of a point of a gap's bodies against the other body by a unit of each, shape
+        motion_bounds: Largest displacement of a point of a gap's bodies against the other body by a unit of each, shape
             (entries,), m; zero where it carries both, or only turns what looks alike.
-        against: A coordinate that moves the other body along the same direction, -1 for none, shape (entries,).
+        opposing_coordinate: Coordinate that moves the other body in the same direction, -1 for none, shape (entries,).
         cores: Extent of the core of a gap's first body from the middle of its two points, shape (E,), m.
         extents: Extent of the core of a gap's second body from its frame's origin, shape (E,), m.
         row: First row that uses each, shape (E,).
@@ -63,8 +63,8 @@ class Paths(NamedTuple):
     start: Annotated[Indices, along("piece", starts="mover")]
     at: Annotated[Indices, along("mover", of="body")]
     moves: Annotated[IndexTable, along("mover", "x")]
-    levers: Annotated[Vector, along("mover")]
-    against: Annotated[Indices, along("mover", of="body")]
+    motion_bounds: Annotated[Vector, along("mover")]
+    opposing_coordinate: Annotated[Indices, along("mover", of="body")]
     cores: Annotated[Vector, along("piece")]
     extents: Annotated[Vector, along("piece")]
     row: Annotated[Indices, along("piece", of="row")]
@@ -88,11 +88,11 @@ class PathWork(NamedTuple):
     Attributes:
         out: Values and slopes of the shapes, shape (E, OUT).
         active: Zero for gaps that are open, shape (E,).
-        awake: Contacts that are not asleep, in order, shape (E,).
-        awake_count: Their number, shape (1,).
+        active_pairs: Contact pairs that are not culled, in order, shape (E,).
+        active_pair_count: Their number, shape (1,).
         closed: Gaps that are not open, in order, shape (E,).
         closed_count: Their number, shape (1,).
-        asleep: One for the rows of a contact that is at rest and too far away to close, shape (K,); kept from step to
+        culled: One for the rows of a contact that is at rest and too far away to close, shape (K,); kept from step to
             step, as the next.
         clear: No more than the gap of every piece where the step began, shape (E,), m.
         ahead: Likewise, where it ends.
@@ -117,11 +117,11 @@ class PathWork(NamedTuple):
 
     out: Matrix
     active: Indices
-    awake: Indices
-    awake_count: Indices
+    active_pairs: Indices
+    active_pair_count: Indices
     closed: Indices
     closed_count: Indices
-    asleep: Indices
+    culled: Indices
     clear: Vector
     ahead: Vector
     path: Vector
@@ -159,7 +159,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in row]) for row in ends]
     carrying = Carrying.of(chains)
-    found = [levers(piece, *each, last, carrying) for piece, each in zip(pieces, entries, strict=True)]
+    found = [motion_bounds(piece, *each, last, carrying) for piece, each in zip(pieces, entries, strict=True)]
     halves = [0.5 * float(np.linalg.norm(row[3:6] - row[:3])) for row in points]
     rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
     carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
@@ -179,8 +179,8 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         start=np.cumsum([0, *(len(at) for at, _ in entries)]),
         at=np.concatenate([np.zeros(0, dtype=np.int64), *(at for at, _ in entries)]),
         moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
-        levers=np.concatenate([np.zeros(0), *(each for each, _ in found)]),
-        against=np.concatenate([np.zeros(0, dtype=np.int64), *(others for _, others in found)]),
+        motion_bounds=np.concatenate([np.zeros(0), *(each for each, _ in found)]),
+        opposing_coordinate=np.concatenate([np.zeros(0, dtype=np.int64), *(others for _, others in found)]),
         cores=np.array([half + piece.breadth for half, piece in zip(halves, pieces, strict=True)]),
         extents=np.array([piece.extent for piece in pieces], dtype=float),
         row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
@@ -222,11 +222,11 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
     return PathWork(
         out=np.zeros((pieces, OUT)),
         active=np.ones(pieces, dtype=np.int64),
-        awake=np.arange(pieces),
-        awake_count=np.array([np.count_nonzero(paths.columns > 1)]),
+        active_pairs=np.arange(pieces),
+        active_pair_count=np.array([np.count_nonzero(paths.columns > 1)]),
         closed=np.zeros(pieces, dtype=np.int64),
         closed_count=np.zeros(1, dtype=np.int64),
-        asleep=np.zeros(count, dtype=np.int64),
+        culled=np.zeros(count, dtype=np.int64),
         clear=np.zeros(pieces),
         ahead=np.zeros(pieces),
         path=np.zeros(pieces),

@@ -1,4 +1,4 @@
-"""Tables of a hand: by joint or tendon, whose names begin with that of their finger and a dot, and by finger."""
+"""Tables of a hand, by joint or tendon with dotted names, or by finger."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A cache of values made of descriptions, which are frozen: the same object makes the same value.
+"""Cache of values that follow from frozen descriptions.
 
 All that is remembered has one bound in bytes; what was made first is forgotten first.
 """
@@ -45,7 +45,7 @@ _KINDS = _Kinds()
 
 
 class _Held(NamedTuple):
-    """A description or a thing made, which counts once, whoever holds it: how many do, its bytes, what it holds."""
+    """Shared object in the account: number of holders, bytes, and the objects it holds."""
 
     thing: object
     holders: int
@@ -109,7 +109,7 @@ class _Account:
             self._release(each)
 
     def _extent(self, things: Sequence[Any], first: bool = False) -> tuple[int, list[object]]:
-        """Return the bytes that can be reached from things, and what is met that is held by itself.
+        """Return the bytes reachable from objects, and the shared objects among them.
 
         Args:
             things: The things.
@@ -154,12 +154,12 @@ class _Memory(Generic[_Made]):
     asked, latest = 0, 0
 
     def __init__(self, most: int) -> None:
-        """Remember nothing yet, and never more than so many."""
+        """Create an empty memory with a maximum number of entries."""
         self._most = most
         self._known: dict[_Key, tuple[tuple[object, ...], _Made]] = {}
 
     def of(self, parts: tuple[object, ...], make: Callable[[], _Made]) -> _Made:
-        """Return the thing made of parts; anew only if it was not made of the same before, or long ago."""
+        """Return the value for these parts, computed if it is not remembered."""
         key = tuple([id(part) if _KINDS[type(part)] == _DESCRIPTION else part for part in parts])
         found = self._known.get(key)
         if found is None:

@@ -1,4 +1,4 @@
-"""What has no effect in a kind of model is refused: the table of what a key needs in order to act.
+"""Refusal of keys without effect: a table of the conditions under which keys act.
 
 Judged are values that a table gives and that differ from the default, so that a description written out in full can be
 read again. What is at a limit where it does nothing, such as a stiffness of zero, is no mistake: sweeps pass there.
@@ -13,7 +13,7 @@ from finger_pin.description.validation import Description, problem
 
 
 class Rule(NamedTuple):
-    """What entries of a table need.
+    """Condition under which entries of a table act.
 
     Attributes:
         table: Dotted name of the table, in which a star stands for every name; empty for the description itself.
@@ -47,6 +47,24 @@ OF_FINGER = (
         (),
         lambda finger, _: finger.tree is None or any(each.bearing for each in finger.tree.joints.values()),
         "has no effect without a joint that has a bearing",
+    ),
+    Rule(
+        "joint_friction",
+        ("stiction", "stribeck_velocity", "stribeck_exponent", "micro_damping"),
+        lambda _, friction: friction.law not in ("dahl", "coulomb"),
+        'has no effect with law = "dahl" or "coulomb"',
+    ),
+    Rule(
+        "joint_friction",
+        ("stiffness", "floor"),
+        lambda _, friction: friction.law != "coulomb",
+        'has no effect with law = "coulomb"',
+    ),
+    Rule(
+        "joint_friction",
+        ("reversal_speed",),
+        lambda _, friction: friction.law not in ("lugre", "dahl"),
+        'is for law = "coulomb", or one of your own',
     ),
     Rule(
         "stroke_limiter",

@@ -172,7 +172,7 @@ class PlacedFinger(Description):
 
 
 class HandSettings(Description):
-    """A palm and the fingers on it, the table ``[hand]``. `joined` describes them all together, as one finger.
+    """Palm with its fingers, the table ``[hand]``; `joined` describes all of them as one finger.
 
     Its gravity, in the world's frame, replaces that of the fingers; a palm at rest has that frame.
     """

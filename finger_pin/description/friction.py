@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+import re
+from typing import Annotated, Any, Self
 
-from pydantic import model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from finger_pin.description.validation import Description, Numbers, problem, quantity, reals
+from finger_pin.description.validation import Description, Numbers, problem, quantity, reals, suggestion
 from finger_pin.exceptions import toml_like
+
+#: Laws of the joints' friction by name.
+JOINT_LAWS = ("lugre", "dahl", "coulomb")
 
 
 class TendonFrictionSettings(Description):
@@ -42,9 +46,22 @@ class TendonFrictionSettings(Description):
     )
 
 
-class JointFrictionSettings(Description):
-    """Law (9) for joints: one number for all, or one per joint."""
+def _law(value: Any) -> Any:
+    """Return the name of a law of joint friction, or that of the user's and its module."""
+    if value in JOINT_LAWS or (isinstance(value, str) and re.fullmatch(r"[\w.]+:\w+", value)):
+        return value
+    raise problem("", f'must be one of {", ".join(JOINT_LAWS)} or "module:NAME"{suggestion(value, JOINT_LAWS)}', value)
 
+
+class JointFrictionSettings(Description):
+    """Friction of the joints, law (9) by default: one number for all, or one per joint."""
+
+    law: Annotated[str, BeforeValidator(_law)] = Field(
+        "lugre",
+        strict=True,
+        description='"lugre": (9). "dahl": no Stribeck curve. "coulomb": M^d R tanh(v / v_r) + b v, cannot stick. '
+        '"module:NAME": a `Law` of your own, in a Python module that can be imported.',
+    )
     coulomb: Annotated[Numbers, reals(0.0, 0.1, hint=" m (is it in millimetres?)")] = quantity(
         2.5e-4, unit="m", source="estimate", doc="M^d, Coulomb coefficient times pin radius."
     )
@@ -70,8 +87,19 @@ class JointFrictionSettings(Description):
         0.0, unit="N m s/rad", source="(9c)", doc="sigma_1, damping of the bristles: none in the paper."
     )
 
+    reversal_speed: Annotated[Numbers, reals(0.0, 1e4, above=True)] = quantity(
+        0.01, unit="rad/s", source="chosen", doc='v_r of law = "coulomb", over which friction turns round.'
+    )
+
+    @property
+    def break_away(self) -> Numbers:
+        """The coefficient at which a joint lets go, m: M^c, or M^d of a law without Stribeck's curve."""
+        return self.coulomb if self.law in ("dahl", "coulomb") else self.stiction
+
     @model_validator(mode="after")
     def _stiction_above_coulomb(self) -> Self:
+        if self.law in ("dahl", "coulomb"):
+            return self
         both = isinstance(self.coulomb, tuple) and isinstance(self.stiction, tuple)
         if both and len(self.coulomb) != len(self.stiction):  # type: ignore[arg-type]
             return self

@@ -195,7 +195,7 @@ def _scenario(table: Table, folder: Path, name: str, overrides: Table) -> Scenar
 
 
 def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> Scenario:
-    """Return the scenario that a table describes, as `load_scenario` returns that of a file.
+    """Return the scenario of a table, as `load_scenario` does for a file.
 
     Raises:
         InputError: Naming the entry that is wrong.

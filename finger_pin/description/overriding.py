@@ -68,7 +68,7 @@ def _expand_wildcards(overrides: Table, table: Table) -> Table:
 
 
 def _each(key: str, table: Table) -> list[str]:
-    """Return the keys that a key stands for, in which a star stands for every name."""
+    """Return the keys matched by a key with stars."""
     head, star, tail = key.partition("*")
     if not star:
         return [key]
@@ -81,7 +81,7 @@ def _each(key: str, table: Table) -> list[str]:
 
 
 def refuse_other(key: str, *, hand: bool, finger: bool) -> None:
-    """Raise for a key of a finger beside a hand, or the other way round."""
+    """Refuse a key of a finger in a hand's scenario, and a key of a hand in a finger's."""
     if key.startswith("finger.") and hand:
         raise InputError(key, "there is a hand; keys of its fingers begin with hand.fingers.NAME.finger")
     if key.startswith("hand.") and finger:

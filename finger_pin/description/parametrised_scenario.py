@@ -186,7 +186,7 @@ def _at(table: Table, path: Sequence[str]) -> Table:
 
 
 def _copied(table: Table) -> Table:
-    """Return a copy of tables of tables, whose entries are shared."""
+    """Return a copy of nested tables with shared entries."""
     return {key: _copied(each) if isinstance(each, dict) else each for key, each in table.items()}
 
 

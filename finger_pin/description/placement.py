@@ -25,6 +25,7 @@ from finger_pin.description.validation import (
     suggestion,
     vector,
 )
+from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
 _MILLIMETRES = " m (is it in millimetres?)"
@@ -103,7 +104,7 @@ def actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
 
 
 def joined_table(parts: Mapping[str, Any], group: str, table: type[_Table]) -> _Table:
-    """Return a table of all fingers, whose entries are lists of numbers in the order of the whole."""
+    """Return one table for all fingers, with lists of numbers in the order of the hand."""
     tables: list[_Table] = [getattr(part, group) for part in parts.values()]
     joined: _Table = _joined(table, tables, [_kinds(part, group) for part in parts.values()])
     return joined
@@ -124,12 +125,26 @@ def _kinds(part: Any, group: str) -> tuple[str, ...]:
 def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dict[str, Any]:
     of_all = [kind for each in kinds for kind in each]
     order = sorted(range(len(of_all)), key=of_all.__getitem__)
-    found = {}
+    found: dict[str, Any] = {}
     for entry in type(tables[0]).model_fields:
+        if entry == "law":
+            found[entry] = _one([table.law for table in tables])  # type: ignore[attr-defined]
+            continue
         pairs = zip(tables, kinds, strict=True)
         numbers = [number for table, own in pairs for number in _each(getattr(table, entry), len(own))]
         found[entry] = tuple([numbers[place] for place in order])
     return found
+
+
+def _one(laws: Sequence[str]) -> str:
+    """Return the law of all fingers.
+
+    Raises:
+        InputError: If they have several.
+    """
+    if len({*laws}) > 1:
+        raise InputError("hand.fingers", f"must have one joint_friction.law, not {', '.join(dict.fromkeys(laws))}")
+    return laws[0]
 
 
 def _each(value: Numbers, size: int) -> Sequence[float]:

@@ -176,7 +176,7 @@ def resolve_hand(hand: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
 
 
 def _on_top(base: Table, hand: Table, folder: Path) -> Table:
-    """Return the table of a hand with another on top, whose fingers may be other ones altogether.
+    """Return the table of a hand merged with another on top.
 
     What is the name or path of a finger, and no table, is that finger where its place is the base's.
     """
@@ -202,7 +202,7 @@ def _named(owner: str) -> Iterator[None]:
 
 
 def resolve_signals(table: Table, folder: Path) -> None:
-    """Replace CSV files by their columns, as samples of signals by name."""
+    """Replace CSV files by signals sampled in their columns."""
     for section, key, target, unit in _SIGNAL_FILES:
         settings = table.get(section)
         if isinstance(settings, dict) and key in settings:

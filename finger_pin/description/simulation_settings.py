@@ -21,7 +21,7 @@ from finger_pin.description.validation import (
 
 # The textbook path keeps to NumPy and Pinocchio; the others evaluate the compiled model.
 METHODS_IN_NUMPY = ("Radau", "BDF", "LSODA")
-METHODS = ("Rodas5P", "Rodas4", *METHODS_IN_NUMPY, "CVODE")
+METHODS = ("Rodas5P", "Rodas4", *METHODS_IN_NUMPY)
 MOST_SAMPLES = 5_000_000
 LEAST_RTOL, LEAST_ATOL_SCALE = 1e-12, 1e-15
 

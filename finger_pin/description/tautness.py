@@ -1,4 +1,4 @@
-"""Tautness of fingers without force closure, whose tendons springs at the joints keep taut."""
+"""Tautness of fingers without force closure: joint springs keep the tendons taut."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Tautness:
 
     @classmethod
     def of(cls, finger: FingerDescription, routing: Routing, coupling: PassiveCoupling, minimum: Array) -> Tautness:
-        """Solve the programmes of all corners; for a finger without force closure, whose spare tension is finite."""
+        """Solve the programmes of all corners of a finger without force closure."""
         # Importing it takes a while, which only who needs it shall wait for.
         from scipy.optimize import linprog
 

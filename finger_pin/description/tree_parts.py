@@ -160,7 +160,11 @@ class TreeTendon(Description):
 
 
 class Coupling(Description):
-    """A joint that follows another: q = offset + ratio q_other + powers[0] q_other^2 + ..., held by a stiff spring."""
+    """A joint that follows another: q = offset + ratio q_other + powers[0] q_other^2 + ..., held by a stiff spring.
+
+    Two hinges in a row whose surfaces roll on each other, a rolling joint, have r q = r_other q_other: the arcs on both
+    surfaces are equally long. The body between them is then as long as the radii together.
+    """
 
     joint: Name = Field(description="The joint that follows.")
     other: Name | None = Field(None, description="The joint that it follows; none: it is held.")
@@ -169,8 +173,16 @@ class Coupling(Description):
     powers: Annotated[Numbers, reals(-1e6, 1e6)] = quantity(
         0.0, unit="1", source="design", doc="Coefficients of the square of q_other and of higher powers, at most six."
     )
+    rolling: Annotated[tuple[float, float], vector(2, 1e-6, 10.0)] | None = quantity(
+        None, unit="m", source="design", doc="Radii of surfaces that roll, of this joint and the other."
+    )
     stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(100.0, unit="N m/rad", source="estimate", doc="k.")
     damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.1, unit="N m s/rad", source="estimate", doc="c.")
+
+    @property
+    def slope(self) -> float:
+        """The ratio, also of rolling surfaces."""
+        return self.rolling[1] / self.rolling[0] if self.rolling else self.ratio
 
     @property
     def higher(self) -> tuple[float, ...]:
@@ -181,8 +193,10 @@ class Coupling(Description):
     def _consistent(self) -> Self:
         if len(self.higher) > MOST_POWER - 1:
             raise problem("powers", f"must be at most {MOST_POWER - 1} numbers", list(self.higher))
-        if self.other is None and (self.ratio or any(self.higher)):
-            raise problem("other", "is missing: ratio and powers are those of another joint")
+        if self.other is None and (self.slope or any(self.higher)):
+            raise problem("other", "is missing: ratio, powers and rolling are those of another joint")
+        if self.rolling and (self.ratio or any(self.higher)):
+            raise problem("rolling", "is the ratio: leave out ratio and powers", list(self.rolling))
         return self
 
 

@@ -169,7 +169,7 @@ def finite_vector(name: str, value: Sequence[float] | NDArray[np.float64], size:
 
 
 def all_finite(values: NDArray[np.float64]) -> bool:
-    """Return whether all numbers of an array are finite; of few numbers sooner than NumPy says it."""
+    """Return whether all numbers of an array are finite; plain Python is faster for a few."""
     # The sum of their squares tells in most cases.
     return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
@@ -276,7 +276,7 @@ def _document(model: type[BaseModel], location: list[str]) -> str:
 
 
 def checker(low: float, high: float, above: bool, hint: str, whole: bool = False) -> Callable[[Any, str], float]:
-    """Return a function from a value and its place in a list, as ``[2]``, to one number of `reals`."""
+    """Return a function that checks one number of `reals`, given its place in a list."""
 
     def check(value: Any, where: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):

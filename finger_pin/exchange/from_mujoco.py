@@ -20,13 +20,12 @@ from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.exchange.mujoco_actuators import ActuatorReader
 from finger_pin.exchange.mujoco_equalities import read_equalities
-from finger_pin.exchange.mujoco_flags import apply_flags
 from finger_pin.exchange.mujoco_free import FreeBodies
 from finger_pin.exchange.mujoco_names import Names, Table, distinct, entry_name, quaternion
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
 from finger_pin.exchange.mujoco_tendons import STOP, TendonReader
-from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest
+from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest, apply_flags
 from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.typing import Array
 
@@ -178,7 +177,7 @@ class _Reader:
         return dict(zip(distinct("keyframe", [model.key(k).name for k in range(model.nkey)]), found, strict=True))
 
     def _bodies(self) -> list[int]:
-        """Return the bodies that move, that tendons pass or that carry these, parents first."""
+        """Return the bodies that move, are passed by tendons, or carry such bodies, parents first."""
         model = self.model
         # What lies around does not carry a tip.
         needed = self._passed() | {self._tip_body()[0]} | self.shapes.still()

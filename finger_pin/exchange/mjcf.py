@@ -200,7 +200,7 @@ def _add_links(
 
 
 def _add_masses(world: ET.Element, description: FingerDescription, tendons: Tendons) -> None:
-    """Add a slide for every lumped mass, across gravity, which must not act on it (13)."""
+    """Add a slide perpendicular to gravity for every lumped mass (13)."""
     gravity = np.array(description.gravity)
     helper = np.eye(3)[np.argmin(np.abs(gravity))]
     axis = np.cross(gravity, helper) if np.any(gravity) else helper

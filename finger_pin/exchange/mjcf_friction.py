@@ -1,4 +1,4 @@
-"""Friction of a finger in its MJCF, which `finger_pin.mujoco` computes while MuJoCo steps."""
+"""Friction of a finger in its MJCF, computed by `finger_pin.mujoco` in MuJoCo's step."""
 
 from __future__ import annotations
 

@@ -7,9 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from finger_pin.description.tree import LARGEST_RADIUS
-from finger_pin.exchange.mujoco_flags import is_disabled
 from finger_pin.exchange.mujoco_names import Table, distinct
-from finger_pin.exchange.mujoco_unsupported import ElementReader
+from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
 from finger_pin.typing import Array
 
 # What forces are at most, N.
@@ -29,7 +28,7 @@ class ActuatorReader(ElementReader):
 
     @cached_property
     def laws(self) -> dict[int, Table]:
-        """The laws of the actuators that can be carried over, as entries of a description; the others are listed."""
+        """Supported actuator laws as entries of a description; unsupported ones are listed."""
         found = {}
         for i in range(getattr(self.model, "nactuator", self.model.nu)):
             why = is_disabled(self.mujoco, self.model, i) or self._foreign(i)
@@ -115,7 +114,7 @@ class ActuatorReader(ElementReader):
         return "tendon" if of_tendon else "joint", int(self.model.actuator_trnid[i, 0])
 
     def _route(self, tendon: int) -> Table:
-        """Return the path of a tendon, or the joints that it crosses, which all bend it."""
+        """Return the path of a tendon, or the joints that it crosses and that bend it."""
         around = self._around(tendon)
         if not around:
             return {"along": self.names.tendons[tendon]}
@@ -174,7 +173,7 @@ class ActuatorReader(ElementReader):
         return "it has dynamics of its own"
 
     def _plugin(self, i: int) -> Table | str:
-        """Return the law of MuJoCo's PID plugin, whose derivative is that of the length alone."""
+        """Return the law of MuJoCo's PID plugin, with the derivative of the length alone."""
         model, instance = self.model, int(self.model.actuator_plugin[i])
         first = int(model.plugin_attradr[instance])
         given = bytes(model.plugin_attr)[first:].split(b"\0")[: len(_PID)]

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.exchange.mujoco_flags import disabled
 from finger_pin.exchange.mujoco_names import Table, quaternion
-from finger_pin.exchange.mujoco_unsupported import ElementReader
+from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 
 # How deep bodies may be in each other at the start, as contacts have it, m.
 _DEEPEST = 1e-3
@@ -99,7 +98,7 @@ class Shapes:
         return {int(carriers[i]) for i in self._colliding if self._solid(i) and not weld[carriers[i]]} - {0}
 
     def objects(self, loose: list[int]) -> Table:
-        """Return planes that something may touch, and free bodies where runs start, as objects."""
+        """Return planes that may be touched, and free bodies at the start of runs, as objects."""
         model, data, found = self.model, self._started(), {}
         shapes = [i for i in self._colliding if self._solid(i) and int(model.geom_bodyid[i]) not in loose]
         taken = {*self.names.joints, *(self.names.geoms[i] for i in shapes)}
@@ -122,7 +121,7 @@ class Shapes:
         return found
 
     def _dropped(self, i: int) -> bool:
-        """Return whether an object overlaps something where runs start, which is listed then."""
+        """Return whether an object overlaps a body at the start of runs, and list it if so."""
         met = sorted({self._name(k) for pair in self._overlapping if i in pair for k in pair - {i}})
         if met:
             self.rest.add(f"geom {self._name(i)}: it overlaps {', '.join(met)} where runs start")

@@ -27,7 +27,7 @@ NAME = "identification.json"
 
 
 def digest(scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording], more: tuple[Any, ...]) -> str:
-    """Return the digest that tells one identification from another: scenario, table, data, options, version."""
+    """Return the digest of an identification: scenario, table, data, options, version."""
     text = [__version__, scenario.model_dump_json(), settings.model_dump_json(), repr(more)]
     found = hashlib.sha256("\0".join(text).encode())
     for recording in taken:

@@ -55,7 +55,7 @@ class LawComparison:
 
 
 def compare_laws(problem: Problem, settings: IdentifySettings, found: Fit) -> LawComparison:
-    """Return the scenario's own law beside others.
+    """Return the scenario's law and the alternatives.
 
     Args:
         problem: Under the own law.

@@ -222,7 +222,7 @@ def _counted(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[
 
 
 def best_of(problem: Problem, fits: Sequence[Fit]) -> Fit:
-    """Return the minimum at which the recordings are met best, all samples counted alike."""
+    """Return the minimum of least misfit with equal weights."""
     alike = np.ones(len(problem.signals))
     return min(fits, key=lambda each: minus_twice_likelihood(each.residuals, alike, problem.groups))
 

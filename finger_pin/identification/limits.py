@@ -1,4 +1,4 @@
-"""What the numbers of a scenario allow each other within bounds, such as a stiction that is not below Coulomb's."""
+"""Limits that parameters set each other within bounds, such as stiction not below Coulomb's."""
 
 from __future__ import annotations
 

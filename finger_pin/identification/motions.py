@@ -21,8 +21,7 @@ from finger_pin.identification.problem import At, NuisanceParameter, own_number
 from finger_pin.identification.recordings import Recording
 from finger_pin.mechanism.coerce import fitted
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.recording import recorded
-from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.recording import RunArrays, recorded
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.sensitivity import changed, nearby
 from finger_pin.simulation.setup import Setup
@@ -49,7 +48,7 @@ _WILD, _COARSE = 30.0, 1e-3
 
 
 class RecordedMotion:
-    """A motion, or a window of one, beside a scenario.
+    """Recorded motion, or a window of one, compared with a scenario.
 
     Attributes:
         recording: The recording.
@@ -95,7 +94,7 @@ class RecordedMotion:
         return computed
 
     def tune(self, factor: float) -> None:
-        """Integrate from now on with so much larger tolerances than the scenario asks for."""
+        """Multiply the scenario's tolerances by a factor from now on."""
         self._factor = factor
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
@@ -273,7 +272,7 @@ class RecordedMotion:
 
 
 def _tuned(scenario: Scenario, factor: float) -> Scenario:
-    """Return a scenario with so much larger tolerances."""
+    """Return a scenario with tolerances multiplied by a factor."""
     own = scenario.simulation
     rtol, atol = (
         min(max(factor * each, min(each, _FINEST)), max(each, _ROUGHEST)) for each in (own.rtol, own.atol_scale)

@@ -43,7 +43,7 @@ class FitPipeline:
     """The work of an identification, piece by piece; pieces that are finished when it is stopped count."""
 
     def __init__(self, problem: Problem, ledger: Checkpoint, loss: str, progress: Progress | None) -> None:
-        """Begin; nothing is done yet."""
+        """Create a pipeline without finished work."""
         self.problem, self.ledger, self.loss = problem, ledger, loss
         self.tell = progress or (lambda words, done, total: None)
         self.fits: list[Fit] = []
@@ -119,7 +119,7 @@ class FitPipeline:
         return [found[k].z for k in near], [found[k].z for k in met if k not in near]
 
     def _cross(self) -> None:
-        """Go on from the best place to a deeper valley beside it, as long as there is one."""
+        """Move to deeper neighbouring minima as long as there are any."""
         words = "looking beside the best place"
         for turn in itertools.count():
             best, number = self.best, self.fits.index(self.best)
@@ -146,7 +146,7 @@ class FitPipeline:
         return any(signal.ordered for signal in self.problem.signals)
 
     def profile_all(self, place: Fit, turn: int = 0) -> None:
-        """Follow all profiles from near a place; from a lower minimum, if one turns up on the way, all over again."""
+        """Compute all profiles; restart from a lower minimum if one is found."""
         fine, number = self.problem.fine(), self.fits.index(self.best)
         best = self.fits[number] = self.middle = fit(fine, place.z, loss=self.loss, slopes=place.slopes)
         self.spread = covariance(fine, best)
@@ -171,7 +171,7 @@ class FitPipeline:
     def _side_by_side(
         self, words: str, task: Callable[[tuple[int, Problem]], _Found], count: int, problem: Problem | None = None
     ) -> list[_Found]:
-        """Do a task by number, each with a problem of its own; tasks with runs in threads."""
+        """Run numbered tasks, each with its own copy of the problem, in threads where they simulate."""
         twins, finished = [(problem or self.problem).alone() for _ in range(count)], itertools.count(1)
         self.tell(words, 0, count)
 
@@ -205,7 +205,7 @@ def starting_points(problem: Problem, count: int, seed: int) -> list[Array]:
 
 
 def _met(problem: Problem, residuals: Sequence[Array]) -> float:
-    """Return minus twice the likelihood, all samples counted alike; infinite if a motion fails."""
+    """Return minus twice the log-likelihood with equal weights; infinite if a motion fails."""
     there = all(np.isfinite(each).all() for each in residuals)
     return minus_twice_likelihood(residuals, np.ones(len(residuals)), problem.groups) if there else np.inf
 
@@ -250,7 +250,7 @@ def beside(problem: Problem, z: Array) -> list[Array]:
 
 
 def lowest(lines: Sequence[Array], met: Sequence[float], count: int) -> list[Array]:
-    """Return the places of lines, lowest first, from which it rises to either side: at their ends, to one.
+    """Return the local minima along lines, lowest first; an end counts if it rises inwards.
 
     Args:
         lines: Places, shape (k, p) each.

@@ -26,7 +26,7 @@ OF_OUTPUTS = ("offset", "scale", "delay")
 
 @dataclass(frozen=True)
 class NuisanceParameter:
-    """A number of a recording's own that is found beside the parameters, such as the start of a joint."""
+    """Nuisance parameter of one recording, such as its initial angle."""
 
     key: str
     low: float
@@ -39,7 +39,7 @@ At = Callable[[Array], tuple[Scenario, dict[str, float]]]
 
 
 class RecordingModel(Protocol):
-    """A recording, or a part of it, beside a scenario."""
+    """Recording, or a part of one, compared with a scenario."""
 
     @property
     def scenario(self) -> Scenario:
@@ -283,7 +283,7 @@ class Problem:
 
 
 def _means(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
-    """Return means of so many samples in a row."""
+    """Return means of consecutive samples."""
     pairs = zip(values, counts, strict=True)
     return [e[: len(e) // n * n].reshape(-1, n, *e.shape[1:]).mean(axis=1) for e, n in pairs]
 

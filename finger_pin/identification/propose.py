@@ -13,7 +13,7 @@ from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.prepared import prepare
-from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.recording import RunArrays
 from finger_pin.typing import Array
 
 

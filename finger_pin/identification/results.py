@@ -168,7 +168,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
 
 
 def _replicates(signal: RecordedSignal) -> float:
-    """Return the rms by which readings of the same inputs differ from their mean, which no law can explain."""
+    """Return the scatter of repeated readings about their mean, rms."""
     groups = signal.alike
     if signal.ordered or groups.max() + 1 == len(groups):
         return math.nan

@@ -19,7 +19,7 @@ _OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current")
 
 
 class SteadyReadings:
-    """A recording of steady states beside a scenario.
+    """Recording of steady states compared with a scenario.
 
     Attributes:
         recording: The recording.

@@ -85,7 +85,7 @@ class Action(LoopController):
         return self._drives
 
     def reset(self, delay: float) -> None:
-        """Begin an episode, whose actions arrive after a delay, s."""
+        """Reset for an episode with an action delay, s."""
         self._delay, self.given = delay, self.low.copy()
         self.held = np.zeros(self._finger.mechanism.channels)
         self._begins: list[float] = []
@@ -96,7 +96,7 @@ class Action(LoopController):
                 memory[:] = 0
 
     def take(self, action: Array, time: float) -> None:
-        """Take an action at a time, s; the first one acts at once."""
+        """Apply an action at a time, s; the first one has no delay."""
         self.given = action
         arrival = time + self._delay if self._begins or self._waiting else time
         self._waiting.append((arrival, self._goals(action)))

@@ -1,4 +1,4 @@
-"""Distributions of numbers that are drawn anew at every reset: of a scenario, of its sensors, of its action."""
+"""Distributions of parameters sampled at every reset: of scenario, sensors and action."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Distribution(Protocol):
 
 @dataclass(frozen=True)
 class Uniform:
-    """Numbers between ``low`` and ``high``, all alike."""
+    """Uniform distribution between ``low`` and ``high``."""
 
     low: float
     high: float
@@ -37,7 +37,7 @@ class Uniform:
 
 @dataclass(frozen=True)
 class LogUniform:
-    """Positive numbers between ``low`` and ``high``, whose logarithms are all alike."""
+    """Log-uniform distribution between positive ``low`` and ``high``."""
 
     low: float
     high: float
@@ -79,7 +79,7 @@ class Normal:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some values, numbers or names, all alike."""
+    """Uniform choice among values, numbers or names."""
 
     values: Sequence[Any]
 

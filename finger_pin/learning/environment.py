@@ -86,7 +86,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Begin an episode with numbers, start and goal drawn anew; the same seed draws the same."""
+        """Reset with sampled parameters, start and goal; the seed determines them."""
         super().reset(seed=seed)
         self._begun = True
         self._worlds.reset((0,), [self.np_random])

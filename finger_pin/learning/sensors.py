@@ -48,10 +48,10 @@ class Sensor:
 
 
 class Measurement:
-    """The sensors of one variable in w worlds, each with numbers of its own."""
+    """Sensors of one variable in w worlds."""
 
     def __init__(self, worlds: int, periods: int) -> None:
-        """Begin with perfect sensors, whose samples are some control periods old."""
+        """Create perfect sensors with a delay in control periods."""
         self._noise, self._quantisation, self._offset = np.zeros((3, worlds))
         self._perfect = True
         self._periods, self._kept = periods, np.zeros((periods + 1, worlds))
@@ -59,7 +59,7 @@ class Measurement:
         self._count = np.zeros(worlds, dtype=np.int64)
 
     def reset(self, world: int, sensor: Sensor) -> None:
-        """Begin an episode of a world with a sensor, and no samples."""
+        """Reset the sensor of a world, without samples."""
         numbers = sensor.noise, sensor.quantisation, sensor.offset
         self._noise[world], self._quantisation[world], self._offset[world] = numbers
         self._perfect = not (self._noise.any() or self._quantisation.any() or self._offset.any())

@@ -18,8 +18,7 @@ from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
-from finger_pin.simulation.quantity import Quantity
-from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory
 from finger_pin.simulation.variables import RESIDUAL, variables
 from finger_pin.typing import Array
 
@@ -67,7 +66,7 @@ def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
 
 @dataclass(frozen=True, eq=False)
 class BatchedLoop(ClosedLoop):
-    """Loops of worlds as one, each world at a time of its own.
+    """Batched loop of worlds, each at its own time.
 
     Attributes:
         loops: Of the worlds.
@@ -138,7 +137,7 @@ class BatchedLoop(ClosedLoop):
 
 
 class _PalmSignals:
-    """Paths of palms, each at a time of its own."""
+    """Batched palm paths, each at its own time."""
 
     def __init__(self, loops: Sequence[ClosedLoop]) -> None:
         self._loops = loops

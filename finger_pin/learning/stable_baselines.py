@@ -1,4 +1,4 @@
-"""Worlds for stable-baselines3, which has a kind of vector environment of its own."""
+"""Vector environment of stable-baselines3."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from finger_pin.learning.vector_environment import VectorEnvironment
 
 
 class StableBaselinesEnvironment(VecEnv):
-    """A `VectorEnvironment` as stable-baselines3 takes it: actions from -1 to 1; episodes begin anew at once."""
+    """`VectorEnvironment` as stable-baselines3 takes it: actions from -1 to 1, automatic resets."""
 
     def __init__(self, worlds: VectorEnvironment) -> None:
         """Take worlds."""

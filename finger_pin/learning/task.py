@@ -148,7 +148,7 @@ class Task:
 
 
 def per_world(function: Callable[[Signals], Any]) -> Function:
-    """Return a function for all worlds at once that calls one for each, with that world's signals alone.
+    """Return a batched function from a function of one world's signals.
 
     A function of arrays with the worlds in front takes no longer for a hundred worlds than for one; this is for those
     that cannot be written so.

@@ -76,7 +76,7 @@ def missing_force(signals: Signals) -> Array:
 
 
 def from_grip(signals: Signals) -> Array:
-    """Return the way from the middle of the fingertips to the ball, as the palm sees it, shape (worlds, 3), m."""
+    """Return the vector from the middle of the fingertips to the ball, palm frame, shape (worlds, 3), m."""
     middle = signals["fingertip_position"].mean(axis=-2)
     return np.asarray(signals["object_position"][..., 0, :] - middle)
 

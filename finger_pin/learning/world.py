@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, sampled_control
 from finger_pin.core.compiled_fingers import Bindings
-from finger_pin.core.stepping.batch import RESTING
+from finger_pin.core.stepping.batch import IDLE
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.coupling import PassiveCoupling
@@ -160,7 +160,7 @@ class World:
         return bool(self.reason) or self._step >= self.task.steps
 
     def reset(self, random: np.random.Generator) -> None:
-        """Begin an episode.
+        """Reset for an episode.
 
         Raises:
             InputError: If what is drawn is not allowed.
@@ -231,7 +231,7 @@ class World:
         return self._next_end()
 
     def finish_piece(self, end: float, status: int) -> float:
-        """Note the status with which a stepper ended a piece; return the end of the next, s, or `RESTING`."""
+        """Note the status with which a stepper ended a piece; return the end of the next, s, or `IDLE`."""
         self.now = end
         if status:
             self.now = self.stepper.time
@@ -239,14 +239,14 @@ class World:
         return self._next_end()
 
     def _next_end(self) -> float:
-        """Hold the inputs that act now, and return the time of their end, s; `RESTING` after the period."""
+        """Hold the inputs that act now, and return the time of their end, s; `IDLE` after the period."""
         end = self._step * self.task.period
         if self.reason or self.now >= end:
-            return RESTING
+            return IDLE
         return self.action.next_piece(self.stepper, self.now, end)
 
     def result(self, sample_rate: float) -> xr.Dataset:
-        """Return the episode so far, integrated again step by step, as a Dataset with its energy account."""
+        """Return the episode so far, repeated step by step, as a Dataset with its energy account."""
         if not self._step:
             raise InputError("result", "is of steps, and there are none yet: call step")
         stepper, end = self._stepper_at(self._begun), self.stepper.time

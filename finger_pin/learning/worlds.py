@@ -1,4 +1,4 @@
-"""Worlds of one scenario side by side, stepped and observed at once."""
+"""Batch of worlds of one scenario, stepped and observed together."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from finger_pin.core.stepping.batch import RESTING, Together
+from finger_pin.core.stepping.batch import IDLE, BatchStepper
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.description.validation import all_finite
 from finger_pin.exceptions import InputError
@@ -46,7 +46,7 @@ class Worlds:
         self._measurements = measurements(task.sensors, count, task.period)
         self._context: dict[str, Array] = {}
         self._randoms = [np.random.default_rng(0)] * count
-        self._steppers = Together([world.stepper for world in self.each])
+        self._steppers = BatchStepper([world.stepper for world in self.each])
         self.reset(range(count), self._randoms)
 
     def _name_variables(self) -> None:
@@ -54,7 +54,7 @@ class Worlds:
         self._variables = {name: known[name] for name in self.task.variables}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all but the functions of the variables, which have no names of their own."""
+        """Return the state without the functions of the variables, which cannot be pickled."""
         return {name: value for name, value in self.__dict__.items() if name != "_variables"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -73,7 +73,7 @@ class Worlds:
         return Box(-np.inf, np.inf, seen.shape[1:], np.float32), Box(low.astype(np.float32), high.astype(np.float32))
 
     def reset(self, places: Sequence[int], randoms: Sequence[np.random.Generator]) -> None:
-        """Begin episodes in some worlds.
+        """Reset some worlds.
 
         Args:
             places: Their numbers.
@@ -95,20 +95,20 @@ class Worlds:
             if world.rebuilt:
                 self._now.renew(i, world.origin, world.action)
         if self.each[0].rebuilt and len(places):
-            self._steppers = Together([world.stepper for world in self.each])
+            self._steppers = BatchStepper([world.stepper for world in self.each])
 
     def act(self, actions: Array, places: Sequence[int]) -> None:
         """Act in some worlds for a control period, shape (w, k).
 
         Where actions arrive within the period, it has several pieces.
         """
-        each, ends = self.each, [RESTING] * len(self.each)
+        each, ends = self.each, [IDLE] * len(self.each)
         for i in places:
             ends[i] = each[i].act(actions[i])
-        while max(ends) != RESTING:
+        while max(ends) != IDLE:
             statuses = self._steppers.advance(ends)
             for i in places:
-                if ends[i] != RESTING:
+                if ends[i] != IDLE:
                     ends[i] = each[i].finish_piece(ends[i], statuses[i])
 
     def observe(self, places: _Places, *, judged: bool = True) -> tuple[NDArray[np.float32], dict[str, Array]]:

@@ -52,7 +52,7 @@ class _Canal:
 
 
 class Canals:
-    """The canals of a finger's tree beside those of the tendons that ideal sources, or drives, pull.
+    """Canals of a tree's tendons, other than those pulled by ideal sources or drives.
 
     Attributes:
         tables: Their rows, none without any.
@@ -180,7 +180,7 @@ class Canals:
         )
 
     def _press(self, canals: list[_Canal], known: Mapping[str, Rows], counted: set[str]) -> None:
-        """Note how tensions load the pins of the joints that canals cross, as they leave the canal.
+        """Record how tensions load the pins of the joints crossed by canals.
 
         Those of the tables that are counted already load them by themselves.
         """

@@ -115,7 +115,9 @@ class Finger:
         around = None if objects is None else Scene.of(objects, description, mechanism, placed)
         self.scene = around
         self.mechanism = mechanism if around is None else around.around(mechanism)
-        self.layout = state_layout(self.tendons, self.actuators, last, around, before, canals.tables)
+        self.layout = state_layout(
+            self.tendons, self.joint_friction, self.actuators, last, around, before, canals.tables
+        )
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -226,7 +228,7 @@ class Finger:
         return (*self.routing.tendons[: self.routing.actuated], *(tree.actuators if tree is not None else ()))
 
     def packed_inputs(self, given: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
-        """Return inputs u, shape (u,), from numbers in order, or by name, where those left out are 0.
+        """Return inputs u, shape (u,), from a sequence or from a table by name, 0 if left out.
 
         Raises:
             InputError: If there is no such input, or the numbers are not as many as inputs and finite; ``name`` names
@@ -312,7 +314,7 @@ class Finger:
         return Motion(found.tip, found.kinetic_energy, found.potential_energy)
 
     def rhs(self, time: float, x: Array, inputs: Array, fingertip_force: Array | None = None) -> Array:
-        """Return the time derivative of the packed state, for a solver of one's own; ``time`` is not used."""
+        """Return the time derivative of the packed state, for custom solvers; ``time`` is not used."""
         return self.mechanism.evaluate(x, inputs, fingertip_force).rate
 
 

@@ -1,4 +1,4 @@
-"""The parts of a finger and their tables of rows, made anew only for other numbers of their own."""
+"""Parts of a finger and their tables of rows, remembered by what they depend on."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from finger_pin.typing import Array
 
 
 class Parts(NamedTuple):
-    """The parts that a description makes, as `Finger` has them."""
+    """Parts of a finger, made from its description."""
 
     routing: Routing
     tendons: Tendons
@@ -68,7 +68,7 @@ class Parts(NamedTuple):
         drives: tuple[Rows, ...],
         pulled: dict[str, Array],
     ) -> tuple[list[Rows], Canals]:
-        """Return the tables of rows in the order of evaluation, as wide as there are coordinates, and the canals."""
+        """Return the tables of rows in the order of evaluation, and the canals."""
         joints, width = self.routing.joints, self.width
         pulling: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.names))
         if paths:
@@ -89,7 +89,7 @@ class Parts(NamedTuple):
 # Most changes of numbers leave most parts, and most tables, as they were.
 @memoised(lambda make, *given: (make.__self__, make.__name__, *given), most=1024)
 def _made(make: Any, *given: Any) -> Any:
-    """Return a method's result for a part and values, anew only if either differs."""
+    """Return a method's result, remembered by its part and arguments."""
     return make(*given)
 
 
@@ -135,13 +135,14 @@ def _pins(parts: Parts, drives: tuple[Rows, ...], pulled: dict[str, Array], load
 
 def state_layout(
     tendons: Tendons,
+    friction: JointFriction,
     motors: Actuators,
     rows: Sequence[Rows] = (),
     scene: Scene | None = None,
     of_tree: Sequence[Rows] = (),
     canals: Sequence[Rows] = (),
 ) -> Layout:
-    """Return the layout of tendons, motors, extra rows, drives among them, and a scene."""
+    """Return the layout of tendons, joints, motors, extra rows, drives among them, and a scene."""
     routing = tendons.routing
     drives, further = (further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
 
@@ -166,7 +167,7 @@ def state_layout(
         "drives": [name for name, _ in drives],
         "tendon_stiction": routing.tendons,
         "canal_stiction": [name for table in canals if table.states for name in table.names],
-        "joint_stiction": routing.joints,
+        "joint_stiction": () if friction.law.scale is None else routing.joints,
         "gearbox_stiction": motors.names,
         "further": [name for name, _ in further],
     }

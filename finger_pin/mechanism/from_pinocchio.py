@@ -62,7 +62,7 @@ def on_model(
 
 
 def _by_joint(joints: Mapping[str, str] | Mapping[str, Mapping[str, str]]) -> dict[str, str]:
-    """Return names of a model's joints by those of a description, which have dots in a hand."""
+    """Return the names of a model's joints by those of a description."""
     found: dict[str, str] = {}
     for name, given in joints.items():
         found |= {name: given} if isinstance(given, str) else {f"{name}.{own}": each for own, each in given.items()}
@@ -106,7 +106,7 @@ def turned_model(body: RigidBody) -> tuple[pin.Model, list[Array]]:
 
 
 def chain(model: pin.Model, first: int, count: int) -> pin.Model:
-    """Return some joints of a tree, each on the one before, as a model of their own."""
+    """Return a serial chain of joints of a tree as a separate model."""
     own = pin.Model()
     for index in range(first, first + count):
         own.addJoint(index - first, model.joints[index], model.jointPlacements[index], model.names[index])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -12,10 +13,13 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.parameters import Spring
 from finger_pin.description.validation import expand
+from finger_pin.exceptions import InputError
 from finger_pin.laws.bristle import PIN_FRICTION
+from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
+from finger_pin.laws.pin import PIN_LAWS, SIGNALS
 from finger_pin.laws.spring import HYSTERESIS, JOINT_SPRING, STIFFER, spring_torque
-from finger_pin.mechanism.rows import Energy, Rows
+from finger_pin.mechanism.rows import Energy, Rows, energy
 from finger_pin.typing import Array
 
 #: Least levels of what tendons, N, and joints' springs, N m, hold, as those of their friction.
@@ -33,6 +37,9 @@ LOSSES = (
     Energy("joint_viscous", "joints viscous"),
     Energy("joint_micro_damping", "joints' micro-damping"),
 )
+_POWERS = {each.name.removeprefix("joint_"): each for each in LOSSES}
+# Numbers of the joints that a law may name.
+_NUMBERS = (*PIN_FRICTION.parameters, "reversal_speed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +57,8 @@ class JointFriction:
         floor: g_min, shape (n,), N m.
         stribeck_exponent: 1 or 2, shape (n,).
         lag: sigma_1 / sigma_0, shape (n,), s.
+        reversal_speed: v_r of Coulomb's law, shape (n,), rad/s.
+        law: The law.
     """
 
     loads: Array
@@ -62,6 +71,8 @@ class JointFriction:
     floor: Array
     stribeck_exponent: Array
     lag: Array
+    reversal_speed: Array
+    law: Law
 
     @classmethod
     def from_description(cls, description: FingerDescription, loads: Array) -> JointFriction:
@@ -73,8 +84,10 @@ class JointFriction:
             loads=bearing[:, None] * loads,
             bearing=bearing,
             kinetic=expand(law.coulomb, size),
-            static=expand(law.stiction, size),
+            static=expand(law.break_away, size),
             **bristles(law, size),
+            reversal_speed=expand(law.reversal_speed, size),
+            law=_law(law.law),
         )
 
     def rows(
@@ -100,15 +113,40 @@ class JointFriction:
         loads |= {group: self.loads @ weights for group, weights in drives.items()} | dict(canals or {})
         return Rows(
             group="joint_friction",
-            law=PIN_FRICTION,
+            law=self.law,
             names=names,
-            parameters=np.array([getattr(self, name) for name in PIN_FRICTION.parameters]),
+            parameters=np.array([getattr(self, name) for name in self.law.parameters]),
             arm=np.eye(size, width),
             loads=loads,
             pins=np.where(self.bearing, np.arange(size), -1),
             stored=Energy("joint_bristles", "joint bristles"),
-            powers=LOSSES,
+            powers=tuple(
+                _POWERS.get(name) or energy(f"joint_{name}") for name in (*self.law.supplies, *self.law.losses)
+            ),
         )
+
+
+def _law(name: str) -> Law:
+    """Return a law of joint friction by its name, or the user's by that of its module and its own.
+
+    Raises:
+        InputError: If there is none, or it cannot be the friction of a joint.
+    """
+    if name in PIN_LAWS:
+        return PIN_LAWS[name]
+    module, _, own = name.partition(":")
+    try:
+        law = getattr(importlib.import_module(module), own)
+    except (ImportError, AttributeError) as error:
+        raise InputError("finger.joint_friction.law", f"cannot be imported: {error}", name) from None
+    if not isinstance(law, Law):
+        raise InputError("finger.joint_friction.law", f"must be a Law, not {type(law).__name__}", name)
+    for kind, has, known in (("parameters", _NUMBERS, law.parameters), ("signals", law.signals, SIGNALS)):
+        if lacking := [each for each in known if each not in has]:
+            allowed = f"the law's {kind} must be some of" if kind == "parameters" else "the law must have the signals"
+            names = ", ".join(_NUMBERS if kind == "parameters" else SIGNALS)
+            raise InputError("finger.joint_friction.law", f"{allowed} {names}: see {', '.join(lacking)}", name)
+    return law
 
 
 def bristles(law: JointFrictionSettings | TendonFrictionSettings, size: int) -> dict[str, Array]:

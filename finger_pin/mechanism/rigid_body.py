@@ -128,7 +128,7 @@ class RigidBody:
         return {name: value for name, value in vars(self).items() if name != "_own"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Become a copy, with memory of its own."""
+        """Initialise as a copy with separate memory."""
         vars(self).update(state, _own=threading.local())
 
     def weighing(self, inertias: Sequence[pin.Inertia], gravity: Sequence[float]) -> RigidBody:

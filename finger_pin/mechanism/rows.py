@@ -1,4 +1,4 @@
-"""Rows: tables of all that exerts force, whose arms and indices are the wiring of (18).
+"""Rows: tables of all force elements; their arms and indices are the wiring of (18).
 
 A row acts along its arm, tau = arm^T phi. What it sees is linear in earlier rows: its input and its load are sums of
 their forces. Rows that share a law stand together in one table, and tables stand in the order in which they are
@@ -25,7 +25,7 @@ STORED, SUPPLIED, LOST = "stored", "supplied", "lost"
 
 
 class Energy(NamedTuple):
-    """An energy, J, that is stored, or a power, W, that is supplied or lost; tables may share one.
+    """Stored energy, J, or supplied or lost power, W; tables may share one.
 
     Attributes:
         name: In a result it follows ``energy_`` or ``power_``.

@@ -75,7 +75,7 @@ def link_shapes(description: FingerDescription, links: Mapping[str, Link]) -> di
 
 
 def pad_shapes(link: Link) -> list[Shape]:
-    """Return the soft end of the last link, in the fingertip frame, which touches it from outside."""
+    """Return the soft end of the last link, in the fingertip frame."""
     radius = _pad_radius(link)
     return [Shape("sphere", (radius,), (-radius, 0.0, 0.0), material="pad", collides=True)]
 

@@ -209,7 +209,7 @@ def _weighing(form: RigidBody, body: RigidBody, moved: Sequence[Object]) -> Rigi
 
 @memoised(lambda body, moved, world: (body.form, *moved, world))
 def _extended(body: RigidBody, moved: Sequence[str], world: Sequence[float]) -> RigidBody:
-    """Return a rigid body with joints of objects that move, and of the world, which goes no farther than it does, m."""
+    """Return a rigid body with further joints for moving objects and for the world seen by a palm."""
     model, place = pin.Model(body.model), pin.SE3.Identity()
     for name in moved:
         slid = model.addJoint(0, pin.JointModelTranslation(), place, name)

@@ -115,7 +115,7 @@ class TendonPaths:
 
 
 def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> TendonPath:
-    """Return a tendon's route: only the turn before the first pulley is that of its own canal."""
+    """Return a tendon's path; the turn before the first pulley is that of its canal."""
     parts: list[tuple[float, list[PathTerm]]] = [(1.0, [])]
     before: Place | None = None
     wrap: Waypoint | None = None
@@ -158,7 +158,7 @@ def rotation(quaternion: tuple[float, float, float, float]) -> Array:
 
 
 class Excursions:
-    """The excursions of all t tendons, which are zero in the joints' reference posture."""
+    """Excursions of all t tendons, zero in the joints' reference posture."""
 
     def __init__(self, routing: Routing, description: FingerDescription, paths: TendonPaths | None) -> None:
         """Find the tendons that go along paths.

@@ -94,7 +94,7 @@ class Tendons:
         return proximal, distal
 
     def rest_position(self, position: Array) -> Array:
-        """Return p_5 with both halves stretched alike, shape (..., p), m."""
+        """Return p_5 at equal stretch of both halves, shape (..., p), m."""
         proximal, distal = self.stretch(position, np.zeros((*position.shape[:-1], self.routing.passive)))
         return 0.5 * (proximal - distal)
 

@@ -187,7 +187,7 @@ def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: 
     held = joints[coupling.joint].coefficients
     if coupling.other is None:
         return TendonPath(held, ())
-    route = TendonPath(held - coupling.ratio * joints[coupling.other].coefficients, ())
+    route = TendonPath(held - coupling.slope * joints[coupling.other].coefficients, ())
     if not any(coupling.higher):
         return route
     # An angle is measured from its range's middle, so that it never comes to half a turn.

@@ -99,7 +99,7 @@ def build_rigid_body(description: FingerDescription) -> RigidBody:
 
 
 def _linked(description: FingerDescription) -> tuple[object, ...]:
-    """Return all that a finger's body depends on; by value, as other numbers make new descriptions of its links."""
+    """Return all that a finger's body depends on, by value."""
     links = (joint.link for joint in description.joints.values())
     values = (link and tuple(getattr(link, name) for name in Link.model_fields) for link in links)
     return (description.name, description.gravity, *description.joints, *values)

@@ -45,6 +45,10 @@ def choose(
             hint = suggestion(pattern, names)
             raise InputError(f"{entry}.{pattern}", f"matches none of {', '.join(names) or 'no names'}{hint}")
         for key, value in validate(kind, dict(keys), (entry, pattern)):
+            if key in ("law", "reversal_speed") and key in keys and value != "lugre":
+                raise InputError(
+                    f"{entry}.{pattern}.{key}", 'is for our own step: in MuJoCo\'s there is "lugre"', value
+                )
             if isinstance(value, tuple) and key != "bends":
                 raise InputError(f"{entry}.{pattern}.{key}", "must be one number", list(value))
         for name in matching:

@@ -42,12 +42,12 @@ class LoopReference(Reference, Protocol):
         """Return the functions of time that it follows; steps end at their knots."""
 
     def planned(self) -> SignalReference | None:
-        """Return its signals, which the compiled core can follow; None if it is Python."""
+        """Return the signals for the compiled core; None for a Python reference."""
 
 
 @dataclass(frozen=True, eq=False)
 class SignalReference:
-    """A signal per joint, then equation (20) for the followers, whose own signals do not count.
+    """Reference of one signal per joint, with (20) for the followers.
 
     Attributes:
         signal: n signals, rad.

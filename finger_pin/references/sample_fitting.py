@@ -1,4 +1,4 @@
-"""Fewer knots through many samples, whose curve is kept to within their rounding.
+"""Reduction of the knots of dense samples, within their rounding.
 
 Where samples are dense, the slope of what joins them says more of their rounding than of the signal: samples rounded to
 1e-7 at 1 MHz have slopes that are wrong by 0.1 per second, which an integrator would follow with steps of microseconds.

@@ -1,1 +1,1 @@
-"""One run: the loop, the stepper for loops of one's own, the Dataset with its energy account, the folder of results."""
+"""One run: the loop, the `Simulator`, the Dataset with its energy account, the folder of results."""

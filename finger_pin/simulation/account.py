@@ -109,7 +109,7 @@ def _worst(opened: Array, allowed: float) -> Iterator[NDArray[np.int64]]:
 
 
 def _steps(ends: Array, times: Array, spans: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the steps in spans between saved times; of more than so many those in the first spans."""
+    """Return the steps between saved times, up to a maximum number."""
     first = np.searchsorted(ends[1:-1], times[spans], side="right")
     last = np.searchsorted(ends[1:-1], times[spans + 1], side="left") + 1
     few = np.cumsum(last - first) <= _MOST_SUSPECTED

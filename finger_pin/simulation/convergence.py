@@ -98,7 +98,7 @@ class Convergence:
 
 
 def tightened(scenario: Scenario, factor: float = FACTOR) -> Scenario:
-    """Return a scenario with tolerances divided by a factor, as far as tolerances go.
+    """Return a scenario with tolerances divided by a factor, within their bounds.
 
     Raises:
         InputError: If the factor is not above 1, or a tolerance is as tight as it can be.
@@ -176,9 +176,6 @@ def check_convergence(
         )
 
     first = run(scenario) if result is None else result
-    # A run whose account stayed open was repeated already.
-    taken = {name: first.attrs[name] for name in TOLERANCES}
-    tighter = tightened(scenario.updated(simulation=taken), factor)
     with warnings.catch_warnings():
         # The first run has said it.
         warnings.simplefilter("ignore", ScenarioWarning)

@@ -1,4 +1,4 @@
-"""A result in the other frame: everything that the palm sees, as the world does."""
+"""Results in the world's frame in place of the palm's."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME
+from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME
 from finger_pin.typing import Array
 
 
 def in_world(result: xr.Dataset) -> xr.Dataset:
-    """Return a result in which every variable with components is in the world's frame; that of a palm at rest is alike.
+    """Return a result with all vectors in the world's frame.
 
     Places gain the palm's, velocities of objects what the palm's motion adds; all else is turned.
 

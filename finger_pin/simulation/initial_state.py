@@ -76,7 +76,7 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
 
 
 def _last_states(finger: Finger, last: xr.Dataset, sizes: dict[str, Array]) -> dict[str, Array]:
-    """Return the states of a tree's actuators and canals, and of rows of one's own, from the variables of their tables.
+    """Return the states of tree actuators, canals and custom rows from a result's variables.
 
     Raises:
         InputError: If a result lacks them.

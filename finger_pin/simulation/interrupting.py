@@ -12,7 +12,7 @@ import xarray as xr
 
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.exceptions import Interrupted
-from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.recording import RunArrays
 
 Found = TypeVar("Found", "xr.Dataset", RunArrays)
 
@@ -55,7 +55,7 @@ class CtrlC:
 
 
 def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
-    """Return the result of a run, which is given a `Stop`.
+    """Return the result of a run that Ctrl-C or a `Stop` can end.
 
     Raises:
         Interrupted: After Ctrl-C or such a stop, with what the run has computed.

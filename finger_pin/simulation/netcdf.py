@@ -1,4 +1,4 @@
-"""A result as a file: netCDF, which holds all of it, or CSV, which holds its signals."""
+"""Results as files: netCDF for all of it, CSV for its signals."""
 
 from __future__ import annotations
 

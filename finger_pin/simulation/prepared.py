@@ -24,8 +24,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import with_tighter
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
-from finger_pin.simulation.recording import attributes_of, record, recorded, refuse_unknown
-from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.recording import RunArrays, attributes_of, record, recorded, refuse_unknown
 from finger_pin.simulation.running import run
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
@@ -68,7 +67,7 @@ def prepare(
 
 
 class Prepared:
-    """A scenario that is run many times, also in several threads at once.
+    """Scenario prepared for many runs, also in several threads.
 
     Attributes:
         family: The scenario, and those that other values make of it.
@@ -173,7 +172,7 @@ class Prepared:
         return add_slopes(found, base, numbers, runs, changes)
 
     def _free_bindings(self) -> Bindings:
-        """Return bindings of an earlier run that no other run uses, if there are any."""
+        """Return unused bindings of an earlier run, or new ones."""
         try:
             return self._bindings.pop()
         except IndexError:

@@ -1,10 +1,10 @@
-"""Records of a motion: variables of it, as arrays or as a Dataset that is finite and fits into memory."""
+"""Recording of a motion's variables, as plain arrays or as a Dataset."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -20,8 +20,7 @@ from finger_pin.description.simulation_settings import SimulationSettings
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.quantity import BASE_FRAME
-from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.sampled_trajectory import BASE_FRAME, SampledTrajectory
 from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
 from finger_pin.typing import Array
 
@@ -148,3 +147,43 @@ def check_memory(settings: SimulationSettings, finger: Finger) -> None:
             f"{present / 2**30:.3g}; must be at most {settings.sample_rate * present / needed:.3g}"
         )
         raise InputError("simulation.sample_rate", allowed, settings.sample_rate)
+
+
+@dataclass(eq=False)
+class RunArrays:
+    """Variables of a run as plain arrays.
+
+    Attributes:
+        variables: Dimensions, of which time is the first, values and attributes, by name.
+        coordinates: Likewise, or the values alone.
+        attrs: End, cost and settings of the run.
+        slopes: Derivatives of the variables by the values that the run was given, shape (p, ...), if they were asked
+            for.
+    """
+
+    variables: Recorded
+    coordinates: dict[str, Any]
+    attrs: dict[str, Any]
+    slopes: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def time(self) -> Array:
+        """The sample times, s, shape (m,)."""
+        return self["time"]
+
+    def __contains__(self, name: str) -> bool:
+        """Return whether there is a variable or coordinate of a name."""
+        return name in self.variables or name in self.coordinates
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the values of a variable or coordinate."""
+        entry = self.variables.get(name) or self.coordinates[name]
+        return np.asarray(entry[1] if isinstance(entry, tuple) else entry)
+
+    def units(self, name: str) -> str:
+        """Return the unit of a variable."""
+        return self.variables[name][2]["units"]
+
+    def dataset(self) -> xr.Dataset:
+        """Return the same as a Dataset."""
+        return xr.Dataset(self.variables, self.coordinates, self.attrs)

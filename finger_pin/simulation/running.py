@@ -1,4 +1,4 @@
-"""A run: from a scenario to its Dataset, judged."""
+"""Run a scenario, check accuracy and energy balance, and return the Dataset."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from finger_pin.exceptions import (
     SelfLockingWarning,
 )
 from finger_pin.references.reference import LoopReference
-from finger_pin.simulation.accuracy import CHUNK, close_account, estimate_error, open_account, ringing, too_stiff
+from finger_pin.simulation.accuracy import CHUNK, judge_error, left_open, open_account, ringing, too_stiff
 from finger_pin.simulation.recording import check_memory, finite_part, record
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
@@ -66,34 +66,27 @@ def run(
         if observe is not None:
             observe(time, loop.evaluate(time, x))
 
-    def repeated(other: Scenario, enough: Stop) -> Trajectory:
-        asked = stop or (lambda: False)
-        return setup.integrate(None, lambda: enough() or asked(), scenario=other)
-
-    text = to_toml(scenario)
-
-    def recorded(found: Trajectory) -> xr.Dataset:
-        return record(scenario, SampledTrajectory(loop, found, scenario.sample_times()), setup.method, text=text)
-
     watched = progress is not None or observe is not None
-    first = setup.integrate(watch if watched else None, stop, chunk=CHUNK if observe is None else CHUNK_OBSERVED)
+    trajectory = setup.integrate(watch if watched else None, stop, chunk=CHUNK if observe is None else CHUNK_OBSERVED)
     margin = _margin(scenario, loop, own)
     close = locking_advice(math.inf if margin is None else margin)
     if close:
         warnings.warn(close, SelfLockingWarning, stacklevel=5)
-    closed = close_account(scenario, first, repeated, recorded)
-    trajectory, result = closed.trajectory, closed.result
-    error, inaccurate = estimate_error(scenario, closed, repeated, margin=math.inf if margin is None else margin)
+    sampled = SampledTrajectory(loop, trajectory, scenario.sample_times())
+    result = record(scenario, sampled, setup.method, text=to_toml(scenario))
+    error, inaccurate = judge_error(scenario, trajectory, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
     # It says why, where an error that is large or unknown says that alone.
-    inaccurate = too_stiff(result, loop.finger, scenario.simulation.atol_scale) or inaccurate
-    if inaccurate:
+    stiff = too_stiff(result, loop.finger, scenario.simulation.atol_scale)
+    inaccurate = stiff or inaccurate
+    # Close to self-locking, the warning of that is enough.
+    if stiff or (inaccurate and not close):
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=5)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
     if np.isfinite(error):
         result.attrs["estimated_error"] = error
-    gap = "" if trajectory.failure else open_account(closed.result, closed.left)
+    gap = "" if trajectory.failure else open_account(result, left_open(result))
     told = {"self_locking": close, "micro_damping": driving, "accuracy": inaccurate, "account": gap, "ringing": slow}
     told["own"] = own
     result.attrs |= {name: text for name, text in told.items() if text}

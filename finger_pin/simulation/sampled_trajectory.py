@@ -1,9 +1,10 @@
-"""A trajectory at the times that are saved, and all that follows from it."""
+"""Trajectory at the saved times, its signals, and the quantities of a result that follow from them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import ControlSignals
@@ -11,11 +12,15 @@ from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.rows import Energy
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.account import Account, account
 from finger_pin.simulation.energy import Flows, energies, powers
 from finger_pin.typing import Array
+
+#: Frames of variables with components; the base's, a palm's if there is one, is that of all but the palm's own.
+BASE_FRAME, WORLD_FRAME = "base", "world"
 
 #: Variables that need states, plans and no more of the finger's signals than forces.
 _OF_FORCES = frozenset(
@@ -120,3 +125,33 @@ class SampledTrajectory:
     def account(self) -> Account:
         """The energy account."""
         return account(self.loop, self.trajectory, self.times, self.signals, self.motion)
+
+
+class Quantity(NamedTuple):
+    """A variable of a result.
+
+    Attributes:
+        dims: Names of its dimensions, time first.
+        value: Returns its values from what is known of a motion.
+        units: SI.
+        long_name: In words.
+        equation: Number of its equation in the paper; empty for none.
+        frame: Whose axes its components are along, `BASE_FRAME` or `WORLD_FRAME`; empty for what has none.
+        booked: Its part in the energy account, if any.
+    """
+
+    dims: tuple[str, ...]
+    value: Callable[[SampledTrajectory], Array]
+    units: str
+    long_name: str
+    equation: str = ""
+    frame: str = ""
+    booked: Energy | None = None
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Unit, name, frame and equation, and its part in the account."""
+        found = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
+        if self.booked is not None:
+            found |= {"account": self.booked.kind, "label": self.booked.label}
+        return found | {"equation": f"({self.equation})"} if self.equation else found

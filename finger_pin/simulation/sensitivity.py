@@ -16,7 +16,7 @@ import numpy as np
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.recording import RunArrays
 from finger_pin.simulation.setup import Setup
 from finger_pin.typing import Array
 
@@ -65,7 +65,7 @@ def nearby(trajectory: Trajectory, others: Sequence[Setup]) -> list[Trajectory]:
 def add_slopes(
     run: RunArrays, base: RunArrays, values: Sequence[float], moved: Sequence[RunArrays], changes: Array
 ) -> RunArrays:
-    """Put the derivatives of all variables into a run, as `RunArrays.slopes`, and return it.
+    """Add the derivatives of all variables to a run, as `RunArrays.slopes`, and return it.
 
     Args:
         run: The run that is to have them.

@@ -192,7 +192,7 @@ class Setup:
             rtol=given.rtol,
             atol_scale=given.atol_scale,
             # Runs that were prepared are not judged; of controllers that are sampled the linearised flow knows nothing.
-            judged=self.bindings is None and self.sampled is None and loop.drives is None,
+            estimate_error=self.bindings is None and self.sampled is None and loop.drives is None,
         )
 
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:

@@ -63,7 +63,7 @@ def simulate(
 
     Returns:
         Every signal of the model at the scenario's sample rate, and the energy account. Where that does not close to
-        ten times the tolerances, nor to 1e-5, the run is repeated at tighter ones: attribute ``repeated`` says so.
+        1e-4 of the energy exchanged, the attribute ``account`` says so.
 
     Raises:
         InputError: If the control period is not positive, the method cannot sample, the controller must be sampled,
@@ -78,8 +78,8 @@ def simulate(
             the result's attribute ``self_locking_margin`` says how close. With a controller or reference of one's own
             there is neither.
         AccuracyWarning: If the run errs by far more than its tolerances suggest; the attribute ``estimated_error`` says
-            by how much, rad rms over joints and time. It has none where the error cannot be judged, which is said, nor
-            where the core does not integrate in one piece.
+            by how much, rad rms over joints and time. It has none where the error is not judged, which is said, nor
+            where the core does not integrate in one piece. `check_convergence` compares two runs.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
     scenario = load_scenario(scenario)

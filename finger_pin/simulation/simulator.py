@@ -1,4 +1,4 @@
-"""A finger in steps, for loops of one's own: controllers, learning, hardware in the loop."""
+"""Stepwise simulation of a finger, for custom loops: controllers, learning, hardware in the loop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.inputs import core_signal, held_control
-from finger_pin.core.stepping.batch import Together
+from finger_pin.core.stepping.batch import BatchStepper
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.validation import suggestion
@@ -96,7 +96,7 @@ class Simulator:
             control = control._replace(guide=core_signal(self._guides.signal))
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
         self._stepper = self._bindings.stepping(finger, control, rest, **self._settings)
-        self._fresh = self._stepper.moments
+        self._fresh = self._stepper.state_snapshot
         self._compiled = self._bindings.evaluating(finger)
         # Which of the inputs are tensions.
         self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
@@ -116,12 +116,12 @@ class Simulator:
         self._tension = np.zeros(self.finger.mechanism.channels)
         self._force = self._unloaded = np.zeros(3 if tips == 1 else (tips, 3))
         # Not even what was loaded once is remembered.
-        self._stepper.resume(self._fresh)
+        self._stepper.restore(self._fresh)
         self._stepper.restart(x, time)
         self._log = StepLog(self._stepper)
 
     def reset(self, initial: State | ArrayLike | None = None) -> State:
-        """Begin anew at time zero, with a new record; return the state then.
+        """Reset to time zero with a new record; return the state.
 
         Args:
             initial: The packed state, shape (size,), the state by name, or theta, shape (n,), rad, for rest there; by
@@ -252,7 +252,7 @@ class Simulator:
         return self._compiled.evaluate(self.x, self._tension, self._force)
 
     def clone(self) -> Simulator:
-        """Return an independent simulator in the same condition: both go on bit by bit alike."""
+        """Return an independent copy in the same state; both continue bit for bit alike."""
         twin = object.__new__(type(self))
         twin.__dict__ |= self.__dict__
         twin._compiled, twin._stepper = CompiledFinger(self.finger), self._stepper.copy()
@@ -304,14 +304,14 @@ def step_many(
 
 
 # By the first of the simulators that were stepped together: as a rule they are again.
-_TOGETHER: WeakKeyDictionary[Simulator, Together] = WeakKeyDictionary()
+_TOGETHER: WeakKeyDictionary[Simulator, BatchStepper] = WeakKeyDictionary()
 
 
-def _together(simulators: Sequence[Simulator]) -> Together:
+def _together(simulators: Sequence[Simulator]) -> BatchStepper:
     """Return what steps simulators side by side."""
     steppers = [each._stepper for each in simulators]
     found = _TOGETHER.get(simulators[0])
-    if found is None or not found.serves(steppers):
-        found = Together(steppers)
+    if found is None or not found.is_for(steppers):
+        found = BatchStepper(steppers)
         _TOGETHER[simulators[0]] = found
     return found

@@ -37,15 +37,15 @@ class StepLog:
     """The steps of a simulator since a start, in the order in which they were made."""
 
     def __init__(self, stepper: Stepper) -> None:
-        """Begin with no steps, at the present time of a stepper."""
-        self._stepper, self._moments = stepper, stepper.moments
+        """Create an empty log at the present time of a stepper."""
+        self._stepper, self._moments = stepper, stepper.state_snapshot
         self._numbers = array("d")
 
     @property
     def start(self) -> Stepper:
         """A copy of the stepper as it stood at the start."""
         start = self._stepper.copy()
-        start.resume(self._moments)
+        start.restore(self._moments)
         return start
 
     def add(self, end: float, inputs: Array, force: Array) -> None:
@@ -54,7 +54,7 @@ class StepLog:
         self._numbers.frombytes(inputs.tobytes() + force.tobytes())
 
     def copy(self, stepper: Stepper) -> StepLog:
-        """Return the same steps of another stepper, made alike, to go on from independently."""
+        """Return a copy of the log for a copied stepper."""
         twin = copy.copy(self)
         twin._stepper, twin._numbers = stepper, self._numbers[:]
         return twin
@@ -135,7 +135,7 @@ class _Repeated:
         return float(self._knots[self._step])
 
     def act(self, x: Array) -> Array:
-        """Begin a step: load it with its force, and return its inputs, shape (u,)."""
+        """Start a step: set its force, and return its inputs, shape (u,)."""
         step, self._step = self._step, self._step + 1
         self._stepper.load(self._force[step].reshape(-1, 3))
         inputs: Array = self._inputs[step]

@@ -15,8 +15,7 @@ from finger_pin.mechanism.rows import LOST, Rows
 from finger_pin.mechanism.state import BLOCKS
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.energy import flows, stores
-from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME, Quantity
-from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory
 from finger_pin.typing import Array
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
@@ -63,7 +62,6 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         "joint_torque_command": Quantity(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
         "joint_torque": Quantity(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
         "joint_friction": Quantity(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
-        "joint_stiction": _of_state("joint_stiction"),
         "joint_reaction": Quantity(_JOINT, lambda of: of.finger.joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": Quantity(_JOINT, lambda of: of.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
         "fingertip_force": Quantity(tip, _fingertip_force, "N", "force on the fingertip", "6"),
@@ -73,6 +71,8 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         ),
         SHORTFALL: Quantity(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
+    if loop.finger.layout.names_of("joint_stiction"):
+        table["joint_stiction"] = _of_state("joint_stiction")
     table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _measured(loop) | _more(loop)
     for name, each in table.items():
         if frame := _frame(name, each):
@@ -81,7 +81,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _of_state(block: str, single: bool = False) -> Quantity:
-    """Return the variable of a block of the state, of a single number without a dimension of its own."""
+    """Return the variable of a block of the state; without a second dimension if ``single``."""
     of = BLOCKS[block]
 
     def value(motion: SampledTrajectory) -> Array:

@@ -24,8 +24,8 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.prepared import Prepared
 from finger_pin.simulation.progress import notebook_bar
-from finger_pin.simulation.quantity import Quantity
 from finger_pin.simulation.recording import refuse_unknown
+from finger_pin.simulation.sampled_trajectory import Quantity
 from finger_pin.simulation.simulate import simulate
 from finger_pin.simulation.variables import variables as known_variables
 from finger_pin.studies.executor import FailedTask, compile_for, open_executor, run_tasks

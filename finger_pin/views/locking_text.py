@@ -24,7 +24,7 @@ def summarize_locking(scenario: Scenario, found: SelfLockingMap) -> str:
         InputError: If there is no force closure.
     """
     finger = scenario.finger
-    static = expand(finger.joint_friction.stiction, len(finger.joints))
+    static = expand(finger.joint_friction.break_away, len(finger.joints))
     alone = [(name, critical_friction(finger, joints=[name]).coefficient) for name in finger.joints]
     together = critical_friction(finger).coefficient
     rows = [(name, _millimetres(value), f"{1e3 * own:.3f}") for (name, value), own in zip(alone, static, strict=True)]

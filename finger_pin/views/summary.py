@@ -52,8 +52,7 @@ def _head(result: xr.Dataset) -> list[str]:
     title = " ".join(str(attributes["title"]).split())
     tolerances = f"rtol {attributes['rtol']:g}, atol_scale {attributes['atol_scale']:g}"
     run = f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"
-    repeated = f"It was {attributes['repeated']}" if "repeated" in attributes else ""
-    return [title, run, *textwrap.wrap(repeated, 80)]
+    return [title, run]
 
 
 def _own(result: xr.Dataset) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -14,7 +13,7 @@ from finger_pin.description.simulation_settings import METHODS
 from finger_pin.simulation.simulate import simulate
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import new_figure, styled
-from validation.check import Check, Picture, Section, compare, skipped
+from validation.check import Check, Picture, Section, compare
 
 TITLE = "Integrators against each other"
 #: Scenario and how much of it the slowest methods can afford, s.
@@ -34,11 +33,6 @@ class Approach:
     errors: tuple[float, ...]
 
 
-def available(method: str) -> bool:
-    """Return whether the packages of a method are installed."""
-    return method != "CVODE" or importlib.util.find_spec("sksundae") is not None
-
-
 def run(name: str, method: str, tolerance: float) -> xr.Dataset:
     """Simulate the window of a scenario at one tolerance for all."""
     settings = {
@@ -54,7 +48,7 @@ def run(name: str, method: str, tolerance: float) -> xr.Dataset:
 def approaches(name: str) -> Iterator[Approach]:
     """Yield every method's way to the truth, which is Rodas4 at its tightest; Rodas5P of its own comes to the same."""
     truth = run(name, "Rodas4", 1e-11).joint_position
-    for method in filter(available, METHODS):
+    for method in METHODS:
         errors = (float(abs(run(name, method, each).joint_position - truth).max()) for each in TOLERANCES)
         yield Approach(name, method, tuple(errors))
 
@@ -68,9 +62,6 @@ def measure() -> Section:
         for each in found[name]:
             what = f"{name}, {window:g} s: {each.method} at {TOLERANCES[-1]:g}, largest difference"
             checks.append(compare(what, source, each.errors[-1], LIMIT, "rad"))
-        for method in METHODS:
-            if not available(method):
-                checks.append(skipped(f"{name}: {method}", source, "scikit-sundae is not installed"))
     return Section.of(
         checks,
         Picture(plot(found), "Whatever the method, the motion approaches one and the same as the tolerance shrinks."),

@@ -46,7 +46,7 @@ class Smooth:
         assert control is not None
         atol, force = 1e6 * finger.layout.scales(), self.loop.fingertip_force
         stepper = Stepper(finger.mechanism, control, self.start, TABLEAUS[method](), 1e6, atol, force)
-        stepper.parts[0].memory[rosenbrock.STEP] = step
+        stepper.parts[0].memory.step_size[0] = step
         return stepper
 
     def largest(self, error: Array) -> float:
@@ -88,7 +88,7 @@ def step_errors(smooth: Smooth, method: str) -> Array:
         for k in range(count):
             if stepper.advance(END * (k + 1) / count) != rosenbrock.DONE:
                 raise RuntimeError("an imposed step failed")
-        if stepper.parts[0].memory[rosenbrock.ACCEPTED] != count:
+        if stepper.parts[0].memory.accepted_steps[0] != count:
             raise RuntimeError("an imposed step was divided")
         errors.append(smooth.largest(stepper.x - smooth.exact(END)))
     return np.array(errors)

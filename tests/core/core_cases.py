@@ -14,7 +14,6 @@ from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.inputs import held_control
 from finger_pin.core.jit import CompiledFunction, Matrix, StructType, Vector, call, call_at, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping import rosenbrock
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
 from finger_pin.mechanism.state import State
@@ -282,7 +281,7 @@ class Case:
         )
         (part,) = stepper.parts
         if step is not None:
-            part.memory[rosenbrock.STEP] = step
+            part.memory.step_size[0] = step
         return part
 
 

@@ -102,13 +102,15 @@ def test_numbers_changed_in_place_are_stepped_bit_for_bit_as_a_mechanism_built_a
     for again in (changed, changed, mechanism):
         given = again, control, x[1], method, 1e-4, atol, None if seed % 2 else force
         assert stepper.renew(*given)
-        fresh, unjudged = Stepper(*given), Stepper(*given, judged=False)
+        fresh, unjudged = Stepper(*given), Stepper(*given, estimate_error=False)
         for each in (stepper, fresh, unjudged):
             each.hold(np.ones(mechanism.channels))
             assert each.advance(0.02) == 0
         assert np.array_equal(unjudged.x, fresh.x) and np.isnan(unjudged.estimated_error)
         assert np.array_equal(stepper.x, fresh.x) and stepper.estimated_error == fresh.estimated_error
-        assert all(np.array_equal(*each) for each in zip(stepper.moments[0][3], fresh.moments[0][3], strict=True))
+        assert all(
+            np.array_equal(*each) for each in zip(stepper.state_snapshot[0][3], fresh.state_snapshot[0][3], strict=True)
+        )
 
 
 def test_another_wiring_is_not_taken_in_place():

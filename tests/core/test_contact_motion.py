@@ -168,10 +168,10 @@ def test_the_methods_keep_their_order_while_a_contact_stays_closed_and_slides(me
     for count in (5, 20):
         control = held_control(mechanism.channels, mechanism.coordinates)
         stepper = Stepper(mechanism, control, start, TABLEAUS[method](), 1e6, np.full(mechanism.size, 1e6))
-        stepper.parts[0].memory[rosenbrock.STEP] = end
+        stepper.parts[0].memory.step_size[0] = end
         for k in range(count):
             assert stepper.advance(end * (k + 1) / count) == rosenbrock.DONE
-        assert stepper.parts[0].memory[rosenbrock.ACCEPTED] == count
+        assert stepper.parts[0].memory.accepted_steps[0] == count
         errors.append(np.abs(stepper.x - exact)[:7].max())
     assert np.log(errors[0] / errors[1]) / np.log(4.0) == pytest.approx(order, abs=0.6)
 

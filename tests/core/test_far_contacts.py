@@ -5,7 +5,7 @@ import pytest
 from core_cases import condensed
 from test_contact_motion import G, plane, scene
 
-from finger_pin.core.collision.broad_phase import wake_all
+from finger_pin.core.collision.broad_phase import activate_all
 from finger_pin.core.evaluation.law_code import FORCE
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -34,14 +34,14 @@ def test_contacts_that_sleep_change_not_one_bit_of_a_motion_in_which_they_wake_u
     (one, start), (other, _) = scene((0.0, 0.0, -G), **balls()), scene((0.0, 0.0, -G), **balls())
     asleep, awake = stepper(one, start), stepper(other, start)
     (sleeper,), (waker,) = asleep.parts, awake.parts
-    slept, closed, room = 0, np.zeros(len(sleeper.work.paths.asleep), dtype=bool), waker.room(1)
+    slept, closed, room = 0, np.zeros(len(sleeper.work.paths.culled), dtype=bool), waker.room(1)
     for k in range(1, 41):
         assert asleep.advance(0.01 * k) == 0
         while waker.time < 0.01 * k:
-            wake_all(waker.tables, waker.work.paths)
+            activate_all(waker.tables, waker.work.paths)
             waker.advance(0.01 * k, room)
         assert np.array_equal(asleep.x, awake.x)
-        slept = max(slept, int(sleeper.work.paths.asleep.sum()))
+        slept = max(slept, int(sleeper.work.paths.culled.sum()))
         closed |= waker.work.rows[FORCE] != 0.0
     assert slept >= 15
     # The capsule met what it slept beside.
@@ -54,7 +54,7 @@ def test_each_block_that_contacts_join_is_condensed_to_the_solution_of_the_dense
     (part,) = stepper(mechanism, start).parts
     part.advance(2e-3)
     # Of what sleeps, states are zero, and are not solved for.
-    wake_all(part.tables, part.work.paths)
+    activate_all(part.tables, part.work.paths)
     size, g = len(part.x), 1e4
     columns, rate = np.zeros((size + 1, size)), np.zeros(size)
 

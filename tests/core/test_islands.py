@@ -149,10 +149,10 @@ def test_fingers_that_nothing_couples_are_islands_that_move_bit_by_bit_as_alone(
             loop.fingertip_force,
         )
         moved.append(run(alone, loop.finger.layout.names).interpolate(TIMES))
-        for counter in (rosenbrock.ACCEPTED, rosenbrock.REJECTED, rosenbrock.EVALUATIONS):
-            assert part.memory[counter] == alone.parts[0].memory[counter], name
+        for counter in ("accepted_steps", "rejected_steps", "evaluations"):
+            assert getattr(part.memory, counter) == getattr(alone.parts[0].memory, counter), name
     np.testing.assert_array_equal(found, fingers.pack(moved))
-    steps = [part.memory[rosenbrock.ACCEPTED] for part in stepper.parts]
+    steps = [part.memory.accepted_steps[0] for part in stepper.parts]
     assert len(set(steps)) > 1
 
 

@@ -27,6 +27,8 @@ def rope(**options):
         ({"rope": {"bends": ["y"]}}, None, "tendons.rope.bends"),
         (None, {"y*": {}}, "joints.y*"),
         (None, {"x": {"coulomb": 2.5}}, "joints.x.coulomb"),
+        (None, {"x": {"law": "dahl"}}, "joints.x.law"),
+        (None, {"x": {"reversal_speed": 0.1}}, "joints.x.reversal_speed"),
         (None, None, "spec"),
     ],
 )

@@ -70,7 +70,7 @@ def test_the_estimated_error_of_the_main_job_has_the_size_of_its_error_and_is_in
     exact = fp.simulate(fp.load_scenario("fig6", tight))
     error = float(np.sqrt(np.mean((result.joint_position - exact.joint_position) ** 2)))
     assert 0.1 * error < result.attrs["estimated_error"] < 100.0 * error
-    assert "accuracy" not in result.attrs and "repeated" not in result.attrs
+    assert "accuracy" not in result.attrs
     assert "Estimated error of the joint angles" in summarize(result)
 
 
@@ -88,7 +88,9 @@ def hunting(tolerance):
 
 @cache
 def truth():
-    return hunting(1e-9)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)
+        return hunting(1e-9)
 
 
 def error_of(result):
@@ -110,8 +112,7 @@ def test_a_run_that_errs_by_far_more_than_its_tolerance_says_so(monkeypatch):
     monkeypatch.setattr(accuracy, "_CLOSE_TO_LOCKING", 0.0)
     with pytest.warns(AccuracyWarning, match="errs by about"):
         result = hunting(1e-4)
-    error = error_of(result)
-    assert 0.3 * error < result.attrs["estimated_error"] < 3.0 * error
+    assert 1.0 / 3.0 < result.attrs["estimated_error"] / error_of(result) < 10.0
     assert "Warning: the run errs by about" in summarize(result).replace("\n", " ")
 
 
@@ -180,7 +181,7 @@ angular_velocity = [0.001, 5, 0]
 """)
     with pytest.warns(fp.exceptions.AccuracyWarning, match="a body that tumbles"):
         result = fp.simulate(path)
-    assert result.attrs["repeated"].endswith(" of the energy stored, as none is exchanged")
+    assert " of the energy stored, as none is exchanged:" in result.attrs["account"]
 
 
 def test_an_account_that_does_not_close_is_told():
@@ -207,59 +208,30 @@ def test_an_impact_from_deep_inside_a_stiff_limiter_is_booked_to_a_hundred_thous
 
 def test_the_account_closes_where_a_limiter_that_would_have_to_pull_lets_go_of_a_joint_inside_it():
     # A limiter loses 0.8 J in the first millisecond, the last of it without a force: past the clamp of (2).
-    assert share_left_open(fp.simulate(wild_scenario(328))) < 1e-6
+    # Small errors grow beyond what a linearised flow shows.
+    with pytest.warns(AccuracyWarning, match="not judged"):
+        result = fp.simulate(wild_scenario(328))
+    assert share_left_open(result) < 1e-6
 
 
 def test_a_power_that_bends_at_the_very_end_of_a_step_is_booked_to_a_millionth():
     # A limiter lets go in the last twentieth of a step, where no node of a quadrature inside the step is.
     result = fp.simulate(wild_scenario(1146))
-    assert share_left_open(result) < 1e-6 and "repeated" not in result.attrs
+    assert share_left_open(result) < 1e-6
 
 
-def test_a_finger_that_exchanges_less_than_a_microjoule_closes_its_account_at_tolerances_that_it_names():
+def test_a_finger_that_exchanges_less_than_a_microjoule_says_that_its_account_is_open_and_closes_it_if_asked():
     scenario = wild_scenario(446)
     result = fp.simulate(scenario)
     works = [abs(values).max() for name, values in result.items() if name.startswith("energy_exchanged_")]
     assert 0.0 < sum(works) < 1e-6
-    assert share_left_open(result) < 1e-5
-    assert (result.attrs["rtol"], result.attrs["atol_scale"]) == (1e-7, 1e-7)
-    alone = fp.simulate(scenario.updated(simulation={"rtol": 1e-7, "atol_scale": 1e-7}))
-    np.testing.assert_array_equal(result.joint_position, alone.joint_position)
-    said = " ".join(summarize(result).split())
-    assert "rtol 1e-07" in said and "repeated at rtol 1e-07: at 1e-06 the energy account closes only to" in said
-    # What it is compared with is tighter again.
-    assert fp.check_convergence(scenario, result).rtol == pytest.approx(1e-9)
-
-
-def test_a_run_of_few_steps_may_take_many_times_as_many_to_close_its_account():
-    result = fp.simulate(wild_scenario(854))
-    assert result.attrs["rtol"] < 1e-7 and share_left_open(result) < 1e-5
-
-
-def test_an_account_is_closed_though_the_first_repetition_leaves_as_much_open():
-    result = fp.simulate(wild_scenario(1301))
-    assert result.attrs["rtol"] == pytest.approx(1e-8) and share_left_open(result) < 1e-5
+    assert (result.attrs["rtol"], result.attrs["atol_scale"]) == (1e-6, 1e-6)
+    assert "account" in result.attrs or share_left_open(result) < 1e-4
+    asked = fp.simulate(scenario.updated(simulation={"rtol": 1e-7, "atol_scale": 1e-7}))
+    assert share_left_open(asked) < 1e-5
 
 
 def test_no_step_passes_over_a_limiter_that_presses_in_its_middle_alone():
     # A joint creeps out of its limiter along the clamp of (2): a step begins and ends past it, and not in between.
     result = fp.simulate(wild_scenario(1451))
-    assert share_left_open(result) < 1e-5 and "repeated" not in result.attrs
-
-
-def test_the_error_of_a_repeated_run_is_its_difference_to_the_run_that_it_replaces(monkeypatch):
-    monkeypatch.setattr(accuracy, "_DOUBTED", 0.0)
-    repeated = fp.simulate(wild_scenario(446))
-    monkeypatch.setattr(accuracy, "_MOST_REPETITIONS", 0)
-    replaced = fp.simulate(wild_scenario(446))
-    assert (repeated.attrs["rtol"], replaced.attrs["rtol"]) == (1e-7, 1e-6)
-    difference = float(np.sqrt(np.mean((repeated.joint_position - replaced.joint_position) ** 2)))
-    assert repeated.attrs["estimated_error"] == pytest.approx(difference, rel=1e-9)
-
-
-def test_a_repetition_that_is_stopped_at_once_leaves_the_estimate_that_was_carried_along(monkeypatch):
-    monkeypatch.setattr(accuracy, "_DOUBTED", 0.0)
-    short = fp.load_scenario("stick_slip", {"simulation.duration": 0.1, "simulation.sample_rate": 10.0})
-    reached = [0.0]
-    result = fp.simulate(short, progress=reached.append, stop=lambda: reached[-1] >= 0.1)
-    assert result.attrs["estimated_error"] > 0.0
+    assert share_left_open(result) < 1e-5

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 import finger_pin as fp
-from finger_pin.core.stepping.rosenbrock import DONE, REJECTED, STEP
+from finger_pin.core.stepping.rosenbrock import DONE
 from finger_pin.description.loading import read_scenario
 from finger_pin.simulation.setup import Setup
 
@@ -79,10 +79,10 @@ def test_a_step_that_meets_a_plate_ends_just_behind_the_touch_without_another_tr
     part = next(each for each in Setup.of(falling).stepper().parts if len(each.objects))
     room, touch, before, rejected = part.room(1), np.sqrt(2.0 * height / gravity), 0.0, 0.0
     while part.time <= touch:
-        before, rejected = part.time, part.memory[REJECTED]
+        before, rejected = part.time, part.memory.rejected_steps[0]
         part.advance(1.0, room)
     width, fall = len(part.tables.guided), part.objects[2]
-    assert part.memory[REJECTED] == rejected
+    assert part.memory.rejected_steps[0] == rejected
     assert 0.0 < part.time - touch < 1e-3 * (part.time - before)
     np.testing.assert_allclose(part.x[width + fall], -gravity * part.time, rtol=1e-6)
     np.testing.assert_allclose(part.x[fall] - 0.005 - height, -0.5 * gravity * part.time**2, rtol=1e-6)
@@ -126,11 +126,11 @@ def test_what_sleeps_and_is_met_and_left_within_one_step_is_met():
     thin = scene(1.0, {"plate": plate(0.005, 30.0, 0.0, -1.0075), "ball": ball(30.0, 0.0, 0.0)})
     (part,) = (each for each in Setup.of(thin).stepper().parts if len(each.objects))
     width = len(part.tables.guided)
-    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.asleep[: part.tables.touching])
+    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.culled[: part.tables.touching])
     # Only the ball is integrated as exactly as ever, so that nothing else makes this step short.
     exact = np.concatenate([part.objects, width + part.objects])
     part.atol[np.setdiff1d(np.arange(len(part.atol)), exact)] = 1.0
-    part.memory[STEP] = 0.3
+    part.memory.step_size[0] = 0.3
     assert part.advance(0.6)[0] == DONE
     fall, stay = np.sqrt(2.0 * 1.0 / 9.81), np.pi * np.sqrt(0.01 / 1e5)
     up = 9.81 * (2.0 * fall + stay - 0.6)

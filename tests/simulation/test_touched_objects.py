@@ -28,7 +28,9 @@ position = [0.0, 0.0, -0.03]
 
 @pytest.fixture(scope="module")
 def pressed():
-    return fp.simulate(fp.load_scenario("press", {"simulation.duration": 3.0}))
+    # What slips and sticks multiplies small errors, as far as a linearised flow shows, beyond all bounds.
+    with pytest.warns(AccuracyWarning, match="the error of the run was not judged: small errors grow"):
+        return fp.simulate(fp.load_scenario("press", {"simulation.duration": 3.0}))
 
 
 @pytest.fixture(scope="module")

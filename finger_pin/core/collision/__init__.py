@@ -1,1 +1,1 @@
-"""Touches that no step misses: bounds of motion, contacts that are asleep, and looks within a step."""
+"""Collision detection within steps: bounds of motion, culling of contact pairs, and a search for missed contacts."""

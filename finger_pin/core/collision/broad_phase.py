@@ -1,37 +1,37 @@
-"""Contacts that are asleep: open, at rest, and too far apart to close before they are looked at again.
+"""Conservative culling of contact pairs that are open, at rest and cannot close within the next steps.
 
 Within a step the path of two bodies' relative motion is at most the sum, over the coordinates that move them against
 each other, of how far each goes to and fro times its lever. A polynomial goes no farther than its Bernstein
-coefficients do. One that is asleep keeps less than its gap, from which such paths are taken.
+coefficients do. A culled pair keeps a lower bound of its gap, from which such paths are subtracted.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import RATE
-from finger_pin.core.jit import njit_always_inline, njit_inline
-from finger_pin.core.path_tables import COLUMNS
+from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
+from finger_pin.core.path_tables import COLUMNS, Paths, PathWork
+from finger_pin.core.tables import Tables
 
-# A gap is known so well, m; and a contact is awake where so many steps as the last one might close it.
+# A gap is known so well, m; and a pair is active where so many steps as the last one might close it.
 KNOWN, _AHEAD = 1e-9, 3.0
 # Bristles bent by less, m, are straight: a ten thousandth of the diameter of an atom.
 _STRAIGHT = 1e-14
 
 
 @njit_always_inline
-def depart(tables: Any, own: Any) -> None:
-    """Note the gaps of all contacts that are awake at the beginning of a step."""
+def record_start_gaps(tables: Tables, own: PathWork) -> None:
+    """Record the gap of every active pair at the start of a step."""
     paths = tables.paths
     for e in range(paths.columns.size):
-        if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
+        if paths.columns[e] > 1 and own.culled[paths.row[e]] == 0:
             own.clear[e], own.far[e] = own.out[e, 0], distance(paths, e, own)
 
 
 @njit_inline
-def distance(paths: Any, e: int, own: Any) -> Any:
+def distance(paths: Paths, e: int, own: PathWork) -> float:
     """Return the largest distance of the core of a gap's first body from the origin of its frame, m."""
     total = 0.0
     for c in range(3):
@@ -41,8 +41,8 @@ def distance(paths: Any, e: int, own: Any) -> Any:
 
 
 @njit_always_inline
-def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
-    """Fill the Bernstein coefficients of the interpolant of a step, and the path of each of n coordinates."""
+def bound_step_motion(dense: Matrix, k: Matrix, x: Vector, end: Vector, size: int, own: PathWork) -> None:
+    """Bound the motion of a step: fill its interpolant's Bernstein coefficients and the path of each coordinate."""
     last, control = k.shape[0] - 1, own.control
     for j in range(size):
         # (1 - s) x + s end + s (1 - s) (first + s second + s^2 third)
@@ -59,8 +59,8 @@ def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
 
 
 @njit_always_inline
-def glide(x: Any, end: Any, size: int, own: Any) -> None:
-    """Fill the same for a motion along a straight line."""
+def bound_linear_motion(x: Vector, end: Vector, size: int, own: PathWork) -> None:
+    """Bound a motion along a straight line: fill its Bernstein coefficients and the path of each coordinate."""
     for j in range(size):
         for i in range(5):
             own.control[j, i] = x[j] + 0.25 * i * (end[j] - x[j])
@@ -68,13 +68,13 @@ def glide(x: Any, end: Any, size: int, own: Any) -> None:
 
 
 @njit_inline
-def path_of(tables: Any, e: int, own: Any) -> Any:
-    """Return a bound of the path of a contact's bodies against each other in the step that was traced, m."""
+def path_of(tables: Tables, e: int, own: PathWork) -> float:
+    """Return a bound of the relative path of a contact's bodies in the bounded motion, m."""
     paths, control = tables.paths, own.control
     endless = np.isinf(paths.extents[e])
     total, turned = 0.0, 0.0
     for s in range(paths.start[e], paths.start[e + 1]):
-        j, other, lever = paths.at[s], paths.against[s], paths.levers[s]
+        j, other, lever = paths.at[s], paths.opposing_coordinate[s], paths.motion_bounds[s]
         way = own.travel[j]
         if other >= 0:
             # Beside what the last stage is off: what both have in common moves neither.
@@ -89,62 +89,62 @@ def path_of(tables: Any, e: int, own: Any) -> Any:
 
 
 @njit_inline
-def widened(path: float, turned: float, far: float) -> Any:
-    """Return a path with that of a turn about a distant point, which is as far away as that and the path, m."""
+def widened(path: float, turned: float, far: float) -> float:
+    """Return a path plus that of a turn about a point as far away as the distance and the path, m."""
     if turned == 0.0:
         return path
     return (path + turned * far) / (1.0 - turned) if turned < 1.0 else np.inf
 
 
 @njit_inline
-def set_asleep(k: int, value: int, asleep: Any) -> None:
-    """Let the rows of a contact sleep, or wake them."""
+def set_culled(k: int, value: int, culled: Indices) -> None:
+    """Set or clear the flag `culled` of a contact's rows."""
     for m in range(k, k + 3):
-        asleep[m] = value
+        culled[m] = value
 
 
-def wake_all(tables: Any, own: Any) -> None:
-    """Wake all contacts, outside compiled code."""
-    own.asleep[:], own.awake[:] = 0, np.arange(own.awake.size)
-    own.awake_count[0] = tables.touching // COLUMNS
+def activate_all(tables: Tables, own: PathWork) -> None:
+    """Make all contact pairs active, outside compiled code."""
+    own.culled[:], own.active_pairs[:] = 0, np.arange(own.active_pairs.size)
+    own.active_pair_count[0] = tables.touching // COLUMNS
 
 
 @njit_inline
-def list_awake(tables: Any, own: Any) -> None:
-    """List the contacts that are awake."""
-    awake = 0
+def list_active_pairs(tables: Tables, own: PathWork) -> None:
+    """List the active contact pairs."""
+    count = 0
     for e in range(tables.touching // COLUMNS):
-        if own.asleep[tables.paths.row[e]] == 0:
-            own.awake[awake] = e
-            awake += 1
-    own.awake_count[0] = awake
+        if own.culled[tables.paths.row[e]] == 0:
+            own.active_pairs[count] = e
+            count += 1
+    own.active_pair_count[0] = count
 
 
 @njit_always_inline
-def wake(tables: Any, own: Any) -> None:
-    """Wake the contacts that may close on the way that was traced; note the paths of all."""
+def activate_near(tables: Tables, own: PathWork) -> None:
+    """Activate the pairs that may close in the bounded motion; fill the paths of all."""
     paths = tables.paths
     for e in range(paths.columns.size):
         k = paths.row[e]
         if paths.columns[e] > 1:
             own.path[e] = path_of(tables, e, own)
-            if own.asleep[k]:
+            if own.culled[k]:
                 own.ahead[e] = own.clear[e] - own.path[e]
                 if not own.ahead[e] > 0.0:
-                    set_asleep(k, 0, own.asleep)
+                    set_culled(k, 0, own.culled)
 
 
 @njit_always_inline
-def arrive(tables: Any, own: Any) -> None:
-    """Note the gaps of contacts that are awake at the end of a way that was traced."""
+def record_end_gaps(tables: Tables, own: PathWork) -> None:
+    """Record the gap of every active pair at the end of a bounded motion."""
     paths = tables.paths
     for e in range(paths.columns.size):
-        if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
+        if paths.columns[e] > 1 and own.culled[paths.row[e]] == 0:
             own.ahead[e], own.far[e] = own.out[e, 0] - KNOWN, distance(paths, e, own)
 
 
 @njit_always_inline
-def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
+def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
     for m in range(k + 1, k + 3):
         if not abs(states[tables.state[m]]) < _STRAIGHT:
@@ -155,8 +155,8 @@ def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
 
 
 @njit_inline
-def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
-    """Let contacts fall asleep or wake up at the end of a step, by bounds of their gaps there.
+def update_culling(tables: Tables, rows: Matrix, own: PathWork, states: Vector) -> bool:
+    """Cull or activate contact pairs at the end of a step, by bounds of their gaps there.
 
     Returns:
         Whether any did.
@@ -167,52 +167,52 @@ def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
         if paths.columns[e] == 1:
             continue
         near = not own.ahead[e] > _AHEAD * own.path[e]
-        if own.asleep[k]:
+        if own.culled[k]:
             own.clear[e] = own.ahead[e]
             own.far[e] += own.path[e]
             if near:
                 changed = True
-                set_asleep(k, 0, own.asleep)
+                set_culled(k, 0, own.culled)
         elif not near and own.active[e] == 0 and _straighten(tables, rows, k, states):
             own.clear[e], own.far[e] = own.ahead[e], own.far[e] + own.path[e]
             changed = True
-            set_asleep(k, 1, own.asleep)
+            set_culled(k, 1, own.culled)
     return changed
 
 
 @njit_inline
-def rouse(tables: Any, work: Any) -> None:
-    """Wake all contacts, of which nothing is known."""
+def activate_all_pairs(tables: Tables, work: Work) -> None:
+    """Make all contact pairs active, as where nothing is known of them."""
     for k in range(tables.touching):
-        work.paths.asleep[k] = 0
+        work.paths.culled[k] = 0
     for e in range(work.paths.path.size):
         work.paths.path[e] = 0.0
-    list_awake(tables, work.paths)
+    list_active_pairs(tables, work.paths)
 
 
 @njit_inline
-def wake_since(tables: Any, work: Any, first: Any, second: Any, before: Any, after: Any) -> None:
-    """Wake the contacts that may have closed since a state, from its quaternions and numbers and from those of now."""
+def activate_since(tables: Tables, work: Work, first: Matrix, second: Matrix, before: Vector, after: Vector) -> None:
+    """Activate the pairs that may have closed between two states, given with their quaternions."""
     for f in range(tables.charts.size):
         # What a free body has turned by: its angles count from its attitude.
         cosine = 0.0
         for r in range(4):
             cosine += first[f, r] * second[f, r]
         before[tables.charts[f]] = after[tables.charts[f]] - 2.0 * np.arccos(min(abs(cosine), 1.0))
-    glide(before, after, tables.parents.size, work.paths)
-    wake(tables, work.paths)
+    bound_linear_motion(before, after, tables.parents.size, work.paths)
+    activate_near(tables, work.paths)
     width = work.torque.size
     for k in range(tables.touching):
         # Bent bristles tell of a contact that was closed meanwhile.
         if tables.state[k] >= 0 and after[2 * width + tables.state[k]] != 0.0:
-            set_asleep(k - k % 3, 0, work.paths.asleep)
-    list_awake(tables, work.paths)
+            set_culled(k - k % 3, 0, work.paths.culled)
+    list_active_pairs(tables, work.paths)
 
 
 @njit_inline
-def let_sleep(tables: Any, work: Any, state: Any, before: Any) -> None:
-    """Let contacts that are far apart at a state sleep, and keep it, for `wake_since`."""
-    arrive(tables, work.paths)
-    settle(tables, work.rows, work.paths, state[2 * work.torque.size :])
+def cull_distant(tables: Tables, work: Work, state: Vector, before: Vector) -> None:
+    """Cull the pairs that are far apart at a state, and store the state for `activate_since`."""
+    record_end_gaps(tables, work.paths)
+    update_culling(tables, work.rows, work.paths, state[2 * work.torque.size :])
     for c in range(state.size):
         before[c] = state[c]

@@ -10,18 +10,22 @@ of its largest second derivative.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import KNOWN, distance, path_of, set_asleep, trace, widened
+from finger_pin.core.collision.broad_phase import KNOWN, bound_step_motion, distance, path_of, set_culled, widened
 from finger_pin.core.evaluation.law_code import SIDE
-from finger_pin.core.jit import call_at, njit_always_inline, njit_inline
-from finger_pin.core.path_tables import LOOKS
-from finger_pin.core.tables import END, FIRST, KINK
+from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
+from finger_pin.core.model import Model
+from finger_pin.core.path_tables import LOOKS, PathWork
+from finger_pin.core.stepping.rosenbrock import Integration
+from finger_pin.core.tables import END, FIRST, KINK, Tables
 
-# Of a step in which all touches have been seen, and of one with a contact that slept meanwhile.
-NOTHING, UNSEEN = 2.0, 1.0
+# Bernstein coefficients of a coordinate over a step.
+_Coefficients: TypeAlias = tuple[float, float, float, float, float]
+# Of a step in which all touches have been seen, and of one in which a culled pair may have closed.
+NOTHING, MISSED_BY_CULLING = 2.0, 1.0
 # To this distances are computed, m; and bodies that part are followed until they are so far out, or have moved by so
 # many times their distance.
 _ROUNDING, _OUT, _TIMES = 1e-13, 1e-6, 4.0
@@ -32,12 +36,12 @@ _SHARE, _GAP, _NORMAL, _FAR = 0, 1, 2, 5
 
 
 @njit_inline
-def _difference(own: Any, j: int, other: int, i: int) -> Any:
+def _difference(own: PathWork, j: int, other: int, i: int) -> float:
     return own.control[j, i] if other < 0 else own.control[j, i] - own.control[other, i]
 
 
 @njit_always_inline
-def _between(start: float, end: float, b: Any) -> Any:
+def _between(start: float, end: float, b: _Coefficients) -> _Coefficients:
     """Return the Bernstein coefficients of a part of a polynomial."""
     b0, b1, b2, b3, b4 = b
     s, c = end, 1.0 - end
@@ -52,13 +56,13 @@ def _between(start: float, end: float, b: Any) -> Any:
 
 
 @njit_always_inline
-def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
+def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> tuple[float, float]:
     """Return bounds of the path between two moments, and of its distance from its chord, m."""
     paths, far = tables.paths, max(one[_FAR], two[_FAR])
     endless = np.isinf(paths.extents[e])
     path = turned = moves = bends = turns = swing = curl = 0.0
     for s in range(paths.start[e], paths.start[e + 1]):
-        j, other, lever = paths.at[s], paths.against[s], paths.levers[s]
+        j, other, lever = paths.at[s], paths.opposing_coordinate[s], paths.motion_bounds[s]
         carries = paths.moves[s, 2] > paths.moves[s, 0] and tables.kinds[j] == 0
         if lever == 0.0 and not carries:
             continue
@@ -92,7 +96,7 @@ def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
 
 
 @njit_always_inline
-def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
+def _clear(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> bool:
     """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
     path, bend = _bounds(tables, own, e, one, two)
     if one[_GAP] < 0.0 or two[_GAP] < 0.0:
@@ -111,8 +115,8 @@ def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
 
 
 @njit_inline
-def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None:
-    """Note a gap and its slopes at a share of the step."""
+def _look(integration: Integration, model: Model, e: int, share: float, seen: Vector) -> None:
+    """Store a gap and its slopes at a share of the step."""
     own, state = model.work.paths, model.state
     s, c = share, 1.0 - share
     w0, w1, w2, w3, w4 = c**4, 4.0 * c**3 * s, 6.0 * c * c * s * s, 4.0 * c * s**3, s**4
@@ -127,7 +131,7 @@ def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None
 
 
 @njit_always_inline
-def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
+def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: Vector) -> float:
     """Return the time just after bodies have met that are apart at one moment and not at another."""
     looks = model.work.paths.looks
     early, late, middle = one[_SHARE], two[_SHARE], looks[LOOKS - 1]
@@ -141,7 +145,7 @@ def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
 
 
 @njit_inline
-def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
+def _scan(integration: Integration, model: Model, e: int, seen: bool) -> float:
     """Return the share of the step to a meeting of bodies that part again before its end, or `NOTHING`.
 
     Those that are not apart at its end have parted too, unless that is ``seen``.
@@ -171,7 +175,7 @@ def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
 
 
 @njit_always_inline
-def _pressed(tables: Any, rows: Any, k: int) -> bool:
+def _pressed(tables: Tables, rows: Matrix, k: int) -> bool:
     """Return whether a contact presses, or would if it were not held open."""
     pressed = False
     for g in range(tables.groups.shape[0]):
@@ -181,27 +185,27 @@ def _pressed(tables: Any, rows: Any, k: int) -> bool:
 
 
 @njit_always_inline
-def survey(integration: Any, model: Any) -> float:
-    """Return the share of a step that was tried after which bodies touch, and part before its end; `NOTHING` for none.
+def detect_missed_contacts(integration: Integration, model: Model) -> float:
+    """Return the share of a tried step after which bodies touch and part again before its end, or `NOTHING`.
 
-    It is `UNSEEN` if a contact slept that is closed at the end, or may be: it is awake now.
+    It is `MISSED_BY_CULLING` if a culled pair is closed at the end, or may be: it is active now.
     """
     tables, own, rows, state = model.tables, model.work.paths, model.work.rows, model.state
     paths, size, first, woken = tables.paths, tables.parents.size, NOTHING, False
-    trace(integration.dense, integration.k, integration.x, state, size, own)
+    bound_step_motion(integration.dense, integration.k, integration.x, state, size, own)
     for e in range(paths.columns.size):
         if paths.columns[e] == 1:
             continue
         k, path = paths.row[e], path_of(tables, e, own)
         own.path[e] = path
-        if own.asleep[k]:
+        if own.culled[k]:
             own.ahead[e] = own.clear[e] - path
             if own.ahead[e] > 0.0:
                 continue
             share = _scan(integration, model, e, True)
             if share < NOTHING or own.ahead[e] < 0.0:
                 # Until it is listed again it exerts nothing, whatever else the step has met.
-                set_asleep(k, 0, own.asleep)
+                set_culled(k, 0, own.culled)
                 woken = True
         else:
             start, end = own.clear[e], own.out[e, 0]
@@ -216,4 +220,4 @@ def survey(integration: Any, model: Any) -> float:
         first = min(first, share)
     for j in range(size):
         state[j] = own.control[j, 4]
-    return UNSEEN if woken else first
+    return MISSED_BY_CULLING if woken else first

@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.chains import Chains
-from finger_pin.core.evaluation.rigid_body import PRISMATIC, ROTATION, TRANSLATION
+from finger_pin.core.chains import PRISMATIC, ROTATION, TRANSLATION, Chains
 from finger_pin.mechanism.path_elements import PathElement
 from finger_pin.typing import Array
 
 
 class Carrying(NamedTuple):
-    """The motions of carried bodies by those that carry them.
+    """Chains of bodies, with the largest motion of each by the one that carries it.
 
     Attributes:
         parents: Of each body, -1 for the base.
@@ -31,7 +30,7 @@ class Carrying(NamedTuple):
 
     @classmethod
     def of(cls, chains: Chains) -> Carrying:
-        """Read chains."""
+        """Return the motions of chains."""
         parents, sliding = chains.parents.tolist(), (chains.kinds == PRISMATIC).tolist()
         slides = [float(most) if each else None for each, most in zip(sliding, chains.slides, strict=True)]
         distances = [float(np.linalg.norm(body[TRANSLATION : TRANSLATION + 3])) for body in chains.bodies]
@@ -45,10 +44,10 @@ class Carrying(NamedTuple):
         return cls(parents, slides, distances, axes)
 
 
-def levers(
+def motion_bounds(
     piece: PathElement, coordinates: NDArray[np.int64], moves: NDArray[np.int64], last: list[int], carrying: Carrying
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Return `levers` and `against` of `Paths` for the coordinates that move a gap's bodies.
+    """Return `motion_bounds` and `opposing_coordinate` of `Paths` for the coordinates that move a gap's bodies.
 
     Args:
         piece: The gap.
@@ -58,7 +57,7 @@ def levers(
         carrying: Motions by the bodies.
     """
     parents, slides, distances, axes = carrying
-    found, against = dict[int, float](), dict[int, int]()
+    found, opposing_coordinate = dict[int, float](), dict[int, int]()
     first = max(_length(end.point) for end in piece.ends) + piece.breadth
     # Of what has no end, how far the first body is counts: `far` is added.
     second = _length(piece.frame.translation) + (piece.extent if math.isfinite(piece.extent) else 0.0)
@@ -77,8 +76,8 @@ def levers(
     for one in (at for at, (one, _, two) in movers if one > two and axes[at]):
         for two in twos:
             if axes[one] == axes[two]:
-                against[one], found[two] = two, 0.0
-    others = np.array([against.get(at, -1) for at, _ in movers], dtype=np.int64)
+                opposing_coordinate[one], found[two] = two, 0.0
+    others = np.array([opposing_coordinate.get(at, -1) for at, _ in movers], dtype=np.int64)
     return np.array([found.get(at, 0.0) for at, _ in movers]), others
 
 

@@ -1,1 +1,1 @@
-"""Steps: Rosenbrock methods, ends of steps, islands, errors and slopes of a run, and other integrators."""
+"""Steps: Rosenbrock methods, ends of steps, islands, errors of a run, and other integrators."""

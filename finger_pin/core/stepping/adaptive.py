@@ -6,177 +6,178 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import list_awake, settle
-from finger_pin.core.collision.continuous import NOTHING, UNSEEN
+from finger_pin.core.collision.broad_phase import list_active_pairs, update_culling
+from finger_pin.core.collision.continuous import MISSED_BY_CULLING, NOTHING
 from finger_pin.core.evaluation.attitude_charts import rechart
 from finger_pin.core.inputs import HELD
 from finger_pin.core.jit import CompiledFunction, call_at, copy, copy_matrix, njit_always_inline, njit_inline, unpack
-from finger_pin.core.model import MODEL
+from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.error_norm import step_error, worst
-from finger_pin.core.stepping.rosenbrock import try_step
+from finger_pin.core.stepping.rosenbrock import Integration, try_step
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
 
 @njit_always_inline
-def _begin(integration: Any, model: Any, end: float) -> None:
-    """Make ready to advance to a time, with all contacts awake that may be."""
+def _begin(integration: Integration, model: Model, end: float) -> None:
+    """Prepare to advance to a time, with the present active contact pairs."""
     memory, control = integration.memory, model.control
-    list_awake(model.tables, model.work.paths)
-    memory[at.FRESH], memory[at.WHOLE] = 1.0, 0.0
+    list_active_pairs(model.tables, model.work.paths)
+    memory.fresh[0], memory.uncut_step_size[0] = 1.0, 0.0
     # Right after a full record nothing has jumped.
-    jumped = control.kind == HELD and memory[at.HELD_STEP] >= 0.0
-    memory[at.JUMPED], memory[at.HELD_STEP] = 1.0 * jumped, abs(memory[at.HELD_STEP])
-    if jumped and memory[at.HELD_STEP] > 0.0:
+    jumped = control.kind == HELD and memory.continued[0] == 0.0
+    memory.jumped[0], memory.continued[0] = 1.0 * jumped, 0.0
+    if jumped and memory.held_step_size[0] > 0.0:
         # Held tensions have just jumped: what sufficed after the last jump is the best guess.
-        memory[at.STEP], memory[at.LAST_STEP] = memory[at.HELD_STEP], 0.0
-    if memory[at.GOAL] != end:
-        memory[at.GOAL], memory[at.WINDOW_END] = end, 0.0
+        memory.step_size[0], memory.last_step_size[0] = memory.held_step_size[0], 0.0
+    if memory.goal[0] != end:
+        memory.goal[0], memory.window_end[0] = end, 0.0
 
 
 @njit_always_inline
-def _hopeless(integration: Any, width: int) -> int:
-    """Return `RUNAWAY` or `CREEPING` if there is no sense in another try, else `DONE`."""
+def _stop_status(integration: Integration, width: int) -> int:
+    """Return `RUNAWAY` or `STALLED` if the integration should be abandoned, else `DONE`."""
     memory, x = integration.memory, integration.x
-    if memory[at.FRESH] > 0.0:
+    if memory.fresh[0] > 0.0:
         for c in range(width, 2 * width):
             if abs(x[c]) > at.FASTEST:
-                memory[at.CULPRIT] = c
+                memory.limiting_state[0] = c
                 return at.RUNAWAY
-    tries = memory[at.ACCEPTED] + memory[at.REJECTED]
-    if tries >= memory[at.WINDOW_END]:
-        if memory[at.WINDOW_END] > 0.0 and memory[at.TIME] - memory[at.WINDOW_START] < at.WINDOW * at.LEAST_MEAN_STEP:
-            _blame(integration)
-            return at.CREEPING
-        memory[at.WINDOW_START], memory[at.WINDOW_END] = memory[at.TIME], tries + at.WINDOW
+    tries = memory.accepted_steps[0] + memory.rejected_steps[0]
+    if tries >= memory.window_end[0]:
+        if memory.window_end[0] > 0.0 and memory.time[0] - memory.window_start[0] < at.WINDOW * at.LEAST_MEAN_STEP:
+            _note_limiting_state(integration)
+            return at.STALLED
+        memory.window_start[0], memory.window_end[0] = memory.time[0], tries + at.WINDOW
     return at.DONE
 
 
 @njit_inline
-def _blame(integration: Any) -> None:
-    """Remember which number of the state keeps steps short."""
+def _note_limiting_state(integration: Integration) -> None:
+    """Store the index of the state with the largest error."""
     k = integration.k
-    integration.memory[at.CULPRIT] = float(worst(integration.x, k[k.shape[0] - 1], integration.rtol, integration.atol))
+    worst_state = worst(integration.x, k[k.shape[0] - 1], integration.rtol, integration.atol)
+    integration.memory.limiting_state[0] = float(worst_state)
 
 
 @njit_inline
-def try_counted(integration: Any, model: Any, h: float) -> int:
+def try_counted(integration: Integration, model: Model, h: float) -> int:
     """Try a step, and count its evaluations; return its outcome, as `try_step` does."""
     memory, tables = integration.memory, model.tables
-    fresh, count = memory[at.FRESH] > 0.0, integration.tableau.nodes.size
-    outcome = try_step(integration, model, memory[at.TIME], h, fresh)
+    fresh, count = memory.fresh[0] > 0.0, integration.tableau.nodes.size
+    outcome = try_step(integration, model, memory.time[0], h, fresh)
     if outcome == at.SENSELESS:
         for c in range(integration.x.size - 1, -1, -1):
             if not np.isfinite(integration.start[c]):
-                memory[at.CULPRIT] = c
+                memory.limiting_state[0] = c
         return outcome
-    memory[at.JACOBIANS] += fresh
-    memory[at.FACTORISATIONS] += 1
-    memory[at.EVALUATIONS] += count if fresh or tables.loaded or tables.touching > 0 else count - 1
+    memory.jacobians[0] += fresh
+    memory.factorisations[0] += 1
+    memory.evaluations[0] += count if fresh or tables.loaded or tables.touching > 0 else count - 1
     # What follows a kink follows from this try alone.
-    memory[at.FRESH], memory[at.AFTER] = 0.0, np.inf
+    memory.fresh[0], memory.max_next_step_size[0] = 0.0, np.inf
     return outcome
 
 
 @njit_inline
-def _fitting(integration: Any, error: float) -> Any:
-    """Return the factor by which a step of an error is to be longer to fit the tolerance."""
+def _fitting(integration: Integration, error: float) -> float:
+    """Return the factor by which a step is lengthened so that its error fits the tolerance."""
     if not error <= 1e30:
         return 0.1
     return min(_GROW, max(_SHRINK, _SAFETY * max(error, 1e-10) ** (-1.0 / integration.tableau.order)))
 
 
 @njit_always_inline
-def _growth(integration: Any, h: float, error: float, clipped: bool) -> Any:
-    """Return the factor by which the step after one that is taken may be longer."""
+def _growth(integration: Integration, h: float, error: float, clipped: bool) -> float:
+    """Return the factor by which the step after an accepted one may be longer."""
     memory, factor = integration.memory, _fitting(integration, error)
-    if memory[at.LAST_STEP] > 0.0 and not clipped:
+    if memory.last_step_size[0] > 0.0 and not clipped:
         # Gustafsson's predictive controller: the error's trend counts too, unless the end cut the step.
-        trend = (memory[at.LAST_ERROR] / max(error, 1e-10) ** 2) ** (1.0 / integration.tableau.order)
-        factor = min(factor, max(_SHRINK, _SAFETY * h / memory[at.LAST_STEP] * trend))
+        trend = (memory.last_error[0] / max(error, 1e-10) ** 2) ** (1.0 / integration.tableau.order)
+        factor = min(factor, max(_SHRINK, _SAFETY * h / memory.last_step_size[0] * trend))
     # Right after a rejection the step does not grow.
-    return min(factor, 1.0) if memory[at.CULPRIT] < 0.0 else factor
+    return min(factor, 1.0) if memory.rejected[0] > 0.0 else factor
 
 
 @njit_inline
-def _shorten(integration: Any, h: float, whole: float) -> None:
-    """Let the next try be shorter than the last; a step that is cut at a kink was longer than that as a whole."""
+def _shorten(integration: Integration, h: float, whole: float) -> None:
+    """Reject a try, and set the shorter size of the next one and the size before a cut at a kink."""
     memory = integration.memory
-    memory[at.REJECTED] += 1
-    memory[at.CULPRIT], memory[at.STEP], memory[at.WHOLE] = -1.0, h, whole
+    memory.rejected_steps[0] += 1
+    memory.rejected[0], memory.step_size[0], memory.uncut_step_size[0] = 1.0, h, whole
 
 
 @njit_always_inline
-def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) -> None:
-    """Count a step that is taken, and set the length of the next."""
+def _pace(integration: Integration, h: float, error: float, final: bool, clipped: bool) -> None:
+    """Count an accepted step, and set the size of the next."""
     memory = integration.memory
     factor = _growth(integration, h, error, clipped)
-    if memory[at.JUMPED] > 0.0 and not clipped:
-        memory[at.HELD_STEP] = h * min(factor, 3.0)
-    memory[at.STEP] = max(memory[at.STEP], h * factor) if final and factor >= 1.0 else h * factor
-    memory[at.LAST_STEP], memory[at.LAST_ERROR] = h, max(error, 1e-2)
-    if memory[at.WHOLE] > 0.0:
+    if memory.jumped[0] > 0.0 and not clipped:
+        memory.held_step_size[0] = h * min(factor, 3.0)
+    memory.step_size[0] = max(memory.step_size[0], h * factor) if final and factor >= 1.0 else h * factor
+    memory.last_step_size[0], memory.last_error[0] = h, max(error, 1e-2)
+    if memory.uncut_step_size[0] > 0.0:
         # The step ends at a kink; the one before it says nothing of the next, which may be as long as before.
-        memory[at.STEP], memory[at.LAST_STEP] = max(memory[at.STEP], memory[at.WHOLE]), 0.0
-    memory[at.STEP] = min(memory[at.STEP], memory[at.AFTER])
-    memory[at.ACCEPTED] += 1
-    memory[at.FRESH], memory[at.JUMPED] = 1.0, 0.0
-    memory[at.CULPRIT], memory[at.WHOLE] = max(memory[at.CULPRIT], 0.0), 0.0
+        memory.step_size[0], memory.last_step_size[0] = max(memory.step_size[0], memory.uncut_step_size[0]), 0.0
+    memory.step_size[0] = min(memory.step_size[0], memory.max_next_step_size[0])
+    memory.accepted_steps[0] += 1
+    memory.fresh[0], memory.jumped[0] = 1.0, 0.0
+    memory.rejected[0], memory.uncut_step_size[0] = 0.0, 0.0
 
 
 @njit_always_inline
-def arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
-    """Go to the end of a step, and keep it, if there is a record."""
-    x, attitude, tables, taken = integration.x, integration.attitude, model.tables, stretch.taken[0]
+def accept_step(args: Any, integration: Integration, model: Model, time: float) -> None:
+    """Move to the end of an accepted step, and store the step if there is a record."""
+    x, attitude, tables, taken = integration.x, integration.attitude, model.tables, args.taken[0]
     first = 2 * model.linear.mass.shape[0]
-    if tables.touching and settle(tables, model.work.rows, model.work.paths, model.state[first:]):
-        list_awake(tables, model.work.paths)
+    if tables.touching and update_culling(tables, model.work.rows, model.work.paths, model.state[first:]):
+        list_active_pairs(tables, model.work.paths)
         _still(integration, model, first)
     copy(model.state, x)
-    integration.memory[at.TIME] = time
-    if taken < stretch.times.size:
-        stretch.times[taken] = time
-        copy_matrix(integration.dense, stretch.dense[taken])
-        copy(x, stretch.states[taken])
-        copy(integration.kinks, stretch.branches[taken])
-        stretch.shares[taken] = integration.memory[at.PART]
-    rechart(tables, x, attitude, integration.drift)
-    if taken < stretch.times.size:
+    integration.memory.time[0] = time
+    if taken < args.times.size:
+        args.times[taken] = time
+        copy_matrix(integration.dense, args.dense[taken])
+        copy(x, args.states[taken])
+        copy(integration.kinks, args.branches[taken])
+        args.shares[taken] = integration.memory.taken_share[0]
+    rechart(tables, x, attitude, integration.global_error)
+    if taken < args.times.size:
         for f in range(attitude.shape[0]):
             for c in range(4):
-                stretch.attitudes[taken, f, c] = attitude[f, c]
-        stretch.taken[0] += 1
+                args.attitudes[taken, f, c] = attitude[f, c]
+        args.taken[0] += 1
 
 
 @njit_always_inline
-def _still(integration: Any, model: Any, first: int) -> None:
-    """Clear the rates and errors of the states of contacts that sleep, which are zero and stay so."""
+def _still(integration: Integration, model: Model, first: int) -> None:
+    """Clear the rates and errors of the states of culled contacts, which are zero and stay so."""
     tables = model.tables
     for row in range(0, tables.touching, 3):
-        if model.work.paths.asleep[row]:
+        if model.work.paths.culled[row]:
             for m in range(row + 1, row + 3):
                 c = first + tables.state[m]
-                integration.start[c] = integration.drift[c] = model.rate[c] = 0.0
+                integration.start[c] = integration.global_error[c] = model.rate[c] = 0.0
                 for j in range(integration.k.shape[0]):
                     integration.k[j, c] = 0.0
 
 
 @CompiledFunction
 def advance(address: int, end: float) -> int:
-    """Take steps of the `Stretch` at an address until a time, s, or until its record is full; return a status."""
-    stretch = unpack(address, at.STRETCH)
-    integration = unpack(stretch.integration, at.INTEGRATION)
+    """Advance the `AdvanceArgs` at an address to a time, s, or until its record is full; return a status."""
+    args = unpack(address, at.ADVANCE_ARGS)
+    integration = unpack(args.integration, at.INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
     _begin(integration, model, end)
-    while memory[at.TIME] < end:
-        status = _hopeless(integration, model.linear.mass.shape[0])
+    while memory.time[0] < end:
+        status = _stop_status(integration, model.linear.mass.shape[0])
         if status != at.DONE:
             return status
-        if stretch.times.size > 0 and stretch.taken[0] == stretch.taken[1]:
-            memory[at.HELD_STEP] = -memory[at.HELD_STEP]
+        if args.times.size > 0 and args.taken[0] == args.taken[1]:
+            memory.continued[0] = 1.0
             return at.FULL
-        time, h = memory[at.TIME], memory[at.STEP]
+        time, h = memory.time[0], memory.step_size[0]
         final = time + 1.01 * h >= end
         clipped = final and end - time < h
         if final:
@@ -189,25 +190,25 @@ def advance(address: int, end: float) -> int:
             error = step_error(integration.x, model.state, integration.k[-1], integration.rtol, integration.atol)
         if not error <= 1.0:
             _shorten(integration, h * min(_fitting(integration, error), 0.9), 0.0)
-            if memory[at.STEP] < 1e-14 * max(1.0, abs(time)):
-                _blame(integration)
+            if memory.step_size[0] < 1e-14 * max(1.0, abs(time)):
+                _note_limiting_state(integration)
                 return at.UNDERFLOW
             continue
-        memory[at.OUTCOME], memory[at.TOUCH] = outcome, NOTHING
-        call_at(integration.cut, stretch.integration, h)
-        if memory[at.KEPT] == 1.0 and model.tables.touching:
-            call_at(integration.survey, stretch.integration, h)
-        kept, part, touch = memory[at.KEPT], memory[at.PART], memory[at.TOUCH]
-        if touch == UNSEEN:
+        memory.outcome[0], memory.touch_share[0] = outcome, NOTHING
+        call_at(integration.cut, args.integration, h)
+        if memory.retry_share[0] == 1.0 and model.tables.touching:
+            call_at(integration.detect_missed_contacts, args.integration, h)
+        kept, part, touch = memory.retry_share[0], memory.taken_share[0], memory.touch_share[0]
+        if touch == MISSED_BY_CULLING:
             # The same step once more, with what slept.
-            list_awake(model.tables, model.work.paths)
-            memory[at.FRESH] = 1.0
+            list_active_pairs(model.tables, model.work.paths)
+            memory.fresh[0] = 1.0
         elif kept < 1.0 or touch < NOTHING:
             # Of a touch nothing has seen the next step's end is inside, and sees it.
-            _shorten(integration, h * (part * touch if touch < NOTHING else kept), max(memory[at.WHOLE], h))
+            _shorten(integration, h * (part * touch if touch < NOTHING else kept), max(memory.uncut_step_size[0], h))
         else:
             if integration.joints.size + integration.objects.size > 0:
-                call_at(integration.judge, stretch.integration, h)
-            arrive(stretch, integration, model, end if final and part == 1.0 else time + part * h)
+                call_at(integration.propagate_error, args.integration, h)
+            accept_step(args, integration, model, end if final and part == 1.0 else time + part * h)
             _pace(integration, h, error, final, clipped)
     return at.DONE

@@ -26,7 +26,7 @@ from finger_pin.core.threads import pool, usable_cores
 from finger_pin.typing import Array
 
 #: In the place of an end: this one is left alone.
-RESTING = -1.0
+IDLE = -1.0
 # How often a thread that has nothing to do asks whether there is something, before it sleeps: helpers, which take 50 us
 # to wake, for 0.15 ms, and the one that waits for them for 0.1 ms; and then how long, s.
 _WATCH, _PATIENCE, _NAP = 300_000.0, 50_000.0, 1e-4
@@ -38,7 +38,7 @@ class Batch(NamedTuple):
     Attributes:
         units: Addresses of what advances each, shape (m,).
         blocks: Addresses of what they are given, shape (m,).
-        ends: Until when, shape (m,), s; `RESTING` for those that are left alone.
+        ends: Until when, shape (m,), s; `IDLE` for those that are left alone.
         statuses: Filled with what they return, shape (m,).
         counts: How many are taken up, how many are done, and how many helpers watch, shape (3,).
     """
@@ -55,7 +55,7 @@ BATCH = StructType(Batch)
 
 @CompiledFunction
 def open_batch(address: int, helpers: float) -> int:
-    """Let threads take up the steppers of the `Batch` at an address; return how many helpers are to be sent."""
+    """Open the `Batch` at an address for threads; return the number of further helpers wanted."""
     taken = unpack(address, BATCH).counts.ctypes.data
     put_at(taken + 8, 0)
     put_at(taken, 0)
@@ -66,7 +66,7 @@ def open_batch(address: int, helpers: float) -> int:
 
 @CompiledFunction
 def advance_batch(address: int, patience: float) -> int:
-    """Advance what nobody has taken up yet of the `Batch` at an address; return whether all is done then."""
+    """Advance the remaining steppers of the `Batch` at an address; return whether all are done."""
     batch = unpack(address, BATCH)
     done, size = batch.counts.ctypes.data + 8, batch.ends.size
     _take_up(batch)
@@ -77,7 +77,7 @@ def advance_batch(address: int, patience: float) -> int:
 
 @CompiledFunction
 def help_batch(address: int, patience: float) -> int:
-    """Advance what nobody has taken up yet, and again whenever the `Batch` at an address is opened soon."""
+    """Advance remaining steppers of the `Batch` at an address, each time that it is opened, until patience ends."""
     batch = unpack(address, BATCH)
     taken, size, asked = batch.counts.ctypes.data, batch.ends.size, 0.0
     while asked <= patience:
@@ -99,11 +99,11 @@ def _take_up(batch: Any) -> None:
         i = add_at(taken, 1)
 
 
-class Together:
-    """Steppers that are advanced side by side, again and again; bound once."""
+class BatchStepper:
+    """Steppers that are advanced together in threads, bound once."""
 
     def __init__(self, steppers: Sequence[Stepper]) -> None:
-        """Bind steppers, whose islands, loops and knots stay the same."""
+        """Bind steppers; their islands, loops and knots must not change."""
         parts = [part for stepper in steppers for part in stepper.parts]
         self._owners = np.repeat(np.arange(len(steppers)), [len(stepper.parts) for stepper in steppers])
         self._first = np.searchsorted(self._owners, np.arange(len(steppers)))
@@ -123,17 +123,17 @@ class Together:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the steppers."""
-        return Together, (self._steppers,)
+        return BatchStepper, (self._steppers,)
 
-    def serves(self, steppers: Sequence[Stepper]) -> bool:
-        """Return whether these are its steppers, with islands, loops and knots as they were."""
+    def is_for(self, steppers: Sequence[Stepper]) -> bool:
+        """Return whether it was made for these steppers with these islands, loops and knots."""
         return [part.ready() for stepper in steppers for part in stepper.parts] == self._ready
 
     def advance(self, ends: Sequence[float]) -> list[int]:
-        """Advance each to a time, s, or not at all if that is `RESTING`; return their statuses, as `advance` does."""
+        """Advance each to a time, s, or not if that is `IDLE`; return the statuses of `advance`."""
         if len(self._ready) == 1:
             block, unit = self._ready[0]
-            return [unit(block, ends[0]) if ends[0] != RESTING else 0]
+            return [unit(block, ends[0]) if ends[0] != IDLE else 0]
         batch = self._batch
         batch.ends[:] = ends if self._whole else np.asarray(ends)[self._owners]
         for _ in range(open_batch(self._block.address, min(usable_cores(), len(self._ready)) - 1)):

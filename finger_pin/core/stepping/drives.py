@@ -17,7 +17,7 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.rosenbrock import DONE, FULL, INTEGRATION, STRETCH, TIME
+from finger_pin.core.stepping.rosenbrock import ADVANCE_ARGS, DONE, FULL, INTEGRATION
 
 
 class Drives(NamedTuple):
@@ -52,27 +52,27 @@ class Drives(NamedTuple):
     voltages: Matrix
 
 
-class Driven(NamedTuple):
-    """A stretch that is integrated while loops run.
+class AdvanceDrivenArgs(NamedTuple):
+    """Arguments of `advance_driven`: an integration while loops run.
 
     Attributes:
         drives: The loops.
-        stretch: Address of the bound `Stretch`.
+        args: Address of the bound `AdvanceArgs`.
         advance: Address of what is called to advance, and is given ``given``.
         given: Address of a block.
     """
 
     drives: Drives
-    stretch: int
+    args: int
     advance: int
     given: int
 
 
-DRIVEN = StructType(Driven)
+ADVANCE_DRIVEN_ARGS = StructType(AdvanceDrivenArgs)
 
 
 @njit_always_inline
-def _sample(drives: Any, x: Any, tension: Any) -> None:
+def _sample(drives: Any, x: Vector, tension: Vector) -> None:
     """Take a sample of all motors, and set their voltages."""
     last = drives.goals.shape[0] - 1
     k = min(drives.taken[0], last)
@@ -101,17 +101,17 @@ def advance_driven(address: int, end: float) -> int:
 
     The end and a sample there may differ by rounding.
     """
-    driven = unpack(address, DRIVEN)
-    drives, stretch = driven.drives, unpack(driven.stretch, STRETCH)
-    integration = unpack(stretch.integration, INTEGRATION)
+    driven = unpack(address, ADVANCE_DRIVEN_ARGS)
+    drives, args = driven.drives, unpack(driven.args, ADVANCE_ARGS)
+    integration = unpack(args.integration, INTEGRATION)
     model = unpack(integration.model, MODEL)
-    memory, times = integration.memory, stretch.times
+    memory, times = integration.memory, args.times
     while True:
-        if memory[TIME] * (1.0 + 1e-12) >= drives.taken[0] * drives.period:
+        if memory.time[0] * (1.0 + 1e-12) >= drives.taken[0] * drives.period:
             _sample(drives, integration.x, model.control.tension)
-        if memory[TIME] >= end:
+        if memory.time[0] >= end:
             return DONE
-        if stretch.taken[0] == stretch.taken[1] and times.size > 0:
+        if args.taken[0] == args.taken[1] and times.size > 0:
             return FULL
         status: int = call_at(driven.advance, driven.given, min(end, drives.taken[0] * drives.period))
         if status != DONE:

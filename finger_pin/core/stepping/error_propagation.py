@@ -1,4 +1,4 @@
-"""The error of a run, carried along with it: local errors, moved on by the linearised flow."""
+"""Propagation of a run's error: local errors, moved on by the linearised flow."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.core.buffers import Linear
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, njit_inline, unpack
-from finger_pin.core.model import MODEL
+from finger_pin.core.jit import CompiledFunction, Vector, call_at, njit_always_inline, njit_inline, unpack
+from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.interpolation import between
-from finger_pin.core.stepping.kink_sides import release
+from finger_pin.core.stepping.kink_sides import unfreeze_branch
+from finger_pin.core.stepping.rosenbrock import Integration
 
 # Terms of the flow. With three, vibrations that steps of a radian or two follow would be damped, and with them what a
 # loop that hunts makes of small errors; with six they are not.
@@ -27,45 +29,53 @@ _WEIGHTS = (5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0)
 
 
 @CompiledFunction
-def judge_step(address: int, h: float) -> int:
-    """Carry the error of the run of an `Integration` at an address over a step of a length, or its taken share.
+def propagate_error(address: int, h: float) -> int:
+    """Propagate the error estimate of the `Integration` at an address over the taken share of a step.
 
     Its state is that of the step's start, that of its model the one at the end.
     """
     integration = unpack(address, at.INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
-    drift, k, width = integration.drift, integration.k, model.linear.mass.shape[0]
-    part, turned, last = memory[at.PART], memory[at.SHARE] < 1.0, k.shape[0] - 1
-    again = memory[at.CULPRIT] < 0.0 and model.tables.touching > 0
-    if turned or memory[at.OUTCOME] == at.STRAYED or again:
+    global_error, k, width = integration.global_error, integration.k, model.linear.mass.shape[0]
+    part, turned, last = memory.taken_share[0], memory.left_share[0] < 1.0, k.shape[0] - 1
+    again = memory.rejected[0] > 0.0 and model.tables.touching > 0
+    if turned or memory.outcome[0] == at.LEFT_BRANCH or again:
         # The two methods may err alike.
-        defect(integration, model, memory[at.TIME], h, part)
+        defect(integration, model, memory.time[0], h, part)
     else:
-        for c in range(drift.size):
+        for c in range(global_error.size):
             k[last, c] *= part
-        for c in range(2 * width, drift.size):
+        for c in range(2 * width, global_error.size):
             k[last, c] -= integration.end[c]
-    memory[at.BEHIND] = carry(
+    memory.error_lag[0] = carry(
         model.linear,
         part * h,
         integration.tableau.gamma / part,
-        drift,
+        global_error,
         k[last],
-        memory[at.BEHIND],
+        memory.error_lag[0],
         turned,
         integration.r,
         model.rate,
     )
-    memory[at.DRIFT] += part * h * weigh(integration.joints, width, drift)
-    memory[at.OBJECT_DRIFT] += part * h * weigh(integration.objects, width, drift)
+    memory.joint_error[0] += part * h * weigh(integration.joints, width, global_error)
+    memory.object_error[0] += part * h * weigh(integration.objects, width, global_error)
     return 1
 
 
 @njit_always_inline
 def carry(
-    linear: Any, h: float, gamma: float, drift: Any, difference: Any, behind: float, turned: bool, r: Any, u: Any
-) -> Any:
-    """Carry the error so far from the middle of the last step to that of this one, and add that of this one.
+    linear: Linear,
+    h: float,
+    gamma: float,
+    global_error: Vector,
+    difference: Vector,
+    behind: float,
+    turned: bool,
+    r: Vector,
+    u: Vector,
+) -> float:
+    """Propagate the error from the middle of the last step to that of this one, and add the local error.
 
     There the linearisation at this step's start is central. One that lags behind reversals damps what vibrates. Where
     a step ends at a kink, the error is carried to its end: what comes after, such as a stiff contact, is another flow.
@@ -74,7 +84,7 @@ def carry(
         linear: Condensed for g = 1 / (h gamma).
         h: Length of the step, s.
         gamma: Of the method.
-        drift: The error so far, changed in place, shape (size,).
+        global_error: The error so far, changed in place, shape (size,).
         difference: Difference of the two methods in the step, shape (size,).
         behind: Time from where the error has been carried to, to the start of the step, s.
         turned: Whether the step ends at a kink.
@@ -84,21 +94,21 @@ def carry(
     Returns:
         Time that is left to the end of the step, s.
     """
-    size, time = drift.size, behind + 0.5 * h
+    size, time = global_error.size, behind + 0.5 * h
     sums = min(np.ceil(time / (_LONGEST * h)), _MOST_SUMS)
     time = min(time, sums * _LONGEST * h)
     for _ in range(int(sums)):
-        _flow(linear, 1.0 / (h * gamma), time / (sums * h * gamma), drift, r, u)
+        _flow(linear, 1.0 / (h * gamma), time / (sums * h * gamma), global_error, r, u)
     for c in range(size):
-        drift[c] += difference[c]
+        global_error[c] += difference[c]
     if turned:
-        _flow(linear, 1.0 / (h * gamma), 0.5 / gamma, drift, r, u)
+        _flow(linear, 1.0 / (h * gamma), 0.5 / gamma, global_error, r, u)
         time += 0.5 * h
     return behind + h - time
 
 
 @njit_always_inline
-def defect(integration: Any, model: Any, time: float, h: float, share: float) -> None:
+def defect(integration: Integration, model: Model, time: float, h: float, share: float) -> None:
     """Replace the difference of the two methods in the last stage by the integrated defect of the rates along a step.
 
     At a kink both methods err alike. What a step's interpolant should have grown by is integrated after Lobatto
@@ -114,7 +124,7 @@ def defect(integration: Any, model: Any, time: float, h: float, share: float) ->
     tableau, x, k, state, rate = integration.tableau, integration.x, integration.k, model.state, model.rate
     r, end, start, length = integration.r, integration.end, integration.start, share * h
     last, size = tableau.nodes.size - 1, x.size
-    release(model.tables, model.work.rows)
+    unfreeze_branch(model.tables, model.work.rows)
     for c in range(size):
         r[c], end[c] = state[c] - x[c] - _WEIGHTS[2] * length * start[c], state[c]
     for node in range(3):
@@ -130,7 +140,7 @@ def defect(integration: Any, model: Any, time: float, h: float, share: float) ->
 
 
 @njit_inline
-def weigh(part: Any, width: int, drift: Any) -> Any:
+def weigh(part: Any, width: int, global_error: Vector) -> float:
     """Return the mean square of some coordinates' errors, rad2 or m2, at most one.
 
     Beyond a radian the linearised flow says nothing more: their errors, and those of their velocities and of all that
@@ -138,28 +148,28 @@ def weigh(part: Any, width: int, drift: Any) -> Any:
     """
     total = 0.0
     for c in part:
-        total += drift[c] * drift[c]
+        total += global_error[c] * global_error[c]
     mean = total / max(part.size, 1)
     if mean <= 1.0:
         return mean
     share = 1.0 / np.sqrt(mean) if mean < np.inf else 0.0
     for c in part:
-        drift[c] = drift[c] * share if share > 0.0 else 0.0
-        drift[width + c] = drift[width + c] * share if share > 0.0 else 0.0
-    for c in range(2 * width, drift.size):
-        drift[c] = drift[c] * share if share > 0.0 else 0.0
+        global_error[c] = global_error[c] * share if share > 0.0 else 0.0
+        global_error[width + c] = global_error[width + c] * share if share > 0.0 else 0.0
+    for c in range(2 * width, global_error.size):
+        global_error[c] = global_error[c] * share if share > 0.0 else 0.0
     return 1.0
 
 
 @njit_inline
-def _flow(linear: Any, g: float, share: float, drift: Any, r: Any, u: Any) -> None:
+def _flow(linear: Linear, g: float, share: float, global_error: Vector, r: Vector, u: Vector) -> None:
     """Multiply by exp(share J / g) = sum of (-D)^k L_k(share), D = J / (g - J), Laguerre polynomials with alpha = -1.
 
     The last term of the sum makes it vanish for fast decay.
     """
-    size = drift.size
+    size = global_error.size
     for c in range(size):
-        u[c] = drift[c]
+        u[c] = global_error[c]
     r[size] = 0.0
     before, term, total, sign = 0.0, 1.0, 1.0, 1.0
     for k in range(1, _TERMS + 1):
@@ -172,4 +182,4 @@ def _flow(linear: Any, g: float, share: float, drift: Any, r: Any, u: Any) -> No
         solve(linear, r, u)
         for c in range(size):
             u[c] -= r[c] / g
-            drift[c] += weight * u[c]
+            global_error[c] += weight * u[c]

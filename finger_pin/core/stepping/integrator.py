@@ -1,4 +1,4 @@
-"""From a stepper to a trajectory that can be evaluated anywhere."""
+"""Integration of a stepper to a trajectory that can be evaluated anywhere."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from finger_pin.core.stepping import rosenbrock as core
-from finger_pin.core.stepping.companion_motion import Companion
 from finger_pin.core.stepping.island_motion import IslandMotion
-from finger_pin.core.stepping.island_stepper import Part, failure
+from finger_pin.core.stepping.island_stepper import IslandIntegrator, failure
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.trajectory import Statistics, Stop, Trajectory, Watch
@@ -47,15 +46,14 @@ class Moving(Protocol):
 
 
 class _Recorder:
-    """Carries one island forward and keeps its steps."""
+    """Integration of one island that keeps its steps."""
 
-    def __init__(self, stepper: Stepper, index: int, chunk: int, judged: bool = False) -> None:
+    def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
         self._stepper, self._index = stepper, index
         part = self.part
         self.start = (part.time, part.x.copy(), part.attitude.copy())
         self.room, self._chunk = part.room(_ROOM), chunk
         self.taken = 0
-        self.companion = Companion(part) if judged else None
         self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
 
     def advance(self, end: float, chunks: int = -1) -> int:
@@ -65,15 +63,13 @@ class _Recorder:
             if self.taken == len(self.room.times):
                 self.room = self.room.doubled()
             status, self.taken = part.advance(end, self.room, slice(self.taken, self.taken + self._chunk))
-            if self.companion is not None:
-                self.companion.look()
             chunks -= 1
             if status != core.FULL or self.taken >= self.most:
                 return status
         return core.DONE
 
     @property
-    def part(self) -> Part:
+    def part(self) -> IslandIntegrator:
         """The island; a stepper that is loaded on the way replaces it."""
         return self._stepper.parts[self._index]
 
@@ -117,8 +113,8 @@ def integrate_compiled(
         stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
     # Of a controller that acts in between, the linearised flow knows nothing.
     known = held is None and not stepper.driven
-    judged = known and stepper.judged and not stepper.repeats
-    recorders = [_Recorder(stepper, index, chunk, judged) for index in range(len(stepper.parts))]
+    estimate_error = known and stepper.estimate_error and not stepper.repeats
+    recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     for recorder in recorders:
         # Compiling is no part of an integration's cost.
         recorder.part.ready(recorder.room)[1].compile()
@@ -152,7 +148,7 @@ def integrate_compiled(
         statistics=_statistics(recorders, time.perf_counter() - began),
         failure=reason,
         interrupted=interrupted,
-        estimated_error=_error(stepper, recorders) if judged else np.nan,
+        estimated_error=stepper.estimated_error if estimate_error else np.nan,
         # Inputs that are held in between are not the core's own.
         islands=() if not known or stepper.held else tuple(steps),
         steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),
@@ -161,20 +157,11 @@ def integrate_compiled(
 
 def _statistics(recorders: Sequence[_Recorder], wall_time: float) -> Statistics:
     """Return the statistics of all islands together."""
-    counters = core.EVALUATIONS, core.JACOBIANS, core.FACTORISATIONS
-    evaluations, jacobians, factorisations = (
-        int(sum(recorder.part.memory[at] for recorder in recorders)) for at in counters
-    )
-    return Statistics(sum(recorder.taken for recorder in recorders), evaluations, jacobians, factorisations, wall_time)
-
-
-def _error(stepper: Stepper, recorders: Sequence[_Recorder]) -> float:
-    """Return the estimated error of a run, rad or m rms; infinite if it has grown beyond all bounds."""
-    companions = [recorder.companion for recorder in recorders if recorder.companion is not None]
-    for companion in companions:
-        companion.look(1)
-    lost = any(companion.lost for companion in companions)
-    return np.inf if lost else stepper.estimated_error
+    steps, memories = sum(recorder.taken for recorder in recorders), [recorder.part.memory for recorder in recorders]
+    evaluations = int(sum(each.evaluations[0] for each in memories))
+    jacobians = int(sum(each.jacobians[0] for each in memories))
+    factorisations = int(sum(each.factorisations[0] for each in memories))
+    return Statistics(steps, evaluations, jacobians, factorisations, wall_time)
 
 
 def joined(stepper: Stepper, steps: Sequence[Moving]) -> Callable[[Array], Array]:

@@ -74,9 +74,11 @@ class _Meetings:
             turn = float(np.linalg.norm(np.diff(packed[:, at : at + 4], axis=0), axis=1).sum())
             least = float(np.linalg.norm(packed[0, at : at + 4])) - turn
             way[i] = 2.0 * turn / least if least > 0.0 else np.inf
-        against = np.abs(steps[:, paths.at] - np.where(paths.against >= 0, steps[:, paths.against], 0.0)).sum(axis=0)
-        ways = np.where(paths.against >= 0, against, way[paths.at])
-        levers = np.where(ways > 0.0, paths.levers, 0.0)
+        against = np.abs(
+            steps[:, paths.at] - np.where(paths.opposing_coordinate >= 0, steps[:, paths.opposing_coordinate], 0.0)
+        ).sum(axis=0)
+        ways = np.where(paths.opposing_coordinate >= 0, against, way[paths.at])
+        levers = np.where(ways > 0.0, paths.motion_bounds, 0.0)
         found = np.zeros(len(paths.columns))
         for e, _ in self._pieces:
             own = slice(paths.start[e], paths.start[e + 1])

@@ -27,7 +27,7 @@ class Between(NamedTuple):
         start: State then, shape (size,).
         attitude: Quaternions of free bodies then, shape (f, 4).
         ends: Ends of the steps, shape (m,), s.
-        states: States there, before the angles of free bodies begin anew, shape (m, size).
+        states: States there, before the angles of free bodies are reset, shape (m, size).
         attitudes: Quaternions after that, shape (m, f, 4).
         dense: Coefficients of the steps' interpolants, shape (m, rows, size).
         charts: First of the three coordinates that turn each free body, shape (f,).
@@ -95,18 +95,18 @@ def begin_step(b: Any, step: int) -> None:
     for c in range(b.before.size):
         b.before[c] = b.start[c] if step == 0 else b.states[step - 1, c]
     if step > 0:
-        begin_anew(b.charts, b.width, b.before)
+        reset_angles(b.charts, b.width, b.before)
 
 
 @njit_inline
-def within(b: Any, step: int, time: float, out: Any) -> None:
+def within(b: Any, step: int, time: float, out: Vector) -> None:
     """Fill the state at a time within a step, which has begun."""
     begin = begin_of(b, step)
     between(b.before, b.states[step], b.dense[step], (time - begin) / (b.ends[step] - begin), out)
 
 
 @njit_inline
-def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None:
+def between(before: Vector, after: Vector, dense: Matrix, share: float, out: Vector) -> None:
     """Fill the state after a share of a step, from the states at its ends and its row of ``dense``."""
     last, rest = dense.shape[0] - 1, 1.0 - share
     # Whole rows at a time, so that the compiler can use vector instructions.
@@ -120,7 +120,7 @@ def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None
 
 
 @njit_always_inline
-def interpolant(tableau: Any, k: Any, dense: Any) -> None:
+def interpolant(tableau: Any, k: Matrix, dense: Matrix) -> None:
     """Fill the coefficients of a step's interpolant from its stages k, shape (s, size)."""
     for row in range(dense.shape[0]):
         bend = dense[row]
@@ -133,8 +133,8 @@ def interpolant(tableau: Any, k: Any, dense: Any) -> None:
 
 
 @njit_inline
-def cut(before: Any, after: Any, dense: Any, share: float) -> None:
-    """Let a step end after a share of it: the state at its end and its row of ``dense`` become those of that part."""
+def cut(before: Vector, after: Vector, dense: Matrix, share: float) -> None:
+    """Cut a step to a share: replace the state at its end and its row of ``dense`` by those of that part."""
     highest, inverse = share ** (dense.shape[0] + 1), 1.0 / share
     for c in range(before.size):
         bend, last, new, power = 0.0, 0.0, 0.0, highest
@@ -148,8 +148,8 @@ def cut(before: Any, after: Any, dense: Any, share: float) -> None:
 
 
 @njit_always_inline
-def begin_anew(charts: Any, width: int, x: Any) -> None:
-    """Let the angles of free bodies begin anew, as `rechart` does: their rates become the angular velocity."""
+def reset_angles(charts: Any, width: int, x: Vector) -> None:
+    """Reset the angles of free bodies to zero, as `rechart` does: their rates become the angular velocity."""
     for f in range(charts.size):
         i = charts[f]
         b, c = x[i + 1], x[i + 2]

@@ -12,7 +12,7 @@ from finger_pin.core.buffers import build_work
 from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import call, copied
 from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate_many
-from finger_pin.core.stepping.island_stepper import Part, Record
+from finger_pin.core.stepping.island_stepper import IslandIntegrator, Record
 from finger_pin.core.stepping.powers import POWERS, Powers, power_many
 from finger_pin.core.threads import in_threads, threads
 from finger_pin.mechanism.mechanism import Mechanism
@@ -21,7 +21,7 @@ from finger_pin.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class IslandMotion:
-    """The steps of one island, from a start; angles of free bodies begin anew at each.
+    """The steps of one island, from a start; angles of free bodies are reset at each.
 
     Attributes:
         mechanism: The whole.
@@ -33,7 +33,7 @@ class IslandMotion:
     """
 
     mechanism: Mechanism
-    part: Part
+    part: IslandIntegrator
     begin: float
     start: Array
     attitude: Array
@@ -103,6 +103,6 @@ class IslandMotion:
 
     @cached_property
     def _models(self) -> list[BoundModel]:
-        """Models that serve, one for each thread, the first the island's own: it goes no further."""
+        """Models, one for each thread; the first is the island's own, which is integrated no further."""
         self.part.work.rows[SIDE] = 0.0
         return [self.part.model]

@@ -1,4 +1,4 @@
-"""One island under way: bound to compiled code, with the memory that a continued integration needs."""
+"""Adaptive integrator of one island, bound to compiled code."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 
 from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
-from finger_pin.core.collision.broad_phase import wake_all
+from finger_pin.core.chains import PRISMATIC
+from finger_pin.core.collision.broad_phase import activate_all
 from finger_pin.core.evaluation.attitude_charts import place_all
-from finger_pin.core.evaluation.rigid_body import PRISMATIC
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import Block, CompiledFunction, copied, pack
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.adaptive import advance
-from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven
-from finger_pin.core.stepping.error_propagation import judge_step
+from finger_pin.core.stepping.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
+from finger_pin.core.stepping.error_propagation import propagate_error
 from finger_pin.core.stepping.islands import Island
-from finger_pin.core.stepping.knots import KNOTTED, Knotted, advance_knotted
-from finger_pin.core.stepping.repetition import REPETITION, Repetition, Steps, repeat_steps
-from finger_pin.core.stepping.step_cuts import cut_step, survey_step
+from finger_pin.core.stepping.knots import ADVANCE_KNOTTED_ARGS, AdvanceKnottedArgs, advance_knotted
+from finger_pin.core.stepping.repetition import REPEAT_STEPS_ARGS, RepeatStepsArgs, Steps, repeat_steps
+from finger_pin.core.stepping.step_cuts import cut_step, find_missed_contacts
 from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.core.tables import Tables
 from finger_pin.laws.law import ContactLaw, Law
@@ -38,7 +38,7 @@ class Record:
 
     Attributes:
         times: Ends of the steps, shape (m,), s.
-        states: States there, before the angles of free bodies begin anew, shape (m, size).
+        states: States there, before the angles of free bodies are reset, shape (m, size).
         attitudes: Quaternions after that, shape (m, f, 4).
         dense: Coefficients of the steps' interpolants, shape (m, rows, size).
         shares: Of the lengths that were tried the shares that were taken, shape (m,).
@@ -54,7 +54,7 @@ class Record:
 
     @classmethod
     def of(cls, count: int, size: int, free: int, rows: int, kinks: int) -> Record:
-        """Make room."""
+        """Return an empty record."""
         shapes = (), (size,), (free, 4), (rows, size), (), (kinks,)
         return cls(*(np.empty((count, *shape)) for shape in shapes))
 
@@ -67,8 +67,8 @@ class Record:
         return Record(*(np.concatenate([part, np.empty_like(part)]) for part in vars(self).values()))
 
 
-class Part:
-    """One island under way.
+class IslandIntegrator:
+    """Adaptive integrator of one island.
 
     Attributes:
         island: Its indices in the whole.
@@ -79,8 +79,8 @@ class Part:
         x: Its packed state, shape (size,); the angles of free bodies since the last step.
         attitude: Quaternions of its free bodies, shape (f, 4).
         atol: Absolute tolerances, shape (size,).
-        memory: Time, step size, error history and counters.
-        judged: Whether its error is estimated.
+        memory: Time, step size, error history and counters; views of one vector.
+        estimate_error: Whether its error is estimated.
         joints: Coordinates whose error is; none of what is moved along paths.
         objects: Coordinates of free objects, likewise.
         drives: Loops of motors in position drive, which sample on the way; None for none.
@@ -104,7 +104,7 @@ class Part:
         rtol: float,
         atol: Array,
         memory: Array,
-        judged: bool = True,
+        estimate_error: bool = True,
     ) -> None:
         """Bind everything; arrays are taken as they are, not copied."""
         self.island, self.laws = island, laws
@@ -119,25 +119,26 @@ class Part:
             attitude=attitude,
             rtol=rtol,
             atol=atol,
-            memory=memory,
+            memory=core.StepMemory.from_vector(memory),
             k=np.zeros((len(tableau.nodes), len(x))),
             start=np.zeros(len(x)),
             r=np.zeros(len(x) + 1),
             end=np.zeros(len(x)),
             dense=np.zeros((len(tableau.dense), len(x))),
-            drift=np.zeros(len(x)),
+            global_error=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
-            joints=np.flatnonzero(~of_objects & led & judged),
-            objects=np.flatnonzero(of_objects & led & judged),
+            joints=np.flatnonzero(~of_objects & led & estimate_error),
+            objects=np.flatnonzero(of_objects & led & estimate_error),
             cut=cut_step.address,
-            survey=survey_step.address if tables.touching else 0,
-            judge=judge_step.address if judged else 0,
+            detect_missed_contacts=find_missed_contacts.address if tables.touching else 0,
+            propagate_error=propagate_error.address if estimate_error else 0,
         )
         self._block = pack(self._bound, core.INTEGRATION)
         self.joints, self.objects = self._bound.joints, self._bound.objects
         place_all(tables, attitude)
-        self.tables, self.control, self.tableau, self.judged = tables, control, tableau, judged
-        self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
+        self.tables, self.control, self.tableau, self.estimate_error = tables, control, tableau, estimate_error
+        self.x, self.attitude, self.atol, self.memory = x, attitude, atol, self._bound.memory
+        self._memory = memory
         self._nothing, self._taken = self.room(0), np.zeros(2, dtype=np.int64)
         # A record, loops, knots and steps that compiled code was given last; and the blocks that hold them, what they
         # are for last.
@@ -155,14 +156,14 @@ class Part:
         return float(self._bound.rtol)
 
     @property
-    def drift(self) -> Array:
+    def global_error(self) -> Array:
         """Estimate of the error of its state, carried along, shape (size,); no copy."""
-        return self._bound.drift
+        return self._bound.global_error
 
     @property
     def time(self) -> float:
         """Time reached, s."""
-        return float(self.memory[core.TIME])
+        return float(self.memory.time[0])
 
     def advance(self, end: float, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, int]:
         """Integrate to a time, or until rows of a record are full; return the status and the row after the last one."""
@@ -170,7 +171,7 @@ class Part:
         return unit(block, end), int(self._taken[0])
 
     def ready(self, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, CompiledFunction]:
-        """Return the address of the `Stretch` to be advanced, and the unit that does it; into a record if given."""
+        """Return the address of the `AdvanceArgs` to be advanced, and the unit that does it; into a record if given."""
         own = self._nothing if record is None else record
         self._taken[:] = rows.indices(len(own.times))[:2]
         self._place(own)
@@ -182,46 +183,49 @@ class Part:
         if before is record and drives is self.drives and knots is self.knots and steps is self.steps:
             return
         room = record.times, record.states, record.attitudes, record.dense, record.shares, record.branches
-        stretch = pack(core.Stretch(self._block.address, *room, self._taken), core.STRETCH)
-        self._placed, self._blocks, self._advance = (record, self.drives, self.knots, self.steps), [stretch], advance
+        args = pack(core.AdvanceArgs(self._block.address, *room, self._taken), core.ADVANCE_ARGS)
+        self._placed, self._blocks, self._advance = (record, self.drives, self.knots, self.steps), [args], advance
         if self.steps is not None:
-            repetition = Repetition(self.steps, np.zeros(1, dtype=np.int64), stretch.address)
-            self._blocks.append(pack(repetition, REPETITION))
+            repetition = RepeatStepsArgs(self.steps, np.zeros(1, dtype=np.int64), args.address)
+            self._blocks.append(pack(repetition, REPEAT_STEPS_ARGS))
             self._advance = repeat_steps
         if self.drives is not None:
-            driven = Driven(self.drives, stretch.address, self._advance.address, self._blocks[-1].address)
-            self._blocks.append(pack(driven, DRIVEN))
+            driven = AdvanceDrivenArgs(self.drives, args.address, self._advance.address, self._blocks[-1].address)
+            self._blocks.append(pack(driven, ADVANCE_DRIVEN_ARGS))
             self._advance = advance_driven
         if len(self.knots):
             passed, given = np.zeros(1, dtype=np.int64), self._blocks[-1].address
-            knotted = Knotted(self.knots, passed, stretch.address, self._advance.address, given)
-            self._blocks.append(pack(knotted, KNOTTED))
+            knotted = AdvanceKnottedArgs(self.knots, passed, args.address, self._advance.address, given)
+            self._blocks.append(pack(knotted, ADVANCE_KNOTTED_ARGS))
             self._advance = advance_knotted
 
     def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
-        """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""
+        """Continue from another state, at the same time or another one, s, with no memory of earlier steps."""
         self.x[:], self.attitude[:] = x, attitude
-        wake_all(self.tables, self.work.paths)
+        activate_all(self.tables, self.work.paths)
         place_all(self.tables, self.attitude)
-        self.memory[[core.LAST_STEP, core.LAST_ERROR, core.CULPRIT, core.HELD_STEP]] = 0.0
-        self.memory[core.STEP] = FIRST_STEP
+        memory = self.memory
+        for each in (memory.last_step_size, memory.last_error, memory.rejected, memory.limiting_state):
+            each[0] = 0.0
+        memory.held_step_size[0] = memory.continued[0] = 0.0
+        memory.step_size[0] = FIRST_STEP
         if time is not None:
             # Steps are counted from here on, for those that creep.
-            self.memory[[core.TIME, core.WINDOW_START, core.WINDOW_END]] = time, 0.0, 0.0
+            memory.time[0], memory.window_start[0], memory.window_end[0] = time, 0.0, 0.0
             if self.drives is not None:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
 
     def renew(self, tables: Tables, control: InputTable, x: Array, attitude: Array, atol: Array) -> None:
-        """Begin anew at time zero with other numbers, which fit, as a new part of them would."""
+        """Reset to time zero and other numbers of the same shapes, as a new integrator of them."""
         self.model.renew(tables, control)
-        self.atol[:], self.memory[:], self._bound.drift[:] = atol, 0.0, 0.0
-        self.drives, self.knots, self.steps = None, Part.knots, None
+        self.atol[:], self._memory[:], self._bound.global_error[:] = atol, 0.0, 0.0
+        self.drives, self.knots, self.steps = None, IslandIntegrator.knots, None
         self.restart(x, attitude, 0.0)
 
-    def with_loads(self, loaded: bool) -> Part:
-        """Return the same part that minds forces at the tips, or not."""
+    def with_loads(self, loaded: bool) -> IslandIntegrator:
+        """Return the same integrator with or without forces at the tips."""
         pack = self._bound
-        return Part(
+        return IslandIntegrator(
             self.island,
             self.laws,
             self.tables._replace(loaded=loaded),
@@ -231,25 +235,25 @@ class Part:
             pack.tableau,
             pack.rtol,
             pack.atol,
-            pack.memory,
-            self.judged,
+            self._memory,
+            self.estimate_error,
         )
 
     @property
-    def moment(self) -> tuple[Array, ...]:
-        """The state and memory that later steps depend on; arrays of its own, which may be filled."""
-        return self.x, self.attitude, self.memory, self.control.tension, self.tables.tip_force, self.tables.bodies
+    def state_snapshot(self) -> tuple[Array, ...]:
+        """The arrays that later steps depend on; no copies, they may be filled."""
+        return self.x, self.attitude, self._memory, self.control.tension, self.tables.tip_force, self.tables.bodies
 
     def repeat(self, steps: Steps) -> None:
-        """Take given steps from now on, whatever their errors; of other rows than these the branches do not matter."""
+        """Take given steps from now on, whatever their errors; branches of another number of rows are ignored."""
         if steps.branches.shape[1] != len(self._bound.kinks):
             steps = steps._replace(branches=np.zeros((len(steps.ends), 0)))
         self.steps = steps
 
-    def copy(self, judged: bool | None = None, tolerances: float = 1.0) -> Part:
-        """Return an independent part at a share of its tolerances; its error is estimated, if not told, as here."""
+    def copy(self) -> IslandIntegrator:
+        """Return an independent integrator that continues with the same bits."""
         pack = self._bound
-        return Part(
+        return IslandIntegrator(
             self.island,
             self.laws,
             copied(self.tables),
@@ -257,10 +261,10 @@ class Part:
             pack.x.copy(),
             pack.attitude.copy(),
             pack.tableau,
-            pack.rtol * tolerances,
-            pack.atol * tolerances,
-            pack.memory.copy(),
-            self.judged if judged is None else judged,
+            pack.rtol,
+            pack.atol.copy(),
+            self._memory.copy(),
+            self.estimate_error,
         )
 
 
@@ -274,12 +278,12 @@ def object_coordinates(tables: Tables) -> NDArray[np.bool_]:
     return found
 
 
-def failure(part: Part, status: int, names: list[str]) -> str:
+def failure(part: IslandIntegrator, status: int, names: list[str]) -> str:
     """Return the status of an island in words; empty if nothing failed."""
-    culprit = names[max(int(part.memory[core.CULPRIT]), 0)]
+    culprit = names[int(part.memory.limiting_state[0])]
     if status == core.UNDERFLOW:
         return f"the step size fell below the resolution of time; the error is largest in {culprit}"
-    if status == core.CREEPING:
+    if status == core.STALLED:
         return (
             f"the last {core.WINDOW} steps advanced by less than {core.LEAST_MEAN_STEP:g} s each; "
             f"the error is largest in {culprit}"

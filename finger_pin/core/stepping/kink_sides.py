@@ -1,4 +1,4 @@
-"""Rows held on one side of their law's kink during a step, so that its rates are smooth.
+"""Rows frozen on one branch of their law during a step, so that its rates are smooth.
 
 Those that bend with the sign of their speed are held and released here; where they turn round, `reversals` says.
 """
@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import SIDE, SPEED
-from finger_pin.core.jit import call_at, copy, njit_always_inline, njit_inline
+from finger_pin.core.jit import Matrix, Vector, call_at, copy, njit_always_inline, njit_inline
+from finger_pin.core.model import Model
 from finger_pin.core.stepping.error_norm import step_error
 from finger_pin.core.stepping.interpolation import between, cut
-from finger_pin.core.tables import END, FIRST, KINK
+from finger_pin.core.tables import END, FIRST, KINK, Tables
 
 # A step after a kink that is rejected costs as much as two that grow.
 _SHARE = 0.25
@@ -23,8 +24,8 @@ _BEHIND, _WANTED, _TRIALS = 0.02, 0.5, 6
 
 
 @njit_inline
-def release(tables: Any, rows: Any) -> None:
-    """Let all rows follow the motion."""
+def unfreeze_branch(tables: Tables, rows: Matrix) -> None:
+    """Let the branches of all rows follow the motion."""
     for g in range(tables.groups.shape[0]):
         if tables.groups[g, KINK] >= 0:
             for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
@@ -32,8 +33,8 @@ def release(tables: Any, rows: Any) -> None:
 
 
 @njit_always_inline
-def hold(tables: Any, rows: Any, kinks: Any, given: bool) -> None:
-    """Hold all rows on the present side of their kink, or on that which the signs of ``kinks`` tell."""
+def freeze_branch(tables: Tables, rows: Matrix, kinks: Vector, given: bool) -> None:
+    """Freeze all rows on the present branch of their law, or on that given by the signs of ``kinks``."""
     for g in range(tables.groups.shape[0]):
         column = tables.groups[g, KINK]
         if column >= 0:
@@ -44,8 +45,8 @@ def hold(tables: Any, rows: Any, kinks: Any, given: bool) -> None:
 
 
 @njit_inline
-def leaving(tables: Any, rows: Any, kinks: Any) -> Any:
-    """Return the least share of the way to here after which a held row leaves its side; above 1 if none has so far.
+def leaving_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
+    """Return the least share of the way to here after which a frozen row leaves its branch, above 1 if none has.
 
     It is taken to go on at its mean rate.
     """
@@ -61,14 +62,14 @@ def leaving(tables: Any, rows: Any, kinks: Any) -> Any:
 
 
 @njit_inline
-def strayed(tables: Any, rows: Any, kinks: Any) -> Any:
-    """Return the least share of the step after which a held row has left its side; 1 if none has."""
-    return min(1.0, leaving(tables, rows, kinks))
+def left_branch(tables: Tables, rows: Matrix, kinks: Vector) -> Any:
+    """Return the least share of the step after which a frozen row has left its branch, 1 if none has."""
+    return min(1.0, leaving_share(tables, rows, kinks))
 
 
 @njit_inline
-def turn(tables: Any, rows: Any, kinks: Any) -> None:
-    """Turn the held rows that have left their side."""
+def switch_left_branches(tables: Tables, rows: Matrix, kinks: Vector) -> None:
+    """Switch the branch of the frozen rows that have left theirs."""
     for g in range(tables.groups.shape[0]):
         column = tables.groups[g, KINK]
         if column > SPEED:
@@ -78,24 +79,24 @@ def turn(tables: Any, rows: Any, kinks: Any) -> None:
 
 
 @njit_inline
-def price(integration: Any, model: Any, time: float, h: float) -> Any:
-    """Return the error made by rows that are held on a side that they have left, as a multiple of the tolerance."""
+def branch_error(integration: Any, model: Model, time: float, h: float) -> float:
+    """Return the error of rows that are frozen on a branch that they have left, as a multiple of the tolerance."""
     tables, rows, kinks, size = model.tables, model.work.rows, integration.kinks, integration.x.size
     r = integration.r
     call_at(model.evaluate, integration.model, time)
-    turn(tables, rows, kinks)
+    switch_left_branches(tables, rows, kinks)
     for c in range(size):
         r[c] = model.rate[c]
     call_at(model.evaluate, integration.model, time)
-    turn(tables, rows, kinks)
+    switch_left_branches(tables, rows, kinks)
     for c in range(size):
         r[c] = h * (model.rate[c] - r[c])
     return step_error(integration.x, model.state, r, integration.rtol, integration.atol)
 
 
 @njit_always_inline
-def past_kink(h: float, share: float, cost: float, rtol: float, tableau: Any) -> Any:
-    """Return the greatest length of the step after a kink, s.
+def max_step_after_event(h: float, share: float, cost: float, rtol: float, tableau: Any) -> float:
+    """Return the maximum step size after a branch change, s.
 
     Stiff methods damp what they are too long for, and both of a pair alike: of a vibration of y radians in a step the
     difference is at most radian y^order, and falls again as 1 / y. An impact would be swallowed. So the step has a
@@ -109,8 +110,8 @@ def past_kink(h: float, share: float, cost: float, rtol: float, tableau: Any) ->
 
 
 @njit_always_inline
-def passed(integration: Any, model: Any, time: float, h: float) -> Any:
-    """Return the share of a step after which a row has left its side in the middle, if that costs too much; else 1.
+def midpoint_violation(integration: Any, model: Model, time: float, h: float) -> float:
+    """Return the share of a step after which a row has left its branch at too great an error, else 1.
 
     A row that is back at the end would not be seen there.
     """
@@ -118,8 +119,8 @@ def passed(integration: Any, model: Any, time: float, h: float) -> Any:
     copy(state, end)
     between(x, end, integration.dense, 0.5, state)
     call_at(model.evaluate, integration.model, time + 0.5 * h)
-    share = strayed(model.tables, model.work.rows, integration.kinks)
-    if share < 1.0 and price(integration, model, time + 0.5 * h, h) <= 1.0:
+    share = left_branch(model.tables, model.work.rows, integration.kinks)
+    if share < 1.0 and branch_error(integration, model, time + 0.5 * h, h) <= 1.0:
         share = 1.0
     copy(end, state)
     call_at(model.evaluate, integration.model, time + h)
@@ -127,8 +128,10 @@ def passed(integration: Any, model: Any, time: float, h: float) -> Any:
 
 
 @njit_always_inline
-def crossing(integration: Any, model: Any, time: float, h: float, share: float, cost: float) -> Any:
-    """Let a step end a little behind the first row's leaving its side, at the interpolant's state.
+def locate_event(
+    integration: Any, model: Model, time: float, h: float, share: float, cost: float
+) -> tuple[float, float, float, int]:
+    """End a step a little behind the first branch change, at the interpolant's state.
 
     Args:
         integration: The integration; its states are those of the step's start.
@@ -136,7 +139,7 @@ def crossing(integration: Any, model: Any, time: float, h: float, share: float, 
         time: Of the start, s.
         h: Length of the step that was tried, s.
         share: Of it after which a row leaves its side, if it does so at a constant rate.
-        cost: At the end, as from `price`.
+        cost: At the end, as from `branch_error`.
 
     Returns:
         The share that is taken, 1 if no end was found; the share of that after which the row has left its side; the
@@ -150,10 +153,10 @@ def crossing(integration: Any, model: Any, time: float, h: float, share: float, 
         between(x, end, integration.dense, at, state)
         call_at(model.evaluate, integration.model, time + at * h)
         count += 1
-        share = leaving(model.tables, model.work.rows, integration.kinks)
+        share = leaving_share(model.tables, model.work.rows, integration.kinks)
         if share < 1.0:
             count += 2
-            cost = price(integration, model, time + at * h, at * h)
+            cost = branch_error(integration, model, time + at * h, at * h)
             if cost <= 1.0:
                 copy(end, state)
                 cut(x, state, integration.dense, at)

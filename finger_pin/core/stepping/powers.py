@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from finger_pin.core.collision.broad_phase import let_sleep, rouse, wake_since
+from finger_pin.core.buffers import Work
+from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.inputs import inputs
 from finger_pin.core.evaluation.signals import book, book_moved, exert_alone
@@ -20,6 +21,7 @@ from finger_pin.core.jit import (
 )
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.interpolation import Between, step_at, within
+from finger_pin.core.tables import Tables
 
 
 class Powers(NamedTuple):
@@ -48,7 +50,7 @@ def _attitude(b: Any, step: int) -> Any:
 
 
 @njit_always_inline
-def _keep(tables: Any, work: Any, state: Any, booked: Any, out: Any) -> None:
+def _keep(tables: Tables, work: Work, state: Vector, booked: Any, out: Vector) -> None:
     """Fill the powers of the rows, which are booked last, and that of the forces at the tips."""
     count, width = out.size - 1, work.torque.size
     for i in range(count):
@@ -67,7 +69,7 @@ def power_many(address: int, _time: float) -> int:
     tables, work, state = model.tables, model.work, model.state
     width, step, last = work.torque.size, -1, -1
     moving = model.base_power != 0 or work.guide.size > 0
-    rouse(tables, work)
+    activate_all_pairs(tables, work)
     for k in range(b.times.size):
         time, last = b.times[k], step
         step = step_at(b, time, step)
@@ -77,15 +79,15 @@ def power_many(address: int, _time: float) -> int:
         if moving:
             call_at(model.evaluate, asked.model, time)
         else:
-            # Contacts far apart sleep from state to state; what is left in ``rate`` is the state before.
+            # Contacts far apart are culled from state to state; what is left in ``rate`` is the state before.
             if tables.touching > 0 and k > 0:
-                wake_since(tables, work, _attitude(b, last), _attitude(b, step), model.rate, state)
+                activate_since(tables, work, _attitude(b, last), _attitude(b, step), model.rate, state)
             inputs(model.control, time, state[:width], state[width : 2 * width], work.command)
             exert_alone(model, asked.model, time)
         book(tables, work, asked.booked)
         if moving:
             book_moved(model, asked.model, True, asked.booked)
         elif tables.touching > 0:
-            let_sleep(tables, work, state, model.rate)
+            cull_distant(tables, work, state, model.rate)
         _keep(tables, work, state, asked.booked, asked.powers[k])
     return 1

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import rouse
+from finger_pin.core.collision.broad_phase import activate_all_pairs
 from finger_pin.core.jit import CompiledFunction, Indices, Matrix, StructType, Vector, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
-from finger_pin.core.stepping.adaptive import arrive, try_counted
+from finger_pin.core.stepping.adaptive import accept_step, try_counted
 from finger_pin.core.stepping.interpolation import cut, interpolant
 from finger_pin.typing import Array
 
@@ -34,34 +34,34 @@ class Steps(NamedTuple):
         return cls(np.array(ends, dtype=float), np.ones(len(ends)), np.zeros((len(ends), 0)))
 
 
-class Repetition(NamedTuple):
-    """A stretch that is integrated on given steps, whatever their errors.
+class RepeatStepsArgs(NamedTuple):
+    """Arguments of `repeat_steps`: an integration on given steps, whatever their errors.
 
     Attributes:
         steps: The steps.
         passed: Memory, how many are behind, shape (1,).
-        stretch: Address of the bound `Stretch`.
+        args: Address of the bound `AdvanceArgs`.
     """
 
     steps: Steps
     passed: Indices
-    stretch: int
+    args: int
 
 
-REPETITION = StructType(Repetition)
+REPEAT_STEPS_ARGS = StructType(RepeatStepsArgs)
 
 
 @CompiledFunction
 def repeat_steps(address: int, end: float) -> int:
-    """Advance the `Repetition` at an address as `adaptive.advance` does; a step that a new end cuts is taken whole."""
-    repetition = unpack(address, REPETITION)
-    steps, passed, stretch = repetition.steps, repetition.passed, unpack(repetition.stretch, at.STRETCH)
-    integration = unpack(stretch.integration, at.INTEGRATION)
+    """Advance the `RepeatStepsArgs` at an address to a time; a step that a new end cuts is taken whole."""
+    repeat = unpack(address, REPEAT_STEPS_ARGS)
+    steps, passed, args = repeat.steps, repeat.passed, unpack(repeat.args, at.ADVANCE_ARGS)
+    integration = unpack(args.integration, at.INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
-    while memory[at.TIME] < end:
-        if stretch.times.size > 0 and stretch.taken[0] == stretch.taken[1]:
+    while memory.time[0] < end:
+        if args.times.size > 0 and args.taken[0] == args.taken[1]:
             return at.FULL
-        time = memory[at.TIME]
+        time = memory.time[0]
         while passed[0] < steps.ends.size - 1 and steps.ends[passed[0]] <= time:
             passed[0] += 1
         step, goal, share = passed[0], end, 1.0
@@ -72,8 +72,8 @@ def repeat_steps(address: int, end: float) -> int:
             for k in range(integration.kinks.size):
                 integration.kinks[k] = steps.branches[step, k]
         # What another run could cull may be close in this one.
-        rouse(model.tables, model.work)
-        memory[at.FRESH], memory[at.FROZEN], memory[at.PART] = 1.0, 1.0 * frozen, share
+        activate_all_pairs(model.tables, model.work)
+        memory.fresh[0], memory.frozen[0], memory.taken_share[0] = 1.0, 1.0 * frozen, share
         outcome = try_counted(integration, model, (goal - time) / share)
         if outcome == at.SENSELESS:
             return at.NOT_FINITE
@@ -82,6 +82,6 @@ def repeat_steps(address: int, end: float) -> int:
         interpolant(integration.tableau, integration.k, integration.dense)
         if share < 1.0:
             cut(integration.x, model.state, integration.dense, share)
-        arrive(stretch, integration, model, goal)
-        memory[at.ACCEPTED] += 1
+        accept_step(args, integration, model, goal)
+        memory.accepted_steps[0] += 1
     return at.DONE

@@ -1,4 +1,4 @@
-"""Integration of x' = f(t, x) by scipy's stiff solvers or CVODE: the textbook path, and a reference for any other."""
+"""Integration of x' = f(t, x) by scipy's stiff solvers: the readable path, and a reference for the compiled one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import scipy
 
-from finger_pin.core.stepping.cvode import Cvode, check_installed
 from finger_pin.core.stepping.trajectory import Meeting, Statistics, Stop, Trajectory, Watch
 from finger_pin.typing import Array
 
@@ -31,28 +30,23 @@ def integrate(
     watch: Watch | None = None,
     stop: Stop | None = None,
 ) -> Trajectory:
-    """Integrate from time zero with one of scipy's methods, or CVODE.
+    """Integrate from time zero with one of scipy's methods.
 
     Args:
         rhs: f(t, x), pure.
         start: x(0), shape (size,).
         duration: s.
-        method: ``Radau``, ``BDF``, ``LSODA`` or ``CVODE``.
+        method: ``Radau``, ``BDF`` or ``LSODA``.
         rtol: Relative tolerance.
         atol: Absolute tolerance, shape (size,).
         longest: The longest step, s.
         meeting: Finds when bodies meet within a step that does not show it: it is taken again, to end there.
         watch: Called with the simulated time and the state after every step.
         stop: Asked after every step; true ends the integration there.
-
-    Raises:
-        InputError: If the package of CVODE is not installed.
     """
-    if method == "CVODE":
-        check_installed()
     began = time.perf_counter()
     system, run = _System(rhs), _Steps([0.0], [], [])
-    kind = Cvode if method == "CVODE" else getattr(scipy.integrate, method)
+    kind = getattr(scipy.integrate, method)
     options = {"jac": _Jacobian(system, atol / rtol)} if method in ("Radau", "BDF") else {}
 
     def solver(x: Array, end: float) -> Any:

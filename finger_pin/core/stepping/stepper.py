@@ -1,4 +1,4 @@
-"""A state that the compiled integrator carries forward, island by island, with its steps' memory."""
+"""Integrator of a mechanism, one island at a time."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.collision.broad_phase import wake_all
+from finger_pin.core.collision.broad_phase import activate_all
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.inputs import HELD, InputTable
 from finger_pin.core.jit import alike, copied, fits, numbered, taken
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.drives import Drives
-from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
+from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, failure
 from finger_pin.core.stepping.islands import Island, find_islands, groups_of, select, select_control, wiring
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
@@ -25,8 +25,8 @@ from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 
-#: Of every island: whether it minds forces at tips, its loops of motors, its knots, and arrays that steps change.
-Moments = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
+#: Snapshot of every island: tip-force flag, drive loops, knots, state arrays.
+Snapshot = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
 
@@ -37,12 +37,12 @@ _TWICE = 2.0
 
 
 class Stepper:
-    """A mechanism under way.
+    """Integrator of a mechanism, one island at a time.
 
     Attributes:
         mechanism: The mechanism.
         parts: Its islands.
-        judged: Whether its error is estimated.
+        estimate_error: Whether its error is estimated.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Stepper:
         force: Array | None = None,
         time: float = 0.0,
         *,
-        judged: bool = True,
+        estimate_error: bool = True,
     ) -> None:
         """Start from a state.
 
@@ -69,22 +69,23 @@ class Stepper:
             atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
             force: At the tips, shape (3,) or (t, 3), N, base frame.
             time: When, s.
-            judged: Whether `estimated_error` will be asked for, which takes a tenth of the time.
+            estimate_error: Whether `estimated_error` will be asked for, which takes a tenth of the time.
         """
-        self.judged = judged
+        self.estimate_error = estimate_error
         tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
         self._charts, self._width, self._wiring = Charts.of(mechanism), mechanism.coordinates, wiring(tables, control)
         self._islands = _islands(self._wiring, tables, control)
         self._free = [np.isin(tables.charts, island.coordinates) for island in self._islands]
         self._made_of, self._tables = (mechanism, control, x, tableau, rtol, atol, force, time), self._selected(tables)
         self._whole, self._inputs = tables, self._selected_inputs(control)
-        self.mechanism, self.parts = mechanism, list[Part]()
+        self.mechanism, self.parts = mechanism, list[IslandIntegrator]()
         for island, (own, inputs, start, attitude, tolerances) in zip(self._islands, self._begun(), strict=True):
-            memory = np.zeros(core.MEMORY_SIZE)
-            memory[[core.TIME, core.STEP]] = time, FIRST_STEP
+            memory = np.zeros(len(core.StepMemory._fields))
+            named = core.StepMemory.from_vector(memory)
+            named.time[0], named.step_size[0] = time, FIRST_STEP
             followed = laws if len(self._islands) == 1 else [laws[g] for g in groups_of(tables, island)]
             given = copied(own), copied(inputs), start, attitude, tableau, float(rtol), tolerances, memory
-            self.parts.append(Part(island, followed, *given, judged))
+            self.parts.append(IslandIntegrator(island, followed, *given, estimate_error))
 
     def renew(
         self,
@@ -96,7 +97,7 @@ class Stepper:
         atol: Array,
         force: Array | None = None,
     ) -> bool:
-        """Begin anew, bit by bit as a new stepper of these; return False, unchanged, if more than numbers differ."""
+        """Reset to new parameters and a new initial state; return False, unchanged, if the structure differs."""
         whole, (_, inputs, _, method, tolerance, *_) = self._whole, self._made_of
         tables = build_tables(mechanism)
         if method is not tableau or tolerance != rtol or not (fits(whole, tables) and fits(inputs, control)):
@@ -132,7 +133,7 @@ class Stepper:
         return self._selected(numbered(build_tables(self.mechanism)))
 
     def _begun(self) -> Iterator[tuple[Tables, InputTable, Array, Array, Array]]:
-        """Yield of every island its tables, inputs, state, quaternions and absolute tolerances at the start."""
+        """Yield the tables, inputs, state, quaternions and absolute tolerances of each island at the start."""
         mechanism, _, x, _, _, atol, force, _ = self._made_of
         forces = np.zeros((len(mechanism.body.tips), 3))
         forces[:] = 0.0 if force is None else force
@@ -177,11 +178,14 @@ class Stepper:
         carried along the linearised flow, and count twice: at kinks they are known to a factor only. It is seldom
         below a third of the error, and sometimes far above it; NaN if nobody wants to know.
         """
-        if not self.judged:
+        if not self.estimate_error:
             return np.nan
-        joints = [(len(part.joints), part.memory[core.DRIFT]) for part in self.parts]
-        objects = [(len(part.objects), part.memory[core.OBJECT_DRIFT]) for part in self.parts]
-        means = [sum(n * drift for n, drift in each) / max(sum(n for n, _ in each), 1) for each in (joints, objects)]
+        joints = [(len(part.joints), part.memory.joint_error[0]) for part in self.parts]
+        objects = [(len(part.objects), part.memory.object_error[0]) for part in self.parts]
+        means = [
+            sum(n * global_error for n, global_error in each) / max(sum(n for n, _ in each), 1)
+            for each in (joints, objects)
+        ]
         return _TWICE * float(np.sqrt(max(means) / self.time)) if self.time > 0.0 else 0.0
 
     @property
@@ -207,13 +211,13 @@ class Stepper:
         return self._charts.to_packed(whole, attitude)
 
     def restart(self, x: Array, time: float | None = None) -> None:
-        """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""
+        """Continue from another state, at the same time or another one, s, with no memory of earlier steps."""
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         for part, free in zip(self.parts, self._free, strict=True):
             part.restart(start[self._places(part.island)], attitude[free], time)
 
     def drive(self, drives: Drives) -> None:
-        """Let loops of motors run from now on, in every island those of its rotors; memory is shared."""
+        """Run loops of motors from now on, each in the island of its rotor; memory is shared."""
         for part in self.parts:
             motors = np.flatnonzero(np.isin(drives.places, part.island.coordinates))
             if len(motors):
@@ -225,7 +229,7 @@ class Stepper:
                 )
 
     def end_steps_at(self, knots: Array) -> None:
-        """Let steps end at times from now on, s, positive, in order: inputs bend or jump there."""
+        """End steps at these times from now on, s, positive, in order: inputs bend or jump there."""
         for part in self.parts:
             part.knots = np.array(knots, dtype=float)
 
@@ -261,7 +265,7 @@ class Stepper:
         return max(in_threads(lambda part: part.advance(end)[0], self.parts))
 
     def copy(self) -> Stepper:
-        """Return an independent stepper that goes on bit by bit alike."""
+        """Return an independent stepper that continues with the same bits."""
         twin = object.__new__(Stepper)
         twin.__dict__ |= self.__dict__
         twin.parts = [part.copy() for part in self.parts]
@@ -269,29 +273,29 @@ class Stepper:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds islands of its own."""
-        return partial(Stepper, judged=self.judged), self._made_of, self.moments
+        return partial(Stepper, estimate_error=self.estimate_error), self._made_of, self.state_snapshot
 
-    def __setstate__(self, state: Moments) -> None:
-        """Go on from the state of another one that was made alike."""
-        self.resume(state)
+    def __setstate__(self, state: Snapshot) -> None:
+        """Continue from the snapshot of a stepper with the same arguments."""
+        self.restore(state)
 
     @property
-    def moments(self) -> Moments:
-        """Its present moments: state and memory that later steps depend on; a copy."""
+    def state_snapshot(self) -> Snapshot:
+        """Snapshot of all that later steps depend on; a copy."""
         return [
-            (part.tables.loaded, part.drives, part.knots, tuple(each.copy() for each in part.moment))
+            (part.tables.loaded, part.drives, part.knots, tuple(each.copy() for each in part.state_snapshot))
             for part in self.parts
         ]
 
-    def resume(self, moments: Moments) -> None:
-        """Go on from earlier moments, of it or of one that was made alike."""
-        for index, (loaded, drives, knots, moment) in enumerate(moments):
+    def restore(self, snapshot: Snapshot) -> None:
+        """Continue from a snapshot of this stepper or of one with the same arguments."""
+        for index, (loaded, drives, knots, arrays) in enumerate(snapshot):
             if loaded != self.parts[index].tables.loaded:
                 self.parts[index] = self.parts[index].with_loads(loaded)
             part = self.parts[index]
             part.drives, part.knots = drives, knots
-            wake_all(part.tables, part.work.paths)
-            for own, other in zip(part.moment, moment, strict=True):
+            activate_all(part.tables, part.work.paths)
+            for own, other in zip(part.state_snapshot, arrays, strict=True):
                 own[...] = other
 
     def failure(self, status: int, names: tuple[str, ...]) -> str:
@@ -307,5 +311,5 @@ def _wires(wires: bytes, tables: Tables, control: InputTable) -> tuple[object, .
 
 @memoised(_wires)
 def _islands(wires: bytes, tables: Tables, control: InputTable) -> list[Island]:
-    """Return the islands of a mechanism under its inputs, found anew only for another wiring."""
+    """Return the islands of a mechanism under its inputs, searched once for each wiring."""
     return find_islands(tables, control)

@@ -1,4 +1,4 @@
-"""The solution of an integration, as every integrator returns it, and what integrators are told."""
+"""The solution of an integration, as every integrator returns it, and the callbacks of integrators."""
 
 from __future__ import annotations
 

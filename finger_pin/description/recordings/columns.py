@@ -94,7 +94,7 @@ class Table:
         return values
 
     def times(self, key: str, given: Column) -> NDArray[np.float64]:
-        """Return a column of times, s, shape (m,), as `column` does.
+        """Return a column of times, s, shape (m,).
 
         Raises:
             InputError: Also if they do not increase, or seem to be milliseconds and no unit says that they are not.
@@ -115,7 +115,7 @@ class Table:
         return times
 
     def signals(self, file: SignalFile) -> Iterator[tuple[str, Column]]:
-        """Yield the columns of signals over time, that of the times first, as a file's entries or its header tell.
+        """Yield the columns of signals over time, the times first.
 
         Raises:
             InputError: If no column is named as times are.
@@ -219,7 +219,7 @@ def read_text(what: str, path: Path) -> str:
 
 
 def expand(name: str) -> Path:
-    """Return a path with the home folder in place of ~, if there is such a home."""
+    """Return a path with ~ expanded where there is a home folder."""
     try:
         return Path(name).expanduser()
     except RuntimeError:
@@ -227,7 +227,7 @@ def expand(name: str) -> Path:
 
 
 def _split(name: str, *patterns: re.Pattern[str]) -> tuple[str, str | None]:
-    """Return a name without its unit, and the unit, if it has one that is known."""
+    """Return a name without its unit, and the unit if it is known."""
     for found in filter(None, (pattern.fullmatch(name) for pattern in patterns)):
         if any(found[2] in units for units in UNITS.values()):
             return found[1], found[2]

@@ -18,7 +18,7 @@ PACKED = "base64:"
 
 
 class Series(Sequence[float]):
-    """Numbers that never change, as an array: a tuple of floats, in a quarter of its memory."""
+    """Immutable sequence of floats, stored as an array."""
 
     def __init__(self, values: ArrayLike) -> None:
         """Keep numbers of shape (m,); of an array a copy."""

@@ -1,4 +1,4 @@
-"""One shape for all: a rounded prism, of which half-space, sphere, box, cylinder and capsule are special cases.
+"""Rounded prism, with half-space, sphere, box, cylinder and capsule as special cases.
 
 Its core is a rectangle, widened by a rim, times an interval of z; a rounding is added all around. The core is convex.
 Everything follows from a point's offset w from the nearest point of the core, or of one that is shrunk on all sides:
@@ -43,7 +43,7 @@ def prism_parameters(shape: str, sizes: Any, fillet: float = 0.0) -> tuple[float
 
 
 def deepest(p: Any) -> Any:
-    """Return by how much a core can shrink alike on all sides, m; 0 for one without a thickness or an end."""
+    """Return the inradius of a core, m; 0 without thickness or end."""
     side = p[RIM] if p[RIM] > 0.0 else min(p[HALF_X], p[HALF_Y])
     least = min(side, 0.5 * (p[HIGH] - p[LOW]))
     return least if least < np.inf else 0.0

@@ -1,4 +1,4 @@
-"""Paths of the tendons in space: lanes beside each other, and windings around the joints."""
+"""Paths of the tendons in space: parallel lanes and windings around the joints."""
 
 from finger_pin.mechanism.geometry.cuts import Cut, Groove
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual

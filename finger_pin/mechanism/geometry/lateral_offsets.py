@@ -1,4 +1,4 @@
-"""Lateral offsets of the tendons: places along the joint axes, by which they lie beside each other."""
+"""Lateral offsets of the tendons along the joint axes."""
 
 from __future__ import annotations
 

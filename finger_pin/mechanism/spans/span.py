@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 @dataclass(frozen=True)
 class WrapSegment:
-    """A piece of a path between two points that bodies carry, seen from its own frame, which a third body carries.
+    """Segment of a path between two points of bodies, in the frame of a third.
 
     Its functions take plain numbers, allocate nothing, and are run by Python and by the compiler.
 

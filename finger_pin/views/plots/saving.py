@@ -96,7 +96,7 @@ def save_figure(figure: Figure, path: str | Path, format: str | None = None) -> 
             if engine is not None and end == "png":
                 # matplotlib draws a figure twice that it lays out itself.
                 engine.execute(figure)
-                figure.set_layout_engine("none")
+                figure.set_layout_engine(None)
             # Little compression: it takes a fifth of the time, and a line drawing is small anyway.
             options: Any = {"pil_kwargs": {"compress_level": 2}} if end == "png" else {}
             figure.savefig(temporary, format=end, **options)

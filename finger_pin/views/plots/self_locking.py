@@ -36,7 +36,7 @@ def plot_critical_friction(finger: FingerLike, *, width: Width = None, titles: b
         value = _MILLI * found.coefficient
         axes.barh(row, value, height=0.6, color=colour(VERMILLION if name == "all joints" else BLUE))
         axes.text(value, row, f" {value:.2f}", va="center", fontsize="small")
-    actual = _MILLI * float(np.max(description.joint_friction.stiction))
+    actual = _MILLI * float(np.max(description.joint_friction.break_away))
     axes.axvline(actual, color=colour(BLACK), linewidth=thin(), label=rf"$M^c$ of the finger, {actual:.2g} mm")
     axes.set_yticks(range(len(entries)), list(entries))
     axes.invert_yaxis()
