@@ -30,7 +30,7 @@ class Interrupts:
     """
 
     def __init__(self) -> None:
-        """Begin without a request."""
+        """Start without a request."""
         self.requested = False
         self._patient = False
 
@@ -128,7 +128,7 @@ def talks(quiet: bool) -> bool:
 
 
 def print_text(text: str) -> None:
-    """Print to standard output, which may be closed and whose encoding may lack characters."""
+    """Print to standard output, tolerating a closed pipe and a limited encoding."""
     encoding = sys.stdout.encoding or "utf-8"
     try:
         print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)

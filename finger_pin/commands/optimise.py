@@ -115,7 +115,7 @@ def optimise(
 
 
 def summary(result: xr.Dataset) -> str:
-    """Return the table of the front, and the starting design beside it."""
+    """Return the table of the front and the starting design."""
     metrics = [str(name) for name in result.data_vars if "units" in result[name].attrs]
     keys = [str(key) for key in result.coords]
     status, feasible = result["status"].values, result["feasible"].values

@@ -48,7 +48,7 @@ def self_locking(
 
 
 def scaled(name: str, scenario: Scenario, factor: float) -> Scenario:
-    """Return the scenario with M^c of the joints times a factor, and M^d alike: sliding is no easier than starting."""
+    """Return the scenario with M^c of the joints times a factor, and M^d equal to it."""
     import numpy as np
 
     from finger_pin.description.loading import load_scenario

@@ -49,7 +49,7 @@ class Subset:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing."""
+        """Start empty."""
         self.kept: dict[str, Indices] = {}
         self.new: dict[str, Indices] = {}
 

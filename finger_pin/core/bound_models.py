@@ -1,4 +1,4 @@
-"""Models of a mechanism under given inputs, and their evaluation of many states at once."""
+"""Models of a mechanism under given inputs, and batched evaluation of states."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FEW = 1000
 
 
 class Room(NamedTuple):
-    """Arrays for the signals of m states, filled by `evaluate_many`, beside packed states, shape (m, size).
+    """Output buffers of `evaluate_many` for m states.
 
     The rows are those of more states, these from the ``first`` on: compiled code takes them whole; ``column`` is the
     first of the table that they have.
@@ -106,7 +106,7 @@ class BoundModel:
         self.address = self._block.address
 
     def renew(self, tables: Tables, control: InputTable) -> None:
-        """Take the numbers of other tables and another control, which fit, into the arrays that are bound."""
+        """Copy the numbers of other tables and inputs of the same shapes into the packed arrays."""
         own = self.model
         refill(own.tables, tables, self._filled)
         refill(own.control, control)
@@ -132,7 +132,7 @@ class Models:
         self._known: dict[tuple[bool, int], BoundModel] = {}
 
     def model(self, loaded: bool = False, thread: int = 0) -> BoundModel:
-        """Return a thread's model that minds forces at the tips or not.
+        """Return a thread's model, with or without forces at the tips.
 
         Each has memory of its own: without loads, nothing writes where loads have left their torques.
         """
@@ -145,7 +145,7 @@ class Models:
         return self._known[loaded, thread]
 
     def renew(self, tables: Tables) -> None:
-        """Take the numbers of other tables, which fit, into all that is bound."""
+        """Copy the numbers of other tables of the same shapes into all packed arrays."""
         self.tables = tables
         for (loaded, _), model in self._known.items():
             model.renew(tables._replace(loaded=loaded), model.model.control)
@@ -189,5 +189,5 @@ def path_motions(base: Array | None, count: int, guided: int) -> Array:
 
 
 def rows_of(values: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Return a copy of one kind alone, of which the core has one compilation: writable, contiguous, of floats."""
+    """Return a writable, contiguous copy of floats, the one array type that the core is compiled for."""
     return np.array(np.broadcast_to(values, shape), dtype=float, order="C")

@@ -1,4 +1,4 @@
-"""Joints of a model as chains of bodies with one coordinate each, which the core moves."""
+"""Joints of a model as chains of bodies with one coordinate each."""
 
 from __future__ import annotations
 

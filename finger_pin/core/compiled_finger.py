@@ -58,7 +58,7 @@ class CompiledMechanism:
         return True
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds models of its own."""
+        """Return constructor and arguments for `copy.deepcopy` and pickles."""
         return CompiledMechanism, (self.mechanism,)
 
     def evaluate(
@@ -83,7 +83,7 @@ class CompiledMechanism:
     def room(
         self, count: int, *, accelerated: bool = True, booked_only: bool = False, forces_only: bool = False
     ) -> Room:
-        """Return room for the signals of so many states: all, or energies, powers and J^T F, or the rows' forces."""
+        """Return buffers for the signals of m states: all, or powers and J^T F, or the rows' forces."""
         mechanism, (columns, rows) = self.mechanism, self.models.model().model.work.rows.shape
         width, kept, booked = mechanism.coordinates, 0 if booked_only else count, 0 if forces_only else count
         return Room(
@@ -229,7 +229,7 @@ class CompiledFinger:
     def exerted(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
-        """Return the same with no accelerations, which are NaN."""
+        """Return the same signals with accelerations NaN."""
         found = self.mechanism.evaluate(x, command, fingertip_force, base, accelerated=False)
         return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
 

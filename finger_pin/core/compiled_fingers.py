@@ -1,4 +1,4 @@
-"""Fingers with different numbers in the same tables, each evaluated at one state of its own."""
+"""Fingers of one structure with different parameters, each evaluated at its own state."""
 
 from __future__ import annotations
 

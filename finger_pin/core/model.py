@@ -1,4 +1,4 @@
-"""A mechanism with its inputs and its memory, as compiled code finds them at an address."""
+"""Compiled model of a mechanism: tables, inputs and memory at one address."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _CPU_MAX = Path("/sys/fs/cgroup/cpu.max")
 
 
 def usable_cores() -> int:
-    """Return the number of cores that this process may use; of a container with less time than its cores, as many."""
+    """Return the number of cores that this process may use, limited by a container's quota."""
     # Only Linux binds processes to cores.
     bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, ceil(min(bound, _share())))
@@ -39,7 +39,7 @@ def _share() -> float:
 
 
 def threads() -> int:
-    """Return the number of threads that `in_threads` uses at most: one beside others."""
+    """Return the maximum number of threads of `in_threads`."""
     return usable_cores() if threading.current_thread() is threading.main_thread() else 1
 
 
@@ -76,7 +76,7 @@ def pool() -> ThreadPoolExecutor:
 
 
 def _renew() -> None:
-    """Make anew what a forked process lacks: threads, and the locks that those of its parent may have held."""
+    """Recreate threads and locks in a forked process."""
     pool.cache_clear()
     if sys.version_info < (3, 12):
         # One lock for all objects, held while a property is computed; later versions have none.

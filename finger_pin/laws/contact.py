@@ -1,4 +1,4 @@
-"""The law of contact: a Hunt-Crossley normal force, and the friction of a bristle, which sticks.
+"""Law of contact: Hunt-Crossley normal force and sticking bristle friction.
 
 Normal, d = -gap: f_n = max(0, k d^p (1 + c d')) (Hunt and Crossley, J. Applied Mechanics 42, 1975).
 

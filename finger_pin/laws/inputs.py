@@ -20,7 +20,7 @@ def proportional_torque(gain: Numeric, reference: Numeric, position: Numeric) ->
 
 
 def internal_level(minimum: Numeric, minimal: Numeric, internal: Numeric) -> Numeric:
-    """Return (f0 - f^m) / f^k, whose largest entry is lambda of (22)."""
+    """Return (f0 - f^m) / f^k; its largest entry is lambda of (22)."""
     return (minimum - minimal) / internal
 
 

@@ -157,7 +157,7 @@ class ContactLaw:
     states: ClassVar[int] = 2
 
     def sees(self, length: Array, speed: Array, state: Array, load: Array, command: Array, curvature: Array) -> Touch:
-        """Return the arguments for contacts; arms stand side by side, shape (..., 3 k), as states do, (..., 2 k)."""
+        """Return the arguments for contacts from arms, shape (..., 3 k), and states, (..., 2 k)."""
         slips = (speed[..., each::3] for each in range(3))
         return Touch(length[..., ::3], *slips, *(state[..., each::2] for each in range(2)))
 

@@ -1,4 +1,4 @@
-"""Stroke limiters (2): Hunt-Crossley contacts at both ends of a joint's range, which never pull."""
+"""Stroke limiters (2): Hunt-Crossley contacts at both ends of a joint's range."""
 
 from __future__ import annotations
 

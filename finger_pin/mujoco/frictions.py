@@ -71,7 +71,7 @@ def frictions(
 def add_branches(
     spec: mujoco.MjSpec, model: mujoco.MjModel, names: Iterable[str]
 ) -> dict[str, list[tuple[str, float]]]:
-    """Add a tendon along each branch behind a pulley of some tendons, by which it rubs; it exerts nothing else.
+    """Add a tendon for the friction along each branch behind a pulley.
 
     Returns:
         By tendon, the names of its branches, each with one over its divisor.
@@ -158,7 +158,7 @@ def _pieces(model: mujoco.MjModel, tendon: int) -> range:
 
 
 def _row(model: mujoco.MjModel, name: str, first: list[tuple[str, Array]]) -> tuple[str, bool, float]:
-    """Return the row that a tendon acts in: its joint's, an earlier parallel one's, or its own, which is noted."""
+    """Return the row that a tendon acts in: its joint's, an earlier parallel one's, or its own."""
     over = _coefficients(model, model.tendon(name).id)
     joints = np.flatnonzero(over)
     if len(joints) == 1:

@@ -35,7 +35,7 @@ class _Plugin(ctypes.Structure):
 
 
 def _callbacks(at: Model, of: Data, contact: Contact, kinds: Kinds) -> dict[str, int]:
-    """Return the addresses of the callbacks, of which offsets are constants."""
+    """Return the addresses of the callbacks, with offsets as constants."""
 
     def nstate(m: int, instance: int) -> int:
         return kernel.signals(m, instance, at)

@@ -1,4 +1,4 @@
-"""Present signals of frictions in a MuJoCo model, as arrays of MuJoCo's own memory."""
+"""Signals of frictions in a MuJoCo model, as views of MuJoCo's memory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from finger_pin.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Signals of all frictions, which follow ``data`` as it is stepped; N and N m.
+    """Signals of all frictions, live views of ``data``; N and N m.
 
     Attributes:
         names: Of the tendons and joints, shape (k,).

@@ -22,7 +22,7 @@ _STIFF = 5.0
 
 
 class MujocoWarning(ScenarioWarning):
-    """A MuJoCo model has an option, or a step, with which friction is less than it could be."""
+    """An option or step of a MuJoCo model weakens friction."""
 
 
 def add_friction(spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys | None = None) -> None:
@@ -102,7 +102,7 @@ def _damping_rate(model: mujoco.MjModel, of_joint: bool, name: str) -> float:
 
 
 def _name_all(spec: mujoco.MjSpec) -> None:
-    """Give what has no name one, by which the table and branches know it."""
+    """Name unnamed elements for the table and branches."""
     named = {"tendon": spec.tendons, "joint": spec.joints, "site": spec.sites, "geom": spec.geoms}
     for what, elements in named.items():
         for index, each in enumerate(elements):
@@ -136,7 +136,7 @@ def _write(spec: mujoco.MjSpec, model: mujoco.MjModel, found: list[PluginFrictio
 
 
 def _target(spec: mujoco.MjSpec, found: list[PluginFriction]) -> tuple[str, mujoco.mjtTrn]:
-    """Return the target of the actuator, on which it does nothing: something driven, whose tree does not sleep."""
+    """Return a harmless target for the actuator: a driven element of an active tree."""
     for each in spec.actuators:
         if each.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_TENDON):
             return each.target, each.trntype

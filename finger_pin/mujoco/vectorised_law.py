@@ -1,4 +1,4 @@
-"""Law (9) of several frictions at once: their numbers stand side by side, so that the compiler takes vectors of them.
+"""Law (9) of several frictions, vectorised by the compiler.
 
 Lane i of field f is number ``WIDTH * f + i`` of a block. Fields up to `DRAG` are those of the table of frictions.
 """

@@ -1,4 +1,4 @@
-"""Many runs at once: scenarios over threads or another executor, results stacked in one Dataset."""
+"""Batch of runs over threads or another executor, stacked in one Dataset."""
 
 from __future__ import annotations
 

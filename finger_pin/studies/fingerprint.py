@@ -122,7 +122,7 @@ def _content(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Any:
 
 
 def _names(code: CodeType) -> frozenset[str]:
-    """Return the names of globals and attributes in some code, that of functions within it included."""
+    """Return the names of globals and attributes in code, nested functions included."""
     nested = [_names(each) for each in code.co_consts if isinstance(each, CodeType)]
     return frozenset(code.co_names).union(*nested)
 

@@ -129,7 +129,7 @@ def current_peak(run: Run) -> float:
 
 
 def locking_margin(run: Run) -> float:
-    """Return the ratio of critical to actual stiction of the joints, at which the finger locks on its reference."""
+    """Return the ratio of critical to actual stiction of the joints."""
     return self_locking_margin(run.scenario).margin
 
 

@@ -26,7 +26,7 @@ GRIP_TIME = 0.1
 
 
 class Run:
-    """A scenario and its simulation, which is done when a metric first asks for it.
+    """Scenario and its lazily computed simulation.
 
     Attributes:
         scenario: The scenario; of a finger of one's own it has the description.

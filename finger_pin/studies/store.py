@@ -67,7 +67,7 @@ class Store:
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        """Read the records of a file that no other process writes, if one is given.
+        """Read the records of a file, if one is given.
 
         Raises:
             OSError: If it cannot be read or written.

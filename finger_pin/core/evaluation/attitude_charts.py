@@ -22,7 +22,7 @@ from finger_pin.typing import Array
 
 
 def place(frame: Matrix, q: Vector, body: Vector) -> None:
-    """Write the attitude of a quaternion into the placement of the first body that turns, whose z axis is its x axis.
+    """Write a quaternion's attitude into the placement of the first body that turns.
 
     Args:
         frame: Rotation of the spherical joint in the body before it, shape (3, 3).

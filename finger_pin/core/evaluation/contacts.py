@@ -102,7 +102,7 @@ def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear,
 
 @CompiledFunction
 def fill_contact_gains(address: int, g: float) -> int:
-    """Fill the gains of a block's closed contacts, which depend on no other rows, and add them to A^T d phi."""
+    """Fill the gains of a block's closed contacts, and add them to A^T d phi."""
     model = unpack(address, MODEL)
     linear, blocks = model.linear, model.linear.blocks
     b = blocks.current[0]

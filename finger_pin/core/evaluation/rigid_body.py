@@ -52,7 +52,7 @@ def _place(tables: Tables, i: int, angle: float, work: Work) -> None:
 
 @njit_inline
 def _massless(tables: Tables, i: int) -> bool:
-    """Return whether a body has no inertia, as five of the six of a free object have none."""
+    """Return whether a body has no inertia."""
     body = tables.bodies[i]
     return body[MASS] == 0.0 and body[INERTIA] == 0.0 and body[INERTIA + 3] == 0.0 and body[INERTIA + 5] == 0.0
 
@@ -163,7 +163,7 @@ def mass_matrix(tables: Tables, work: Work) -> None:
 
 @njit_always_inline
 def factorise_mass(tables: Tables, size: int, work: Work) -> None:
-    """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted, tree by tree."""
+    """Fill work.square[CHOLESKY] with the Cholesky factor of M, its diagonal inverted, tree by tree."""
     factor = work.square[CHOLESKY]
     for i in range(size):
         for j in range(tables.roots[i], i + 1):

@@ -1,4 +1,4 @@
-"""Many states at once, compiled: the evaluation that the integrator steps with, kept state by state."""
+"""Batched evaluation of states, compiled."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from finger_pin.core.tables import END, FIRST, Tables
 
 
 class States(NamedTuple):
-    """Many states of one island under given inputs, which its control must hold, and their signals to be filled.
+    """States of one island under given inputs, and buffers for their signals.
 
     Attributes:
         model: Address of a bound `Model`.
@@ -164,7 +164,7 @@ def _evaluate(many: States, model: Model, m: int) -> None:
 
 @njit_inline
 def exert_alone(model: Model, address: int, time: float) -> None:
-    """Fill the rows' forces and rates under known inputs, for powers, which do not need the acceleration."""
+    """Fill the rows' forces and rates under known inputs, without accelerations."""
     tables, width = model.tables, model.work.torque.size
     # Only some rows need to know where bodies are.
     if tables.loaded or tables.paths.columns.size > 0:
@@ -195,7 +195,7 @@ def _keep(many: States, model: Model, m: int) -> None:
 
 @njit_inline
 def book_moved(model: Model, address: int, moving: bool, totals: Vector) -> None:
-    """Book the power of a moving base, or of coordinates led along paths, after a whole evaluation."""
+    """Record the power of a moving base or of prescribed coordinates after an evaluation."""
     work, width, last = model.work, model.work.torque.size, totals.size - 1
     if model.base_power != 0 and moving:
         call_at(model.base_power, address, 0.0)

@@ -97,6 +97,6 @@ def signal_derivative(signal: SignalTable, j: int, time: float, order: int) -> f
 
 @njit_inline
 def signal_derivatives(signal: SignalTable, time: float, order: int, out: Vector) -> None:
-    """Fill a time derivative of the functions, as many as there is room for; without functions nothing changes."""
+    """Fill a time derivative of the functions, as many as the buffer holds."""
     for j in range(min(out.size, signal.harmonics.shape[0])):
         out[j] = signal_derivative(signal, j, time, order)

@@ -1,4 +1,4 @@
-"""Compiled code: the only place that knows the compiler, which is numba.
+"""Compiled code: the only place that knows the compiler, numba.
 
 `functions` compiles, `tables` hands over arguments of the `struct_types` there are, `calls` calls what lies at an
 address and reads memory, and `digests` tells which code on disk still holds. The rest of the package sees the names

@@ -1,4 +1,4 @@
-"""Calls of functions at an address, and memory read and written, as compiled code does them."""
+"""Calls of functions at an address, and reads and writes of memory, in compiled code."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def add_at(_typing: Any, address: types.Type, number: types.Type) -> _Generated:
 
 @_generated
 def put_at(_typing: Any, address: types.Type, number: types.Type) -> _Generated:
-    """Put an integer in the place of one at such an address, which is returned."""
+    """Exchange the integer at an address, and return the former one."""
     return types.int64(types.int64, types.int64), partial(_shared, "xchg")
 
 
@@ -152,7 +152,7 @@ def view(kind: types.Type) -> Callable[[int], MutableSequence[Any]]:
 
 @_generated
 def scratch(_typing: Any, count: types.Type) -> _Generated:
-    """Return the address of room for numbers on the caller's stack: an array of NumPy's would be allocated anew."""
+    """Return the address of a buffer on the caller's stack, free of allocation."""
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         return builder.ptrtoint(builder.alloca(ir.DoubleType(), size=arguments[0]), ir.IntType(64))
@@ -162,7 +162,7 @@ def scratch(_typing: Any, count: types.Type) -> _Generated:
 
 @_generated
 def two_to_the(_typing: Any, rounded: types.Type) -> _Generated:
-    """Return 2^n of a number with the integer n in its last bits, as bits of its exponent."""
+    """Return 2^n from a number that holds the integer n in its last bits."""
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         word = ir.IntType(64)

@@ -42,7 +42,7 @@ def njit_inline(function: _Function) -> _Function:
 
 
 def njit_always_inline(function: _Function) -> _Function:
-    """Return a function that is compiled as a part of its caller; of several callers, each would compile it anew.
+    """Return a function that is inlined into its callers when compiled.
 
     Numba optimises each function of `njit_inline` with all that it calls, and makes machine code of it, though only
     what calls it is ever run: of a chain of calls, the last function would be optimised as often as the chain is long.
@@ -59,12 +59,12 @@ class CompiledFunction:
     """A function of an address and a number that returns an integer, compiled on first use, or found on disk."""
 
     def __init__(self, function: Callable[[int, float], int]) -> None:
-        """Keep the function, which is compiled on first use."""
+        """Wrap a function, compiled on first use."""
         assert isinstance(function, FunctionType)
         self._function, self.__module__ = function, function.__module__
 
     def __reduce__(self) -> str:
-        """Return its name: another process has an address of its own."""
+        """Return the name; addresses differ between processes."""
         return self._function.__qualname__
 
     @cached_property
@@ -124,12 +124,12 @@ def address_of(signature: str, function: Callable[..., Any], announced: bool = T
 
 
 def cache_root() -> Path:
-    """Return the folder of compiled code, which may not be writable."""
+    """Return the folder of compiled code; it may not be writable."""
     return Path(os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin"))
 
 
 def cache_place() -> Path | None:
-    """Return the empty file beside the compiled code, or None if that cannot be kept."""
+    """Return the lock file of the compiled code, or None if it cannot be kept."""
     place = cache_root() / "compiled.py"
     try:
         if not place.exists():

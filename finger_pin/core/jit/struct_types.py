@@ -1,4 +1,4 @@
-"""Types of tables: a record of machine words, which compiled code reads by the names of a NamedTuple's fields.
+"""Struct types of tables: records of machine words with the fields of a NamedTuple.
 
 To compiled code a table is a pointer, whose attributes are its fields: passing a pointer instead of some hundred
 numbers is what compiling quickly depends on. `numba.extending.overload_attribute` would do as well, but compiles a
@@ -83,7 +83,7 @@ register_model(StructType)(models.OpaqueModel)
 
 @lower_getattr_generic(StructType)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: ir.IRBuilder, table: StructType[Any], value: ir.Value, name: str) -> ir.Value:
-    """Load a field, marked as constant, so that the optimiser loads it once, whatever is stored meanwhile."""
+    """Load a field marked as constant, so that the optimiser loads it once."""
     kind, place, found = table.kinds[name], table.offset(name), table.typeof(name)
     integer = context.get_value_type(types.int64)
 

@@ -19,7 +19,7 @@ _DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
 
 
 def refuse_copy(holder: object) -> NoReturn:
-    """Refuse to copy or pickle an object that holds addresses, as its method ``__reduce__``.
+    """Refuse to copy or pickle an object that holds addresses.
 
     A copy would lead compiled code to the memory of the original, which may be gone, or in another process. Owners that
     can be copied have a ``__reduce__`` that builds another from what they were built from; all others refuse with this.
@@ -65,7 +65,7 @@ def call(unit: CompiledFunction, table: _Table, kind: StructType[_Table]) -> int
 
 
 def copied(table: _Table) -> _Table:
-    """Return a table with arrays of its own."""
+    """Return a table with copied arrays."""
     return type(table)(*map(_copied, table))
 
 
@@ -110,7 +110,7 @@ def fits(table: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
 
 
 def refill(table: tuple[Any, ...], other: tuple[Any, ...], before: tuple[Any, ...] | None = None) -> None:
-    """Copy the numbers of another table, which `fits`, into the arrays of one: a block that holds it holds them.
+    """Copy the numbers of another table of the same shapes into the arrays of one.
 
     Args:
         table: It is filled.
@@ -135,7 +135,7 @@ def numbered(table: _Table) -> _Table:
 
 
 def taken(like: _Table, places: _Table, table: tuple[Any, ...], before: tuple[Any, ...]) -> _Table:
-    """Return a table with the numbers that stand at some places, as `numbered` has them, in another.
+    """Return a table gathered from flat indices into another.
 
     Args:
         like: Such a table, of the same places in ``before``: what both have in common stays.

@@ -63,7 +63,7 @@ def _note_limiting_state(integration: Integration) -> None:
 
 @njit_inline
 def try_counted(integration: Integration, model: Model, h: float) -> int:
-    """Try a step, and count its evaluations; return its outcome, as `try_step` does."""
+    """Try a step and count its evaluations; return the outcome of `try_step`."""
     memory, tables = integration.memory, model.tables
     fresh, count = memory.fresh[0] > 0.0, integration.tableau.nodes.size
     outcome = try_step(integration, model, memory.time[0], h, fresh)
@@ -152,7 +152,7 @@ def accept_step(args: Any, integration: Integration, model: Model, time: float) 
 
 @njit_always_inline
 def _still(integration: Integration, model: Model, first: int) -> None:
-    """Clear the rates and errors of the states of culled contacts, which are zero and stay so."""
+    """Clear the rates and errors of the states of culled contacts."""
     tables = model.tables
     for row in range(0, tables.touching, 3):
         if model.work.paths.culled[row]:

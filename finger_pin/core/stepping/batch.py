@@ -77,7 +77,7 @@ def advance_batch(address: int, patience: float) -> int:
 
 @CompiledFunction
 def help_batch(address: int, patience: float) -> int:
-    """Advance remaining steppers of the `Batch` at an address, each time that it is opened, until patience ends."""
+    """Worker loop: advance remaining steppers of the `Batch` at an address whenever it is opened."""
     batch = unpack(address, BATCH)
     taken, size, asked = batch.counts.ctypes.data, batch.ends.size, 0.0
     while asked <= patience:

@@ -28,7 +28,7 @@ _SLICES = 200
 
 
 class Held(Protocol):
-    """A controller that sets tensions at instants of its own and holds them in between."""
+    """Controller that sets tensions at sample times and holds them in between."""
 
     @property
     def instant(self) -> float:
@@ -95,7 +95,7 @@ def integrate_compiled(
     together: bool = False,
     stop: Stop | None = None,
 ) -> Trajectory:
-    """Integrate from a stepper's present state with the compiled core, every island with steps of its own.
+    """Integrate from a stepper's present state with the compiled core, island by island.
 
     Args:
         stepper: State to start from, method and tolerances.

@@ -100,7 +100,7 @@ def begin_step(b: Any, step: int) -> None:
 
 @njit_inline
 def within(b: Any, step: int, time: float, out: Vector) -> None:
-    """Fill the state at a time within a step, which has begun."""
+    """Fill the state at a time within the current step."""
     begin = begin_of(b, step)
     between(b.before, b.states[step], b.dense[step], (time - begin) / (b.ends[step] - begin), out)
 
@@ -149,7 +149,7 @@ def cut(before: Vector, after: Vector, dense: Matrix, share: float) -> None:
 
 @njit_always_inline
 def reset_angles(charts: Any, width: int, x: Vector) -> None:
-    """Reset the angles of free bodies to zero, as `rechart` does: their rates become the angular velocity."""
+    """Reset the chart angles of free bodies to zero; their rates become the angular velocity."""
     for f in range(charts.size):
         i = charts[f]
         b, c = x[i + 1], x[i + 2]

@@ -55,7 +55,7 @@ class IslandMotion:
         return between.found, between.turned
 
     def _between(self, times: Array, kept: int = 0) -> Between:
-        """Return the steps and times, with room for so many states."""
+        """Return the steps and times with a buffer for m states."""
         record, tables = self.record, self.part.tables
         return Between(
             begin=self.begin,
@@ -103,6 +103,6 @@ class IslandMotion:
 
     @cached_property
     def _models(self) -> list[BoundModel]:
-        """Models, one for each thread; the first is the island's own, which is integrated no further."""
+        """Models, one for each thread; the first is the island's."""
         self.part.work.rows[SIDE] = 0.0
         return [self.part.model]

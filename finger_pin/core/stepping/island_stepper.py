@@ -147,7 +147,7 @@ class IslandIntegrator:
         self._advance = advance
 
     def room(self, count: int) -> Record:
-        """Return room for so many steps."""
+        """Return a buffer for m steps."""
         return Record.of(count, len(self.x), len(self.attitude), len(self.tableau.dense), len(self._bound.kinks))
 
     @property
@@ -178,7 +178,7 @@ class IslandIntegrator:
         return self._blocks[-1].address, self._advance
 
     def _place(self, record: Record) -> None:
-        """Hand a record to compiled code, with the loops of motors, knots and given steps, if any."""
+        """Pass a record to compiled code, with drive loops, knots and given steps if any."""
         before, drives, knots, steps = self._placed
         if before is record and drives is self.drives and knots is self.knots and steps is self.steps:
             return
@@ -216,7 +216,7 @@ class IslandIntegrator:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
 
     def renew(self, tables: Tables, control: InputTable, x: Array, attitude: Array, atol: Array) -> None:
-        """Reset to time zero and other numbers of the same shapes, as a new integrator of them."""
+        """Reset to time zero with other parameters of the same shapes."""
         self.model.renew(tables, control)
         self.atol[:], self._memory[:], self._bound.global_error[:] = atol, 0.0, 0.0
         self.drives, self.knots, self.steps = None, IslandIntegrator.knots, None
@@ -245,7 +245,7 @@ class IslandIntegrator:
         return self.x, self.attitude, self._memory, self.control.tension, self.tables.tip_force, self.tables.bodies
 
     def repeat(self, steps: Steps) -> None:
-        """Take given steps from now on, whatever their errors; branches of another number of rows are ignored."""
+        """Repeat given steps from now on, regardless of errors."""
         if steps.branches.shape[1] != len(self._bound.kinks):
             steps = steps._replace(branches=np.zeros((len(steps.ends), 0)))
         self.steps = steps

@@ -1,4 +1,4 @@
-"""Islands: parts of a mechanism that nothing couples, which are integrated apart.
+"""Islands: uncoupled parts of a mechanism, integrated separately.
 
 Coordinates are coupled by inertia (one tree), by a row that acts on or measures both, by a load or an input that one
 row has from another, and by a controller that reads both.
@@ -84,7 +84,7 @@ def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> 
 
 
 def wiring(tables: Tables, control: InputTable) -> bytes:
-    """Return the wiring that islands and memory follow from, besides sizes: fingers wired alike differ in numbers."""
+    """Return the structure key of islands and memory."""
     wires = (control.loop, control.channel, _reads(control))
     return b"".join([indices(tables), *(each.tobytes() for each in wires)])
 

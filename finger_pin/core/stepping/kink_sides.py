@@ -80,7 +80,7 @@ def switch_left_branches(tables: Tables, rows: Matrix, kinks: Vector) -> None:
 
 @njit_inline
 def branch_error(integration: Any, model: Model, time: float, h: float) -> float:
-    """Return the error of rows that are frozen on a branch that they have left, as a multiple of the tolerance."""
+    """Return the error of rows frozen on a branch already left, in tolerances."""
     tables, rows, kinks, size = model.tables, model.work.rows, integration.kinks, integration.x.size
     r = integration.r
     call_at(model.evaluate, integration.model, time)

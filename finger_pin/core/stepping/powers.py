@@ -51,7 +51,7 @@ def _attitude(b: Any, step: int) -> Any:
 
 @njit_always_inline
 def _keep(tables: Tables, work: Work, state: Vector, booked: Any, out: Vector) -> None:
-    """Fill the powers of the rows, which are booked last, and that of the forces at the tips."""
+    """Fill the powers of the rows and of the forces at the tips."""
     count, width = out.size - 1, work.torque.size
     for i in range(count):
         out[i] = booked[booked.size - count + i]

@@ -1,4 +1,4 @@
-"""Steps of an earlier run taken again by another one, which is then as smooth in its parameters as its equations."""
+"""Repetition of recorded steps with other parameters, for smooth differences."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Steps(NamedTuple):
 
 
 class RepeatStepsArgs(NamedTuple):
-    """Arguments of `repeat_steps`: an integration on given steps, whatever their errors.
+    """Arguments of `repeat_steps`.
 
     Attributes:
         steps: The steps.

@@ -1,4 +1,4 @@
-"""A Rosenbrock step with the exact Jacobian, compiled; without Newton iterations, which could fail."""
+"""Rosenbrock step with the exact Jacobian, compiled; there are no Newton iterations."""
 
 from __future__ import annotations
 

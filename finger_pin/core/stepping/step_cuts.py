@@ -51,7 +51,7 @@ def find_missed_contacts(address: int, _h: float) -> int:
 
 @njit_always_inline
 def _kept_at_kinks(integration: Integration, model: Model, h: float, outcome: int) -> tuple[float, float, float]:
-    """Return the share of a step that is taken, that of another try, and that after which a row leaves its branch.
+    """Return the shares of a step that is taken, for another try, and until a row leaves its branch.
 
     Returns:
         The share that is taken, at the end of which the model's state is; 1, or how much to try next; and the share

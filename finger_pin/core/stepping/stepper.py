@@ -234,7 +234,7 @@ class Stepper:
             part.knots = np.array(knots, dtype=float)
 
     def repeat(self, steps: Sequence[Steps]) -> None:
-        """Take given steps from now on in each island, whatever their errors."""
+        """Repeat given steps from now on in each island, regardless of errors."""
         if len(steps) != len(self.parts):
             # Parameters that join what moved apart, or part it, leave the steps of all to each.
             steps = [Steps.whole(np.unique(np.concatenate([each.ends for each in steps])))] * len(self.parts)

@@ -1,4 +1,4 @@
-"""The solution of an integration, as every integrator returns it, and the callbacks of integrators."""
+"""Solution of an integration, common to all integrators, and their callbacks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Statistics:
 
 
 class Apart(Protocol):
-    """The motion of an island, with steps of its own."""
+    """Motion of an island with its own steps."""
 
     @property
     def times(self) -> Array:

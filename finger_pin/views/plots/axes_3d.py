@@ -17,7 +17,7 @@ _LABEL = 8.0
 
 
 def space(part: SubFigure, corners: Array, unit: str) -> Axes3D:
-    """Return axes, seen obliquely, that hold some points.
+    """Return oblique axes around points.
 
     Args:
         part: The part of the figure.

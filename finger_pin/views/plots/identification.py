@@ -1,4 +1,4 @@
-"""An identification: measured beside computed signals, residuals, and the profile of every number."""
+"""Figures of an identification: measured and computed signals, residuals, profiles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The signals of a result, of a finger of any size, as lines and areas of few points that hide no spike."""
+"""Signals of a result as thinned lines and areas that keep every spike."""
 
 from __future__ import annotations
 

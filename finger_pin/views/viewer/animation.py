@@ -66,7 +66,7 @@ def animation_page(
     ghost: xr.Dataset | None = None,
     finger: Finger | None = None,
 ) -> str:
-    """Return the page that plays a result, with a set of fingertip forces and another result beside it if given."""
+    """Return the page that plays a result, with fingertip forces and a second result if given."""
     motion = Playback.of(result, finger=finger)
     every = slice(None, None, max(1, len(motion.time) // _POSITIONS_IN_VIEW))
     seen = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])

@@ -1,4 +1,4 @@
-"""A result in the user's own meshcat.Visualizer: the finger moves there, beside the user's own objects."""
+"""Animation of a result in the user's meshcat.Visualizer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The set of forces that a fingertip can exert, as a translucent body that starts at the fingertip."""
+"""Set of forces that a fingertip can exert, as a translucent body at the fingertip."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ _GHOST, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Ghost:
-    """Another motion that is seen faintly beside the one that is played.
+    """Second motion, drawn faintly.
 
     Attributes:
         scene: Its finger.

@@ -50,7 +50,7 @@ _FEW = 25
 def write_video(
     result: xr.Dataset, path: str | os.PathLike[str], *, speed: float = 1.0, rate: float | None = None
 ) -> Path:
-    """Write a result as a film: MP4, which needs the program ffmpeg or the package imageio-ffmpeg that has it, or GIF.
+    """Write a result as a film: GIF, or MP4 with ffmpeg or imageio-ffmpeg.
 
     The file appears whole or not at all; an earlier one is replaced.
 

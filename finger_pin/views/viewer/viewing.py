@@ -30,7 +30,7 @@ class PageServer:
     """
 
     def __init__(self, page: str) -> None:
-        """Serve a page, HTML text, from a thread of its own."""
+        """Serve a page, HTML text, from a thread."""
         self._page = page.encode()
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
         self._hosts = {f"{host}:{self._server.server_port}" for host in ("127.0.0.1", "localhost")}
