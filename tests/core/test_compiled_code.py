@@ -142,7 +142,10 @@ def test_lambdas_on_one_line_are_told_apart():
     assert source_digest(plus) == source_digest(plus)
 
 
-@pytest.mark.parametrize("thing", [object(), [1.0], np.frompyfunc(abs, 1, 1), np.array([None])], ids=["object", "list", "ufunc", "objects"])
+THINGS = {"object": object(), "list": [1.0], "ufunc": np.frompyfunc(abs, 1, 1), "objects": np.array([None])}
+
+
+@pytest.mark.parametrize("thing", THINGS.values(), ids=THINGS)
 def test_what_a_later_process_could_not_recognise_has_no_digest(thing):
     with pytest.raises(Undigestible):
         spring("def force(x):\n    return THING", THING=thing)
