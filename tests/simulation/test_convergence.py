@@ -76,7 +76,7 @@ def test_a_stiff_loop_with_high_joint_friction_hunts_and_parts_from_its_repetiti
 
 def test_where_a_run_parts_a_smaller_tolerance_helps_as_the_warning_says():
     tighter = {"simulation.rtol": 1e-8, "simulation.atol_scale": 1e-8}
-    with pytest.warns(fp.exceptions.AccuracyWarning, match="errs by about .* --check"):
+    with pytest.warns(fp.exceptions.AccuracyWarning, match=r"errs by about .*\(--check"):
         found = fp.check_convergence(fp.load_scenario("fig6", HUNTING | tighter))
     assert found.converged
 
