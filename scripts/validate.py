@@ -75,11 +75,10 @@ def measured(names: tuple[str, ...]) -> tuple[Family, ...]:
     from validation.report import Family
 
     found: list[Family] = []
-    texts = ("{task.fields[doing]}", "{task.completed} of {task.total} families")
-    with bar(sys.stderr.isatty(), *texts, total=len(names), doing="") as show:
+    with bar(sys.stderr.isatty(), "families", len(names)) as show:
         for name in names:
             module = import_module(f"validation.{FAMILIES[name]}")
-            show(completed=len(found), doing=module.TITLE)
+            show(len(found), text=module.TITLE)
             about = " ".join((module.__doc__ or "").strip().split("\n\n")[0].split())
             try:
                 section = module.measure()

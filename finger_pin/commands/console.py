@@ -7,9 +7,9 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from types import FrameType
-from typing import Any, Self
+from typing import Self
 
 import typer
 
@@ -60,56 +60,45 @@ class Interrupts:
 
 
 @contextmanager
-def bar(shown: bool, *texts: str, **fields: Any) -> Iterator[Callable[..., None]]:
-    """Show a bar on standard error if asked, between two texts and times, and give a function that sets its fields.
-
-    Args:
-        shown: Whether to show it.
-        texts: Before the bar and after it, with fields of ``task``.
-        fields: Those of its task at first, ``total`` among them.
-    """
+def bar(shown: bool, unit: str, total: float | None = None) -> Iterator[Callable[..., None]]:
+    """Show a progress bar on standard error if asked, and give the function that moves it (`ProgressBar`)."""
     if not shown:
-        yield lambda **fields: None
+        yield lambda *numbers, **texts: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
+    from finger_pin.simulation.progress import ProgressBar
 
-    before, after = texts
-    columns = (before, BarColumn(), after, TimeElapsedColumn(), "so far, left", TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task, total = progress.add_task("", **fields), fields["total"]
-
-        def show(**fields: Any) -> None:
-            nonlocal total
-            # What was finished before there was a total took no time: the time that is left does not follow from it.
-            change = progress.reset if total is None else progress.update
-            total = fields.get("total", total)
-            change(task, **fields)
-
+    with closing(ProgressBar(unit, total)) as show:
         yield show
 
 
 @contextmanager
 def progress_bar(shown: bool, duration: float) -> Iterator[Callable[[float], None] | None]:
     """Show a bar if asked, and give a function that takes the simulated time, s, out of a duration, s, or None."""
-    with bar(shown, "", "{task.completed:.3f} of {task.total:g} s simulated", total=duration) as show:
-        yield (lambda time: show(completed=time)) if shown else None
+    with bar(shown, "s", duration) as show:
+        yield show if shown else None
 
 
 @contextmanager
 def count_bar(shown: bool, total: int) -> Iterator[Callable[[int], None]]:
     """Show a bar if asked, and give a function that takes the number of further runs that are finished."""
-    with bar(shown, "", "{task.completed} of {task.total} runs", total=total) as show:
-        yield lambda further: show(advance=further)
+    done = 0
+    with bar(shown, "runs", total) as show:
+
+        def advance(further: int) -> None:
+            nonlocal done
+            done += further
+            show(done)
+
+        yield advance
 
 
 @contextmanager
 def runs_bar(shown: bool, what: str) -> Iterator[Callable[[int, int, int], None] | None]:
     """Show a bar if asked, and give a function that takes the numbers of finished, failed and all runs, or None."""
-    with bar(shown, what, "{task.completed} of {task.total} runs{task.fields[note]}", total=None, note="") as show:
+    with bar(shown, "runs") as show:
 
         def count(finished: int, failed: int, total: int) -> None:
-            show(completed=finished, total=total, note=f", {failed} failed" if failed else "")
+            show(finished, total, text=what, note=f"{failed} failed" if failed else "")
 
         yield count if shown else None
 

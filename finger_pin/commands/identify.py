@@ -69,5 +69,5 @@ def _listing() -> str:
 @contextmanager
 def _progress(shown: bool) -> Iterator[Callable[[str, int, int], None]]:
     """Show a bar if asked, and give a function that takes the piece of work, how much of it is done, and its size."""
-    with bar(shown, "{task.fields[words]}", "{task.completed} of {task.total}", total=None, words="reading") as show:
-        yield lambda words, done, total: show(words=words, completed=done, total=total)
+    with bar(shown, "pieces") as show:
+        yield lambda words, done, total: show(done, total, text=words)

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.core.evaluation.law_code import SLOPES, widest
-from finger_pin.core.evaluation.rigid_body import SPATIAL_LAYERS, SQUARE_LAYERS
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import PathWork, build_path_work
 from finger_pin.core.stepping.islands import find_islands
 from finger_pin.core.tables import Tables
 from finger_pin.laws.law import ContactLaw, Law
+
+# Layers of work.spatial, one motion or force vector per body, and of work.square.
+AXIS, AXIS_RATE, AXIS_CURVE, MOTION, SPATIAL_ACCELERATION, FORCE, MOMENTUM, SPATIAL_LAYERS = range(8)
+MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
 
 
 class Work(NamedTuple):
@@ -172,7 +176,7 @@ def build_blocks(tables: Tables, control: InputTable) -> Blocks:
             atom[island.coordinates], row_atom[island.rows] = index, index
         row_atom[tables.touch > 0] = -1
 
-    def room(size: int) -> Any:
+    def room(size: int) -> NDArray[np.int64]:
         return np.zeros(size, dtype=np.int64)
 
     return Blocks(

@@ -9,22 +9,16 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from finger_pin.core.evaluation.rigid_body import (
-    ARMATURE,
-    BODY_COLUMNS,
-    CENTRE,
-    INERTIA,
-    MASS,
-    PRISMATIC,
-    ROTATION,
-    TRANSLATION,
-)
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import FREE_JOINTS, RigidBody
 from finger_pin.mechanism.solids import WORLD
 from finger_pin.typing import Array
 
 # Less of a unit axis is rounding.
+# Columns of the table of bodies.
+ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, ARMATURE, BODY_COLUMNS = 0, 9, 12, 13, 16, 22, 23
+PRISMATIC = 1
+
 _STILL = 1e-8
 _UPPER = np.triu_indices(3)
 # Farther than anything slides, m, but for what is led.

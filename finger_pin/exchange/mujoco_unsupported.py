@@ -1,4 +1,4 @@
-"""Elements of a MuJoCo model that are switched off or not supported: flags applied, elements listed or refused by name."""
+"""Elements of a MuJoCo model switched off or not supported: flags applied, elements listed or refused by name."""
 
 from __future__ import annotations
 

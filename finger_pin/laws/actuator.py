@@ -7,28 +7,27 @@ error.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.laws.law import Law, Row
+from finger_pin.typing import Number, Numbers, Parameters
 
 
-def _value(row: Row, p: Any) -> Any:
+def _value(row: Row, p: Parameters) -> Numbers:
     gain, offset, by_length, by_speed, lowest, highest, least, most = p
     held = np.minimum(np.maximum(row.command, lowest), highest)
     wanted = gain * held + offset + by_length * row.length + by_speed * row.speed
     return np.minimum(np.maximum(wanted, least), most), 0.0 * row.length, wanted
 
 
-def _slopes(row: Row, p: Any, signals: Any) -> Any:
+def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     gain, _, by_length, by_speed, lowest, highest, least, most = p
     free = 1.0 * (signals[0] > least) * (signals[0] < most)
     by_command = free * gain * (row.command > lowest) * (row.command < highest)
     return (free * by_length, free * by_speed, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     return 0.0 * force, force * row.speed
 
 
@@ -47,21 +46,21 @@ ACTUATOR = Law(
 _STOPS = 1e3
 
 
-def _moved(row: Row, p: Any) -> Any:
+def _moved(row: Row, p: Parameters) -> Numbers:
     """Return u within its limits, and z' free of its limits and within them."""
     held = np.minimum(np.maximum(row.command, p[4]), p[5])
     rate = p[9] * held + p[10] * row.length + p[11] * row.state
     return held, rate, np.minimum(np.maximum(rate, _STOPS * (p[12] - row.state)), _STOPS * (p[13] - row.state))
 
 
-def _value_of_state(row: Row, p: Any) -> Any:
+def _value_of_state(row: Row, p: Parameters) -> Numbers:
     gain, offset, by_length, by_speed, _, _, least, most, by_state = p[:9]
     held, free, rate = _moved(row, p)
     wanted = gain * held + offset + by_length * row.length + by_speed * row.speed + by_state * row.state
     return np.minimum(np.maximum(wanted, least), most), rate, wanted, free
 
 
-def _slopes_of_state(row: Row, p: Any, signals: Any) -> Any:
+def _slopes_of_state(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     gain, _, by_length, by_speed, lowest, highest, least, most, by_state = p[:9]
     wanted, rate = signals
     free = 1.0 * (wanted > least) * (wanted < most)

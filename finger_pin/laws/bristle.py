@@ -14,16 +14,15 @@ as long as |v| <= 4 F^n M (1 + b / sigma_1) / sigma_1, which covers sticking.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.laws.law import Law, Row, direction, magnitude
+from finger_pin.typing import Array, Number, Numbers, Numeric, Parameters
 
 
 def friction_coefficient(
-    velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0, side: Any = 0.0
-) -> Any:
+    velocity: Numeric, kinetic: Numeric, static: Numeric, stribeck: Numeric, exponent: Number = 1.0, side: Number = 0.0
+) -> Numeric:
     """Return M(v) = M^d + (M^c - M^d) exp(-(|v| / omega)^p), equation (9b) with p = 1.
 
     Args:
@@ -41,8 +40,8 @@ def friction_coefficient(
 
 
 def friction_coefficient_slope(
-    velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0, side: Any = 0.0
-) -> Any:
+    velocity: Number, kinetic: Number, static: Number, stribeck: Number, exponent: Number = 1.0, side: Number = 0.0
+) -> Number:
     """Return dM/dv of (9b)."""
     ratio = magnitude(velocity, side) / stribeck
     power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
@@ -50,7 +49,7 @@ def friction_coefficient_slope(
     return -direction(velocity, side) * (static - kinetic) / stribeck * power_slope * np.exp(-power)
 
 
-def friction_level(normal: Any, coefficient: Any, floor: Any) -> Any:
+def friction_level(normal: Number, coefficient: Number, floor: Number) -> Number:
     """Return max(F^n M, g_min), the stiction that steady sliding settles at.
 
     The floor keeps (9a) finite for an unloaded contact.
@@ -58,14 +57,14 @@ def friction_level(normal: Any, coefficient: Any, floor: Any) -> Any:
     return np.maximum(normal * coefficient, floor)
 
 
-def stiction_rate(stiction: Any, velocity: Any, level: Any, stiffness: Any, side: Any = 0.0) -> Any:
+def stiction_rate(stiction: Number, velocity: Number, level: Number, stiffness: Number, side: Number = 0.0) -> Number:
     """Return F^s' = sigma_0 (v - F^s |v| / level), equation (9a)."""
     return stiffness * (velocity - stiction * magnitude(velocity, side) / level)
 
 
 def stiction_rate_slopes(
-    stiction: Any, velocity: Any, level: Any, stiffness: Any, side: Any = 0.0
-) -> tuple[Any, Any, Any]:
+    stiction: Number, velocity: Number, level: Number, stiffness: Number, side: Number = 0.0
+) -> tuple[Number, Number, Number]:
     """Return the derivatives of (9a) with respect to F^s, v and the level."""
     speed = magnitude(velocity, side)
     by_stiction = -stiffness * speed / level
@@ -74,7 +73,9 @@ def stiction_rate_slopes(
     return by_stiction, by_velocity, by_level
 
 
-def friction_force(stiction: Any, velocity: Any, viscous: Any, rate: Any = 0.0, lag: Any = 0.0) -> Any:
+def friction_force(
+    stiction: Number, velocity: Number, viscous: Number, rate: Number = 0.0, lag: Number = 0.0
+) -> Number:
     """Return F^f = F^s + lag F^s' + b v, equation (9c) with lag = 0.
 
     Args:
@@ -87,22 +88,22 @@ def friction_force(stiction: Any, velocity: Any, viscous: Any, rate: Any = 0.0, 
     return stiction + viscous * velocity + lag * rate
 
 
-def bristle_energy(stiction: Any, stiffness: Any) -> Any:
+def bristle_energy(stiction: Number, stiffness: Number) -> Number:
     """Return the elastic energy of the bristles, F^s^2 / (2 sigma_0)."""
     return stiction * stiction / (2.0 * stiffness)
 
 
-def coulomb_loss(stiction: Any, velocity: Any, level: Any) -> Any:
+def coulomb_loss(stiction: Number, velocity: Number, level: Number) -> Number:
     """Return the power lost by sliding, F^s^2 |v| / level: F^f v less the viscous loss and the bristles' power."""
     return stiction * stiction * np.abs(velocity) / level
 
 
-def viscous_loss(velocity: Any, viscous: Any) -> Any:
+def viscous_loss(velocity: Number, viscous: Number) -> Number:
     """Return the power lost in the viscous part of (9c), b v^2."""
     return viscous * velocity * velocity
 
 
-def micro_loss(rate: Any, velocity: Any, lag: Any) -> Any:
+def micro_loss(rate: Number, velocity: Number, lag: Number) -> Number:
     """Return the power lost in the micro-damping, sigma_1 z' v.
 
     It is positive while the bristles follow the motion; while they spring back, it may be negative.
@@ -110,18 +111,18 @@ def micro_loss(rate: Any, velocity: Any, lag: Any) -> Any:
     return lag * rate * velocity
 
 
-def passive_micro_damping(viscous: Any, kinetic: Any, static: Any) -> Any:
+def passive_micro_damping(viscous: Number, kinetic: Number, static: Number) -> Array:
     """Return the most sigma_1 with which friction never drives motion, b M^d / (M^c - M^d); see the module."""
     excess = static - kinetic
     return np.where(excess > 0.0, viscous * kinetic / np.where(excess > 0.0, excess, 1.0), np.inf)
 
 
-def steady_force(velocity: Any, normal: Any, coefficient: Any, viscous: Any) -> Any:
+def steady_force(velocity: Number, normal: Number, coefficient: Number, viscous: Number) -> Number:
     """Return the friction of steady sliding, F^n M(v) sign(v) + b v: (9) with F^s' = 0, the curves of Fig. 3."""
     return normal * coefficient * np.sign(velocity) + viscous * velocity
 
 
-def _value(row: Row, p: Any) -> Any:
+def _value(row: Row, p: Parameters) -> Numbers:
     kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag = p
     coefficient = friction_coefficient(row.speed, kinetic, static, stribeck, exponent, row.side)
     level = friction_level(row.load, coefficient, floor)
@@ -130,7 +131,7 @@ def _value(row: Row, p: Any) -> Any:
     return -loss, rate, loss, row.load, coefficient, level
 
 
-def _slopes(row: Row, p: Any, signals: Any) -> Any:
+def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag = p
     _, _, coefficient, level = signals
     own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
@@ -141,7 +142,9 @@ def _slopes(row: Row, p: Any, signals: Any) -> Any:
     return (0.0, -viscous, -1.0, -lag, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_level * coefficient, 0.0, 0.0)
 
 
-def bristle_account(speed: Any, stiction: Any, rate: Any, level: Any, stiffness: Any, viscous: Any, lag: Any) -> Any:
+def bristle_account(
+    speed: Number, stiction: Number, rate: Number, level: Number, stiffness: Number, viscous: Number, lag: Number
+) -> Numbers:
     """Return the energy of the bristles, and the powers lost by sliding, in viscous friction and in micro-damping."""
     return (
         bristle_energy(stiction, stiffness),
@@ -151,7 +154,7 @@ def bristle_account(speed: Any, stiction: Any, rate: Any, level: Any, stiffness:
     )
 
 
-def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     _, _, stiffness, viscous, _, _, _, lag = p
     return bristle_account(row.speed, row.state, rate, signals[3], stiffness, viscous, lag)
 

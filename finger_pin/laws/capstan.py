@@ -13,8 +13,6 @@ micro-damping. Near slack that loop has two solutions where bristles spring back
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.laws.bristle import (
@@ -27,6 +25,7 @@ from finger_pin.laws.bristle import (
     stiction_rate_slopes,
 )
 from finger_pin.laws.law import Law, Row, direction, magnitude
+from finger_pin.typing import Number, Numbers, Numeric, Parameters
 
 # More than any tendon bears, N.
 _ANY_FORCE = 1e30
@@ -34,7 +33,7 @@ _ANY_FORCE = 1e30
 _INSTANT = 1e-12
 
 
-def capstan_coefficient(surface: Any, curvature: Any) -> Any:
+def capstan_coefficient(surface: Numeric, curvature: Numeric) -> Numeric:
     """Return mu^d = (1 - exp(-mu_e phi)) / (1 + exp(-mu_e phi)) = tanh(mu_e phi / 2), equation (16).
 
     Steady sliding then loses tension by the capstan law, f / f^a = exp(-mu_e phi) when pulling.
@@ -47,17 +46,17 @@ def capstan_coefficient(surface: Any, curvature: Any) -> Any:
     return (1.0 - left) / (1.0 + left)
 
 
-def capstan_slope(surface: Any, coefficient: Any) -> Any:
+def capstan_slope(surface: Number, coefficient: Number) -> Number:
     """Return d mu^d / d phi of (16), from mu^d itself."""
     return 0.5 * surface * (1.0 - coefficient * coefficient)
 
 
-def delivered_tension(command: Any, loss: Any) -> Any:
+def delivered_tension(command: Number, loss: Number) -> Number:
     """Return f = max(0, f^a - f^f), N: a tendon cannot push."""
     return np.maximum(0.0, command - loss)
 
 
-def _haste(p: Any) -> Any:
+def _haste(p: Parameters) -> Number:
     """Return the least level over the speed, N s/m: beyond the floor's reach, (9a) must not get faster.
 
     As a driven tendon goes slack that slides against its stretched bristles, the tension in (14), y = |F^s| - b v,
@@ -68,7 +67,9 @@ def _haste(p: Any) -> Any:
     return np.sqrt(_INSTANT * p[2] * p[3]) + _INSTANT * p[2]
 
 
-def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, drag: Any = 0.0, floor: Any = 0.0) -> Any:
+def sliding_tension(
+    command: Numeric, coefficient: Numeric, speed: Numeric, viscous: Numeric, drag: Number = 0.0, floor: Number = 0.0
+) -> Numeric:
     """Return the f, N, that a driven tendon delivers in steady sliding, in the shape of the arguments.
 
     From f = f^a - s max(M (f + f^a) + drag, g_min) - b v, with s the sign of v: where M = mu^d and b = 0, the capstan
@@ -88,12 +89,14 @@ def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, dr
     return np.maximum(0.0, left - way * np.maximum(0.0, floor - way * (command - left - lost)))
 
 
-def _level(normal: Any, sliding: Any, row: Row, p: Any) -> Any:
+def _level(normal: Number, sliding: Number, row: Row, p: Parameters) -> Number:
     """Return F^n M + drag, or its floor."""
     return friction_level(1.0, normal * sliding + p[8], np.maximum(p[5], _haste(p) * magnitude(row.speed, row.side)))
 
 
-def _rate_slopes(row: Row, normal: Any, coefficient: Any, sliding: Any, level: Any, p: Any) -> Any:
+def _rate_slopes(
+    row: Row, normal: Number, coefficient: Number, sliding: Number, level: Number, p: Parameters
+) -> Numbers:
     """Return the derivatives of F^s' by v, F^s, F^n and phi."""
     surface, ratio, stiffness, stribeck, floor, exponent = p[0], p[1], p[2], p[4], p[5], p[6]
     own, by_speed, by_any = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
@@ -108,7 +111,7 @@ def _rate_slopes(row: Row, normal: Any, coefficient: Any, sliding: Any, level: A
     return by_speed + by_level * normal * slope, own, by_level * sliding, by_curvature
 
 
-def _driven(row: Row, p: Any) -> Any:
+def _driven(row: Row, p: Parameters) -> Numbers:
     surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _, acting = p
     coefficient = capstan_coefficient(surface, row.curvature)
     pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
@@ -121,7 +124,7 @@ def _driven(row: Row, p: Any) -> Any:
     return force, rate, loss, normal, coefficient, sliding, level, pressing
 
 
-def _driven_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _driven_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     viscous, lag = p[3], p[7]
     loss, normal, coefficient, sliding, level, pressing = signals
     by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
@@ -132,14 +135,14 @@ def _driven_slopes(row: Row, p: Any, signals: Any) -> Any:
     return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
 
 
-def _driven_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _driven_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
     # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
     slack = (row.command - signals[0]) * row.speed * (row.command <= signals[0])
     return stored, (1.0 - p[9]) * row.command * row.speed, coulomb, viscous, micro, slack
 
 
-def _passive(row: Row, p: Any) -> Any:
+def _passive(row: Row, p: Parameters) -> Numbers:
     surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _ = p
     coefficient = capstan_coefficient(surface, row.curvature)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
@@ -149,13 +152,13 @@ def _passive(row: Row, p: Any) -> Any:
     return -loss, rate, loss, row.load, coefficient, sliding, level
 
 
-def _passive_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _passive_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, normal, coefficient, sliding, level = signals
     by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
     return (0.0, -p[3], -1.0, -p[7], 0.0, 0.0, 0.0), (0.0, by_speed, own, by_normal, 0.0, by_curvature)
 
 
-def _passive_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _passive_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     return bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
 
 
@@ -200,7 +203,7 @@ PASSIVE_FRICTION = Law(
 )
 
 
-def _canal(row: Row, p: Any) -> Any:
+def _canal(row: Row, p: Parameters) -> Numbers:
     surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _, one_way = p
     # What pushes, where it can.
     lowest = -_ANY_FORCE * (one_way <= 0.0)
@@ -217,7 +220,7 @@ def _canal(row: Row, p: Any) -> Any:
     return force, rate, loss, normal, coefficient, sliding, level, pressing
 
 
-def _canal_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _canal_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     viscous, lag, one_way = p[3], p[7], 1.0 * (p[9] > 0.0)
     loss, normal, coefficient, sliding, level, pressing = signals
     by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
@@ -230,7 +233,7 @@ def _canal_slopes(row: Row, p: Any, signals: Any) -> Any:
     return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
 
 
-def _canal_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _canal_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
     return stored, coulomb, viscous, micro, -(signals[0] + force) * row.speed
 
@@ -250,16 +253,16 @@ CANAL_FRICTION = Law(
 )
 
 
-def _shared(row: Row, p: Any) -> Any:
+def _shared(row: Row, p: Parameters) -> Numbers:
     return np.maximum(row.command, 0.0) + p[0] * np.maximum(-row.command, 0.0), 0.0 * row.command
 
 
-def _shared_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _shared_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     by_command = 1.0 * (row.command > 0.0) - p[0] * (row.command < 0.0)
     return (0.0, 0.0, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _shared_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _shared_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     # Without an arm it has no speed, and no power.
     return 0.0 * force, force * row.speed
 

@@ -27,14 +27,15 @@ slopes finite at f_n = 0.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from finger_pin.laws.law import ContactLaw, Touch
+from finger_pin.typing import Number, Numbers, Parameters
 
 
-def _normal(touch: Touch, p: Any) -> Any:
+def _normal(touch: Touch, p: Parameters) -> Numbers:
     """Return d > 0 or 0, the spring force, the damping factor, and 1 for a contact that pushes, else 0."""
     stiffness, damping, exponent = p[:3]
     depth = -touch.gap * ((touch.gap < 0.0) | (touch.side > 0.0))
@@ -43,7 +44,7 @@ def _normal(touch: Touch, p: Any) -> Any:
     return depth, stiffness * np.abs(depth) ** (exponent - 1.0) * depth, factor, held
 
 
-def _cone(touch: Touch, pressing: Any, p: Any) -> Any:
+def _cone(touch: Touch, pressing: Number, p: Parameters) -> Numbers:
     """Return w, |w|, the sliding speed x that lowers mu, mu, and its excess over kinetic friction, mu - mu_k."""
     _, _, _, static, kinetic, stiffness, lag, stribeck, _ = p
     bend_1, bend_2 = touch.state_1 + lag * touch.slip_1, touch.state_2 + lag * touch.slip_2
@@ -53,7 +54,7 @@ def _cone(touch: Touch, pressing: Any, p: Any) -> Any:
     return bend_1, bend_2, bend, sliding, kinetic + excess, excess
 
 
-def _value(touch: Touch, p: Any) -> Any:
+def _value(touch: Touch, p: Parameters) -> Numbers:
     _, _, _, _, _, stiffness, lag, _, floor = p
     _, spring, factor, held = _normal(touch, p)
     normal = spring * factor * held
@@ -76,7 +77,7 @@ def _value(touch: Touch, p: Any) -> Any:
     )
 
 
-def _slopes(touch: Touch, p: Any, signals: Any) -> Any:
+def _slopes(touch: Touch, p: Parameters, signals: Numbers) -> tuple[Numbers, ...]:
     kn, damping, exponent, static, _, stiffness, lag, stribeck, floor = p
     depth, spring, factor, held = _normal(touch, p)
     touching = 1.0 * ((touch.gap < 0.0) | (touch.side > 0.0))
@@ -126,7 +127,9 @@ def _slopes(touch: Touch, p: Any, signals: Any) -> Any:
     )
 
 
-def _account(touch: Touch, p: Any, forces: Any, rates: Any, signals: Any) -> Any:
+def _account(
+    touch: Touch, p: Parameters, forces: Sequence[Number], rates: Sequence[Number], signals: Numbers
+) -> Numbers:
     _, _, exponent, _, _, stiffness, lag, _, _ = p
     depth, spring, _, _ = _normal(touch, p)
     bent = touch.state_1 * touch.state_1 + touch.state_2 * touch.state_2

@@ -22,37 +22,36 @@ p = 0.76.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.laws.bristle import bristle_account, friction_force, friction_level, stiction_rate, stiction_rate_slopes
 from finger_pin.laws.law import Law, Row, direction
+from finger_pin.typing import Number, Numbers, Parameters
 
 _EPSILON = 1e-4
 # Least level, N m: it keeps (9a) finite for a gearbox without dry friction.
 _FLOOR = 1e-9
 
 
-def stribeck_share(speed: Any, stribeck: Any, exponent: Any) -> Any:
+def stribeck_share(speed: Number, stribeck: Number, exponent: Number) -> Number:
     """Return exp(-(|v| / w)^p), smooth and 1 at rest."""
     square = (speed / stribeck) ** 2 + _EPSILON**2
     return np.exp(_EPSILON**exponent - square ** (0.5 * exponent))
 
 
-def stribeck_share_slope(speed: Any, stribeck: Any, exponent: Any, share: Any) -> Any:
+def stribeck_share_slope(speed: Number, stribeck: Number, exponent: Number, share: Number) -> Number:
     """Return the derivative of `stribeck_share` by v."""
     square = (speed / stribeck) ** 2 + _EPSILON**2
     return -share * exponent * square ** (0.5 * exponent - 1.0) * speed / (stribeck * stribeck)
 
 
-def loss_share(pull: Any, speed: Any, driving: Any, driven: Any, side: Any = 0.0) -> Any:
+def loss_share(pull: Number, speed: Number, driving: Number, driven: Number, side: Number = 0.0) -> Number:
     """Return the share of the tendons' torque T that gears lose, by the direction of power through them."""
     way = np.sign(pull) * direction(speed, side)
     return 0.5 * ((1.0 + way) * driving + (1.0 - way) * driven)
 
 
-def _value(row: Row, p: Any) -> Any:
+def _value(row: Row, p: Parameters) -> Numbers:
     base, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     share = stribeck_share(row.speed, velocity, exponent)
     dry = base + by_load * row.load + (stribeck + stribeck_by_load * row.load) * share
@@ -62,7 +61,7 @@ def _value(row: Row, p: Any) -> Any:
     return -loss, stiction_rate(row.state, row.speed, level, stiffness, row.side), loss, share, level
 
 
-def _slopes(row: Row, p: Any, signals: Any) -> Any:
+def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     _, share, level = signals
     own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
@@ -73,7 +72,7 @@ def _slopes(row: Row, p: Any, signals: Any) -> Any:
     return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed + by_level * steep, own, pressed, pulled, 0.0)
 
 
-def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stored, dry, viscous, _ = bristle_account(row.speed, row.state, rate, signals[2], p[7], p[6], 0.0)
     return stored, dry, viscous
 

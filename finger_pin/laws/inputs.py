@@ -7,48 +7,56 @@ so that bodies at rest on a palm at rest feel their weight (Featherstone, Rigid 
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
+from finger_pin.typing import Array, Number, Numbers, Numeric
 
-def proportional_torque(gain: Any, reference: Any, position: Any) -> Any:
+
+def proportional_torque(gain: Numeric, reference: Numeric, position: Numeric) -> Numeric:
     """Return tau^d = K_P (theta^d - theta), N m, equation (19)."""
     return gain * (reference - position)
 
 
-def internal_level(minimum: Any, minimal: Any, internal: Any) -> Any:
+def internal_level(minimum: Numeric, minimal: Numeric, internal: Numeric) -> Numeric:
     """Return (f0 - f^m) / f^k, whose largest entry is lambda of (22)."""
     return (minimum - minimal) / internal
 
 
-def harmonic(time: Any, offset: Any, amplitude: Any, frequency: Any, phase: Any) -> Any:
+def harmonic(time: Numeric, offset: Numeric, amplitude: Numeric, frequency: Numeric, phase: Numeric) -> Numeric:
     """Return offset + amplitude sin(2 pi frequency time + phase), rad."""
     return offset + amplitude * np.sin(2.0 * np.pi * frequency * time + phase)
 
 
-def harmonic_rate(time: Any, amplitude: Any, frequency: Any, phase: Any) -> Any:
+def harmonic_rate(time: Numeric, amplitude: Numeric, frequency: Numeric, phase: Numeric) -> Numeric:
     """Return the time derivative of `harmonic`, rad/s."""
     circular = 2.0 * np.pi * frequency
     return amplitude * circular * np.cos(circular * time + phase)
 
 
-def quintic(s: Any, c5: Any, c4: Any, c3: Any, c2: Any, c1: Any, c0: Any) -> Any:
+def quintic(s: Numeric, c5: Numeric, c4: Numeric, c3: Numeric, c2: Numeric, c1: Numeric, c0: Numeric) -> Numeric:
     """Return c5 s^5 + ... + c1 s + c0, by Horner's rule."""
     return ((((c5 * s + c4) * s + c3) * s + c2) * s + c1) * s + c0
 
 
-def quintic_rate(s: Any, c5: Any, c4: Any, c3: Any, c2: Any, c1: Any) -> Any:
+def quintic_rate(s: Numeric, c5: Numeric, c4: Numeric, c3: Numeric, c2: Numeric, c1: Numeric) -> Numeric:
     """Return the derivative of `quintic` with respect to s."""
     return (((5.0 * c5 * s + 4.0 * c4) * s + 3.0 * c3) * s + 2.0 * c2) * s + c1
 
 
-def quintic_curvature(s: Any, c5: Any, c4: Any, c3: Any, c2: Any) -> Any:
+def quintic_curvature(s: Numeric, c5: Numeric, c4: Numeric, c3: Numeric, c2: Numeric) -> Numeric:
     """Return the second derivative of `quintic` with respect to s."""
     return ((20.0 * c5 * s + 12.0 * c4) * s + 6.0 * c3) * s + 2.0 * c2
 
 
-def base_motion(first: Any, second: Any, third: Any, turns: Any, gravity: Any) -> Any:
+def base_motion(
+    first: Sequence[Number] | Array,
+    second: Sequence[Number] | Array,
+    third: Sequence[Number] | Array,
+    turns: Sequence[Number] | Array,
+    gravity: Sequence[Number] | Array,
+) -> Numbers:
     """Return 27 numbers: omega, w, omega', w' - R^T g, R^T g, and the rates of the first twelve.
 
     Args:
@@ -90,7 +98,9 @@ def base_motion(first: Any, second: Any, third: Any, turns: Any, gravity: Any) -
     return velocity + acceleration + (gx, gy, gz) + (a1, b1, c1, wx, wy, wz) + (a2, b2, c2, kx, ky, kz)
 
 
-def _turned_back(sr: Any, cr: Any, sp: Any, cp: Any, sy: Any, cy: Any, x: Any, y: Any, z: Any) -> Any:
+def _turned_back(
+    sr: Number, cr: Number, sp: Number, cp: Number, sy: Number, cy: Number, x: Number, y: Number, z: Number
+) -> Numbers:
     """Return R^T (x, y, z)."""
     along, across = cy * x + sy * y, cy * y - sy * x
     up = sp * along + cp * z

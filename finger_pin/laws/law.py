@@ -12,6 +12,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from finger_pin.typing import Array, Number, Numbers, Parameters
+
 
 class Row(NamedTuple):
     """The arguments of a law: numbers, or arrays that broadcast.
@@ -27,26 +29,26 @@ class Row(NamedTuple):
             rows during a step, so that what it integrates is smooth, and ends steps where a row leaves its side.
     """
 
-    length: Any
-    speed: Any
-    state: Any
-    load: Any
-    command: Any
-    curvature: Any
-    side: Any = 0.0
+    length: Number
+    speed: Number
+    state: Number
+    load: Number
+    command: Number
+    curvature: Number
+    side: Number = 0.0
 
 
-def beyond(kink: Any, side: Any) -> Any:
+def beyond(kink: Number, side: Number) -> Number:
     """Return 1 for a row on the positive side of its kink, or held there; else 0."""
     return 1.0 * (kink * (side == 0.0) + side > 0.0)
 
 
-def magnitude(value: Any, side: Any) -> Any:
+def magnitude(value: Number, side: Number) -> Number:
     """Return |x|, or x or -x for a row held on a side."""
     return np.abs(value) * (side == 0.0) + side * value
 
 
-def direction(value: Any, side: Any) -> Any:
+def direction(value: Number, side: Number) -> Number:
     """Return the derivative of `magnitude`: the sign of x, or the side of a held row."""
     return np.sign(value) * (side == 0.0) + side
 
@@ -85,16 +87,16 @@ class Law:
     arms: ClassVar[int] = 1
     states: ClassVar[int] = 1
 
-    def sees(self, length: Any, speed: Any, state: Any, load: Any, command: Any, curvature: Any) -> Row:
+    def sees(self, length: Array, speed: Array, state: Array, load: Array, command: Array, curvature: Array) -> Row:
         """Return the arguments of the law for rows, shape (..., k) each."""
         return Row(length, speed, state, load, command, curvature)
 
-    def act(self, row: Row, p: Any) -> tuple[Any, Any, tuple[Any, ...]]:
+    def act(self, row: Row, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
         """Return the rows' forces, the rates of their states, and their signals."""
         force, rate, *signals = self.value(row, p)
         return force, rate, tuple(signals)
 
-    def book(self, row: Row, p: Any, force: Any, rate: Any, signals: tuple[Any, ...]) -> Any:
+    def book(self, row: Row, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
         """Return stored energy, J, and powers, W, from the results of `act`."""
         return self.account(row, p, force, rate, signals)
 
@@ -112,13 +114,13 @@ class Touch(NamedTuple):
         side: On which side of its law's kink the contact is held, as in `Row`.
     """
 
-    gap: Any
-    speed: Any
-    slip_1: Any
-    slip_2: Any
-    state_1: Any
-    state_2: Any
-    side: Any = 0.0
+    gap: Number
+    speed: Number
+    slip_1: Number
+    slip_2: Number
+    state_1: Number
+    state_2: Number
+    side: Number = 0.0
 
 
 @dataclass(frozen=True)
@@ -154,22 +156,22 @@ class ContactLaw:
     arms: ClassVar[int] = 3
     states: ClassVar[int] = 2
 
-    def sees(self, length: Any, speed: Any, state: Any, load: Any, command: Any, curvature: Any) -> Touch:
+    def sees(self, length: Array, speed: Array, state: Array, load: Array, command: Array, curvature: Array) -> Touch:
         """Return the arguments for contacts; arms stand side by side, shape (..., 3 k), as states do, (..., 2 k)."""
         slips = (speed[..., each::3] for each in range(3))
         return Touch(length[..., ::3], *slips, *(state[..., each::2] for each in range(2)))
 
-    def act(self, touch: Touch, p: Any) -> tuple[Any, Any, tuple[Any, ...]]:
+    def act(self, touch: Touch, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
         """Return the contacts' forces, shape (..., 3 k), the rates of their states, (..., 2 k), and their signals."""
         found = self.value(touch, p)
         return _side_by_side(found[:3]), _side_by_side(found[3:5]), tuple(found[5:])
 
-    def book(self, touch: Touch, p: Any, force: Any, rate: Any, signals: tuple[Any, ...]) -> Any:
+    def book(self, touch: Touch, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
         """Return stored energy, J, and powers, W, from the results of `act`."""
         forces, rates = ([all_[..., each::count] for each in range(count)] for all_, count in ((force, 3), (rate, 2)))
         return self.account(touch, p, forces, rates, signals)
 
 
-def _side_by_side(parts: Sequence[Any]) -> Any:
+def _side_by_side(parts: Sequence[Number]) -> Array:
     stacked = np.stack(np.broadcast_arrays(*parts), axis=-1)
     return stacked.reshape(*stacked.shape[:-2], -1)

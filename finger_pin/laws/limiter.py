@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.laws.law import Law, Row, beyond
+from finger_pin.typing import Number, Numbers, Parameters
 
 
-def penetration(position: Any, lower: Any, upper: Any) -> Any:
+def penetration(position: Number, lower: Number, upper: Number) -> Number:
     """Return the depth of a joint beyond its range, positive above the upper limit, negative below the lower one."""
     return np.maximum(position - upper, 0.0) - np.maximum(lower - position, 0.0)
 
 
-def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> Any:
+def limiter_torque(depth: Number, velocity: Number, stiffness: Number, damping: Number) -> Number:
     """Return tau^r = max(0, k d (1 + c d')) with the sign of the penetration, N m.
 
     It enters (18) as -tau^r, so a positive torque acts against positive rotation.
@@ -28,24 +27,24 @@ def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> A
     return stiffness * depth * np.maximum(1.0 + damping * velocity * np.sign(depth), 0.0)
 
 
-def limiter_energy(depth: Any, stiffness: Any) -> Any:
+def limiter_energy(depth: Number, stiffness: Number) -> Number:
     """Return the elastic energy k d^2 / 2, J."""
     return 0.5 * stiffness * depth * depth
 
 
-def limiter_loss(torque: Any, depth: Any, velocity: Any, stiffness: Any) -> Any:
+def limiter_loss(torque: Number, depth: Number, velocity: Number, stiffness: Number) -> Number:
     """Return the power that the contact does not store, (tau^r - k d) theta', W; never negative."""
     return (torque - stiffness * depth) * velocity
 
 
-def _seen(row: Row, p: Any) -> Any:
+def _seen(row: Row, p: Parameters) -> Numbers:
     """Return the side of the nearer limit, 1 or -1, the penetration d, and 1 + c d'."""
     lower, upper, _, damping = p
     end = 2.0 * (row.length > 0.5 * (lower + upper)) - 1.0
     return end, np.maximum(row.length - upper, lower - row.length), 1.0 + damping * row.speed * end
 
 
-def _value(row: Row, p: Any) -> Any:
+def _value(row: Row, p: Parameters) -> Numbers:
     end, past, factor = _seen(row, p)
     # The torque bends where the joint meets its limit, and where the limiter would begin to pull.
     grip = np.minimum(past, factor)
@@ -53,14 +52,14 @@ def _value(row: Row, p: Any) -> Any:
     return -torque, 0.0 * row.length, end * np.maximum(past, 0.0), grip
 
 
-def _slopes(row: Row, p: Any, signals: Any) -> Any:
+def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, _, stiffness, damping = p
     _, past, factor = _seen(row, p)
     gripping = stiffness * beyond(signals[1], row.side)
     return (-factor * gripping, -damping * past * gripping, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stiffness, depth = p[2], signals[0]
     return limiter_energy(depth, stiffness), limiter_loss(-force, depth, row.speed, stiffness)
 

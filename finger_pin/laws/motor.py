@@ -10,17 +10,16 @@ is limited they apply less than was asked for, so that U i = R i^2 + tau w alway
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.laws.law import Law, Row
+from finger_pin.typing import Number, Numbers, Parameters
 
 # Least share of a torque that gears are expected to leave.
 _LEAST = 1e-3
 
 
-def friction_torque(speed: Any, torque: Any, p: Any) -> tuple[Any, Any, Any]:
+def friction_torque(speed: Number, torque: Number, p: Parameters) -> tuple[Number, Number, Number]:
     """Return the torque that is expected to overcome friction, N m, smooth over a reversal, and its slopes.
 
     With s = tanh(w / w_r) for the sign of w, the level is linear in its load of either sign; one sign comes out.
@@ -43,20 +42,20 @@ def friction_torque(speed: Any, torque: Any, p: Any) -> tuple[Any, Any, Any]:
     return eased * level + viscous * speed, by_speed, eased * side * by_torque / left * (torque > 0.0)
 
 
-def asked_voltage(speed: Any, command: Any, p: Any) -> Any:
+def asked_voltage(speed: Number, command: Number, p: Parameters) -> Number:
     """Return the voltage that the drive asks for before any limit, V; see `MOTOR` for ``p``."""
     constant, resistance, by_current, gain = p[0], p[1], p[4], p[5]
     torque = gain * command + friction_torque(speed, gain * command, p)[0]
     return by_current * (resistance * torque / constant + constant * speed) + (1.0 - by_current) * command
 
 
-def free_current(speed: Any, asked: Any, p: Any) -> Any:
+def free_current(speed: Number, asked: Number, p: Parameters) -> Number:
     """Return the current without its limit, A, for an asked voltage, V."""
     constant, resistance, supply = p[0], p[1], p[2]
     return (np.minimum(np.maximum(asked, -supply), supply) - constant * speed) / resistance
 
 
-def _value(row: Row, p: Any) -> Any:
+def _value(row: Row, p: Parameters) -> Numbers:
     constant, resistance, limit = p[0], p[1], p[3]
     free = free_current(row.speed, asked_voltage(row.speed, row.command, p), p)
     current = np.minimum(np.maximum(free, -limit), limit)
@@ -64,7 +63,7 @@ def _value(row: Row, p: Any) -> Any:
     return constant * current, 0.0 * row.length, current, voltage
 
 
-def _slopes(row: Row, p: Any, signals: Any) -> Any:
+def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     constant, resistance, supply, limit, by_current, gain = p[0], p[1], p[2], p[3], p[4], p[5]
     asked = asked_voltage(row.speed, row.command, p)
     within = constant / resistance * (np.abs(free_current(row.speed, asked, p)) < limit)
@@ -75,7 +74,7 @@ def _slopes(row: Row, p: Any, signals: Any) -> Any:
     return (0.0, by_speed, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     current, voltage = signals
     return 0.0 * row.length, voltage * current, p[1] * current * current
 

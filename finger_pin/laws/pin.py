@@ -7,8 +7,6 @@ alone, M^d R tanh(v / v_r) + b v: it needs no state and cannot stick; below its 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.laws.bristle import (
@@ -20,12 +18,13 @@ from finger_pin.laws.bristle import (
     stiction_rate_slopes,
 )
 from finger_pin.laws.law import Law, Row
+from finger_pin.typing import Number, Numbers, Parameters
 
 #: Signals that any law of a joint's friction gives.
 SIGNALS = ("friction", "normal_force", "coefficient", "level")
 
 
-def _dahl_value(row: Row, p: Any) -> Any:
+def _dahl_value(row: Row, p: Parameters) -> Numbers:
     kinetic, stiffness, viscous, floor = p
     level = friction_level(row.load, kinetic, floor)
     rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
@@ -33,7 +32,7 @@ def _dahl_value(row: Row, p: Any) -> Any:
     return -loss, rate, loss, row.load, kinetic + 0.0 * row.load, level
 
 
-def _dahl_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _dahl_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     kinetic, stiffness, viscous, floor = p
     level = signals[3]
     own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
@@ -41,25 +40,25 @@ def _dahl_slopes(row: Row, p: Any, signals: Any) -> Any:
     return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_load, 0.0, 0.0)
 
 
-def _dahl_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _dahl_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     return bristle_account(row.speed, row.state, rate, signals[3], p[1], p[2], 0.0)
 
 
-def _coulomb_value(row: Row, p: Any) -> Any:
+def _coulomb_value(row: Row, p: Parameters) -> Numbers:
     kinetic, viscous, reversal_speed = p
     level = kinetic * row.load
     loss = level * np.tanh(row.speed / reversal_speed) + viscous * row.speed
     return -loss, 0.0 * row.speed, loss, row.load, kinetic + 0.0 * row.load, level
 
 
-def _coulomb_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _coulomb_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     kinetic, viscous, reversal_speed = p
     share = np.tanh(row.speed / reversal_speed)
     by_speed = -signals[3] * (1.0 - share * share) / reversal_speed - viscous
     return (0.0, by_speed, 0.0, 0.0, -kinetic * share, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _coulomb_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _coulomb_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     dry = signals[3] * np.tanh(row.speed / p[2]) * row.speed
     return 0.0 * row.speed, dry, p[1] * row.speed * row.speed, 0.0 * row.speed
 

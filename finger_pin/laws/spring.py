@@ -12,16 +12,15 @@ way, it pulls with 1 - h / (1 - h k / s0) of its force.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.laws.bristle import bristle_energy, coulomb_loss, friction_level, stiction_rate, stiction_rate_slopes
 from finger_pin.laws.law import Law, Row, beyond
 from finger_pin.laws.limiter import penetration
+from finger_pin.typing import Number, Numbers, Numeric, Parameters
 
 
-def spring_torque(position: Any, velocity: Any, stiffness: Any, rest: Any, damping: Any) -> Any:
+def spring_torque(position: Numeric, velocity: Numeric, stiffness: Numeric, rest: Numeric, damping: Numeric) -> Numeric:
     """Return tau^k = k (theta - theta_0) + c theta', N m.
 
     It enters (18) as -tau^k, so a positive torque acts against positive rotation.
@@ -36,27 +35,27 @@ def spring_torque(position: Any, velocity: Any, stiffness: Any, rest: Any, dampi
     return stiffness * (position - rest) + damping * velocity
 
 
-def spring_energy(position: Any, stiffness: Any, rest: Any) -> Any:
+def spring_energy(position: Number, stiffness: Number, rest: Number) -> Number:
     """Return the elastic energy k (theta - theta_0)^2 / 2, J."""
     return 0.5 * stiffness * (position - rest) * (position - rest)
 
 
-def spring_loss(velocity: Any, damping: Any) -> Any:
+def spring_loss(velocity: Number, damping: Number) -> Number:
     """Return the power lost in the damping, c theta'^2, W."""
     return damping * velocity * velocity
 
 
-def _value(row: Row, p: Any) -> Any:
+def _value(row: Row, p: Parameters) -> Numbers:
     stiffness, rest, damping = p
     return -spring_torque(row.length, row.speed, stiffness, rest, damping), 0.0 * row.length
 
 
-def _slopes(row: Row, p: Any, signals: Any) -> Any:
+def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     stiffness, _, damping = p
     return (-stiffness, -damping, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stiffness, rest, damping = p
     return spring_energy(row.length, stiffness, rest), spring_loss(row.speed, damping)
 
@@ -72,15 +71,15 @@ JOINT_SPRING = Law(
 )
 
 
-def _constant(row: Row, p: Any) -> Any:
+def _constant(row: Row, p: Parameters) -> Numbers:
     return p[0] + 0.0 * row.length, 0.0 * row.length
 
 
-def _constant_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _constant_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _constant_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _constant_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     return (-p[0] * row.length,)
 
 
@@ -88,28 +87,28 @@ def _constant_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> 
 CONSTANT_FORCE = Law("constant force", ("force",), _constant, _constant_slopes, _constant_account)
 
 
-def half_tension(stretch: Any, stiffness: Any) -> Any:
+def half_tension(stretch: Number, stiffness: Number) -> Number:
     """Return max(0, K_h stretch), N: one half of a passive tendon, equations (5) and (12)."""
     return np.maximum(0.0, stiffness * stretch)
 
 
-def half_energy(stretch: Any, stiffness: Any) -> Any:
+def half_energy(stretch: Number, stiffness: Number) -> Number:
     """Return the elastic energy of one half of a passive tendon, J; zero when slack."""
     return 0.5 * stiffness * np.maximum(0.0, stretch) ** 2
 
 
-def _half_value(row: Row, p: Any) -> Any:
+def _half_value(row: Row, p: Parameters) -> Numbers:
     (stiffness,) = p
     return half_tension(-row.length, stiffness), 0.0 * row.length
 
 
-def _half_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _half_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     (stiffness,) = p
     by_length = -stiffness * (row.length < 0.0)
     return (by_length, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _half_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _half_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     (stiffness,) = p
     return (half_energy(-row.length, stiffness),)
 
@@ -124,24 +123,24 @@ TENDON_HALF = Law(
 )
 
 
-def elastic_energy(stretch: Any, stiffness: Any) -> Any:
+def elastic_energy(stretch: Number, stiffness: Number) -> Number:
     """Return the elastic energy K e^2 / 2, J; zero when slack."""
     return 0.5 * stiffness * np.maximum(0.0, stretch) ** 2
 
 
-def _elastic_value(row: Row, p: Any) -> Any:
+def _elastic_value(row: Row, p: Parameters) -> Numbers:
     stiffness, damping = p
     pull = -stiffness * row.length - damping * row.speed
     return pull * beyond(pull, row.side), 0.0 * row.length, pull
 
 
-def _elastic_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _elastic_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     stiffness, damping = p
     taut = beyond(signals[0], row.side)
     return (-stiffness * taut, -damping * taut, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _elastic_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _elastic_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stiffness, stretch = p[0], np.maximum(0.0, -row.length)
     return elastic_energy(stretch, stiffness), (stiffness * stretch - force) * row.speed
 
@@ -159,19 +158,19 @@ ELASTIC_TENDON = Law(
 )
 
 
-def _dead_band_value(row: Row, p: Any) -> Any:
+def _dead_band_value(row: Row, p: Parameters) -> Numbers:
     stiffness, lower, upper, damping = p
     stretch = penetration(row.length, lower, upper)
     return -stiffness * stretch - damping * row.speed, 0.0 * row.length, stretch
 
 
-def _dead_band_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _dead_band_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     stiffness, _, _, damping = p
     by_length = -stiffness * np.abs(np.sign(signals[0]))
     return (by_length, -damping, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _dead_band_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _dead_band_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stiffness, _, _, damping = p
     return spring_energy(signals[0], stiffness, 0.0), spring_loss(row.speed, damping)
 
@@ -188,20 +187,20 @@ DEAD_BAND_SPRING = Law(
 )
 
 
-def _hysteresis_value(row: Row, p: Any) -> Any:
+def _hysteresis_value(row: Row, p: Parameters) -> Numbers:
     share, stiffness, floor = p
     level = friction_level(row.load, share, floor)
     return -row.state, stiction_rate(row.state, row.speed, level, stiffness, row.side), level
 
 
-def _hysteresis_slopes(row: Row, p: Any, signals: Any) -> Any:
+def _hysteresis_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     share, stiffness, floor = p
     own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, signals[0], stiffness, row.side)
     by_load = by_level * share * (signals[0] > floor)
     return (0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_load, 0.0, 0.0)
 
 
-def _hysteresis_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+def _hysteresis_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     return bristle_energy(row.state, p[1]), coulomb_loss(row.state, row.speed, signals[0])
 
 

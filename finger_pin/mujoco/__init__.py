@@ -11,10 +11,10 @@ except ImportError:
     raise InputError("mujoco", "is not installed: pip install 'finger-pin[mujoco]'") from None
 
 from finger_pin.exchange.mujoco_overlay import add_tendons
-from finger_pin.mujoco.known_answer import try_known_answer
+from finger_pin.mujoco.self_test import try_self_test
 from finger_pin.mujoco.signals import Signals, friction
 from finger_pin.mujoco.specification import MujocoWarning, add_friction
 
-try_known_answer()
+try_self_test()
 
 __all__ = ["MujocoWarning", "Signals", "add_friction", "add_tendons", "friction"]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from finger_pin.core.jit import njit_inline
+from finger_pin.core.jit import Pointer, njit_inline
+from finger_pin.mujoco.layout import Data, Kinds, Model
 from finger_pin.mujoco.memory import integer, integer_in, integers, number_in, numbers, size
 
 # What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
@@ -12,7 +11,7 @@ _NOTHING = 1e-12
 
 
 @njit_inline
-def write_rows(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any) -> None:
+def write_rows(m: int, d: int, at: Model, of: Data, kinds: Kinds, rows: Pointer, dt: float) -> None:
     """Write the solver's rows: of islands their copies too, of a dual one the diagonal of its matrix."""
     width, ne, nefc = size(m, at.nv), integer(d, of.ne), integer(d, of.nefc)
     kind, which = integers(d, of.efc_type), integers(d, of.efc_id)
@@ -40,7 +39,7 @@ def write_rows(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any)
 
 
 @njit_inline
-def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -> Any:
+def _diagonal(m: int, d: int, at: Model, of: Data, kinds: Kinds, r: int, nefc: int) -> int:
     """Return the address of a diagonal entry of the dual solver's matrix, in its dense or its sparse form."""
     how = integer(m, at.jacobian)
     # As mj_isSparse: automatic is sparse from 60 degrees of freedom on.
@@ -53,8 +52,8 @@ def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -
 
 
 @njit_inline
-def row_forces(m: Any, d: Any, at: Any, of: Any, kinds: Any, width: Any, found: Any) -> None:
-    """Note the forces of the solver's rows of friction, by degree of freedom and tendon."""
+def row_forces(m: int, d: int, at: Model, of: Data, kinds: Kinds, width: int, found: Pointer) -> None:
+    """Record the forces of the solver's rows of friction, by degree of freedom and tendon."""
     ne = integer(d, of.ne)
     for r in range(ne, ne + integer(d, of.nf)):
         row = integer_in(d, of.efc_id, r)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
-from finger_pin.core.jit import njit_inline
+from finger_pin.core.jit import Pointer, njit_inline
 from finger_pin.exchange.mujoco_friction import (
     BRANCH,
     DRAG,
@@ -21,14 +21,28 @@ from finger_pin.exchange.mujoco_friction import (
     SHARE,
     VISCOUS,
 )
+from finger_pin.mujoco.layout import Data, Kinds, Model
 from finger_pin.mujoco.loads import between, spring, turn_of_path
 from finger_pin.mujoco.memory import integer_in, integers, number_in, numbers
+
+#: Speed, load, normal force, largest friction, turn, and the complex number of a path's turn.
+Seen: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
 @njit_inline
 def tendon(
-    m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, force: Any, held: Any, along: Any, about: Any, reactions: Any
-) -> Any:
+    m: int,
+    d: int,
+    at: Model,
+    of: Data,
+    kinds: Kinds,
+    e: int,
+    force: float,
+    held: float,
+    along: Pointer,
+    about: Pointer,
+    reactions: Pointer,
+) -> Seen:
     """Return speed, tension, normal force, largest friction and turn of a tendon: (14). See `vectorised_law`."""
     p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
@@ -61,7 +75,7 @@ def tendon(
 
 
 @njit_inline
-def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> Any:
+def _turn(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, tendon: int) -> tuple[float, float, float]:
     """Return the angle by which a path turns besides its offset, (15) or along its points: see `turn_of_path`."""
     if tendon >= 0 and integer_in(d, of.ten_wrapnum, tendon) > 0:
         return turn_of_path(d, of, tendon)
@@ -74,7 +88,7 @@ def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> 
 
 
 @njit_inline
-def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -> Any:
+def mass(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, reactions: Pointer) -> Seen:
     """Return speed, load, normal force, largest friction and turn of a slide that is a passive tendon's mass: (14c)."""
     p, objects, types = (
         numbers(m, at.tuple_objprm, e),
@@ -95,7 +109,7 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
 
 
 @njit_inline
-def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> Any:
+def pin(m: int, d: int, at: Model, of: Data, e: int, held: int, reactions: Pointer) -> Seen:
     """Return speed, load, normal force, largest friction and turn of a joint's pin: (17)."""
     joint = integer_in(m, at.tuple_objid, e)
     dof = integer_in(m, at.jnt_dofadr, joint)
@@ -109,7 +123,7 @@ def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> 
 
 
 @njit_inline
-def _proximal(m: Any, d: Any, at: Any, of: Any, joint: Any) -> Any:
+def _proximal(m: int, d: int, at: Model, of: Data, joint: int) -> tuple[float, float, float]:
     """Return e_j: from the joint before to this one, or the x axis of its carrier."""
     parent, joints, count = integers(m, at.body_parentid), integers(m, at.body_jntadr), integers(m, at.body_jntnum)
     anchor, own = numbers(d, of.xanchor), integer_in(m, at.jnt_bodyid, joint)

@@ -11,6 +11,7 @@ import numpy as np
 
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, PluginFriction
+from finger_pin.mujoco.name_matching import RoutedFriction
 from finger_pin.typing import Array
 
 # Kinds of joints that have one coordinate.
@@ -20,7 +21,7 @@ _PARALLEL = 1e-9
 
 
 def frictions(
-    model: Any,
+    model: mujoco.MjModel,
     tendons: dict[str, tuple[Any, bool]],
     joints: dict[str, tuple[Any, bool]],
     branches: dict[str, list[tuple[str, float]]],
@@ -67,7 +68,9 @@ def frictions(
     return _with_loss(model, found)
 
 
-def add_branches(spec: Any, model: Any, names: Iterable[str]) -> dict[str, list[tuple[str, float]]]:
+def add_branches(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, names: Iterable[str]
+) -> dict[str, list[tuple[str, float]]]:
     """Add a tendon along each branch behind a pulley of some tendons, by which it rubs; it exerts nothing else.
 
     Returns:
@@ -91,7 +94,7 @@ def add_branches(spec: Any, model: Any, names: Iterable[str]) -> dict[str, list[
     return found
 
 
-def _with_loss(model: Any, found: list[PluginFriction]) -> list[PluginFriction]:
+def _with_loss(model: mujoco.MjModel, found: list[PluginFriction]) -> list[PluginFriction]:
     """Return frictions, the constant one of a joint in whose row tendons act as the drag of the first of these."""
     rows = {each.row for each in found if each.kind == PIN}
     kept = []
@@ -104,25 +107,25 @@ def _with_loss(model: Any, found: list[PluginFriction]) -> list[PluginFriction]:
     return kept
 
 
-def pulled(model: Any, names: Iterable[str]) -> list[str]:
+def pulled(model: mujoco.MjModel, names: Iterable[str]) -> list[str]:
     """Return the tendons among some that an actuator, a spring, a limit or an equality pulls."""
     return [name for name in names if _held(model, model.tendon(name).id)]
 
 
-def _held(model: Any, tendon: int) -> bool:
+def _held(model: mujoco.MjModel, tendon: int) -> bool:
     """Return whether a tendon has an actuator, a spring, a limit or an equality of its own."""
     kinds = mujoco.mjtTrn
     driven = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
     return bool(driven.any() or model.tendon_stiffness[tendon] > 0.0 or _limited_or_coupled(model, tendon))
 
 
-def _limited_or_coupled(model: Any, tendon: int) -> bool:
+def _limited_or_coupled(model: mujoco.MjModel, tendon: int) -> bool:
     coupled = model.eq_type == mujoco.mjtEq.mjEQ_TENDON
     held = coupled & ((model.eq_obj1id == tendon) | (model.eq_obj2id == tendon))
     return bool(held.any() or model.tendon_limited[tendon])
 
 
-def _share(model: Any, tendon: int, names: list[str]) -> float:
+def _share(model: mujoco.MjModel, tendon: int, names: list[str]) -> float:
     """Return the share of a fixed tendon in the drive of the only joint that it runs over; see `PluginFriction`.
 
     Zero of all others, and of those that have an actuator or a spring of their own.
@@ -141,7 +144,7 @@ def _share(model: Any, tendon: int, names: list[str]) -> float:
     return float((1.0 if alike == len(arms) else -1.0) / alike)
 
 
-def _coefficients(model: Any, tendon: int) -> Array:
+def _coefficients(model: mujoco.MjModel, tendon: int) -> Array:
     """Return the coefficients of a fixed tendon, shape (joints,); zeros of a spatial one."""
     found = np.zeros(model.njnt)
     for k in _pieces(model, tendon):
@@ -150,11 +153,11 @@ def _coefficients(model: Any, tendon: int) -> Array:
     return found
 
 
-def _pieces(model: Any, tendon: int) -> range:
+def _pieces(model: mujoco.MjModel, tendon: int) -> range:
     return range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
 
 
-def _row(model: Any, name: str, first: list[tuple[str, Array]]) -> tuple[str, bool, float]:
+def _row(model: mujoco.MjModel, name: str, first: list[tuple[str, Array]]) -> tuple[str, bool, float]:
     """Return the row that a tendon acts in: its joint's, an earlier parallel one's, or its own, which is noted."""
     over = _coefficients(model, model.tendon(name).id)
     joints = np.flatnonzero(over)
@@ -169,13 +172,13 @@ def _row(model: Any, name: str, first: list[tuple[str, Array]]) -> tuple[str, bo
     return name, False, 1.0
 
 
-def _tendon_law(model: Any, name: str, law: Any) -> tuple[float, ...]:
+def _tendon_law(model: mujoco.MjModel, name: str, law: Any) -> tuple[float, ...]:
     drag = law.drag or float(model.tendon_frictionloss[model.tendon(name).id])
     ratio = (law.coulomb, law.stiction_ratio, law.stiffness, law.viscous, law.stribeck_velocity)
     return (*ratio, law.floor, law.stribeck_exponent, law.micro_damping, drag, law.curvature_offset)
 
 
-def _crossed(model: Any, name: str, law: Any) -> tuple[tuple[bool, str, float], ...]:
+def _crossed(model: mujoco.MjModel, name: str, law: RoutedFriction) -> tuple[tuple[bool, str, float], ...]:
     """Return the joints that a tendon crosses before its first pulley, with 1 for those that bend a fixed one."""
     tendon, movers = model.tendon(name).id, None
     found = dict.fromkeys(np.flatnonzero(_coefficients(model, tendon)), 1.0)
@@ -200,7 +203,7 @@ def _crossed(model: Any, name: str, law: Any) -> tuple[tuple[bool, str, float], 
     )
 
 
-def _movers(model: Any, body: int) -> set[int]:
+def _movers(model: mujoco.MjModel, body: int) -> set[int]:
     """Return the joints that move a body."""
     found = set[int]()
     while body:

@@ -11,8 +11,6 @@ this speed and level.
 
 from __future__ import annotations
 
-from typing import Any
-
 from finger_pin.core.jit import njit_inline, scratch
 from finger_pin.exchange.mujoco_friction import (
     BRANCH,
@@ -33,6 +31,7 @@ from finger_pin.exchange.mujoco_friction import (
 )
 from finger_pin.mujoco.constraint_rows import row_forces, write_rows
 from finger_pin.mujoco.elements import mass, pin, tendon
+from finger_pin.mujoco.layout import Contact, Data, Kinds, Model
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
 from finger_pin.mujoco.memory import (
     flags,
@@ -71,7 +70,7 @@ _LOW = 0xFFFFFFFF
 
 
 @njit_inline
-def instance_of(m: Any, instance: Any, at: Any, kinds: Any) -> Any:
+def instance_of(m: int, instance: int, at: Model, kinds: Kinds) -> tuple[int, int]:
     """Return the actuator and the tuple of an instance; -1 without them, or without friction."""
     if integer(m, at.integrator) == kinds.discrete:
         return -1, -1
@@ -90,7 +89,7 @@ def instance_of(m: Any, instance: Any, at: Any, kinds: Any) -> Any:
 
 
 @njit_inline
-def signals(m: Any, instance: Any, at: Any) -> Any:
+def signals(m: int, instance: int, at: Model) -> int:
     """Return the number of signals of an instance in plugin_state; MuJoCo asks before a model has its tuples."""
     digits, k, count = flags(m, at.plugin_attr), integer_in(m, at.plugin_attradr, instance), 0
     while digits[k] != 0:
@@ -99,8 +98,8 @@ def signals(m: Any, instance: Any, at: Any) -> Any:
 
 
 @njit_inline
-def init(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> Any:
-    """Note the actuator and the tuple of an instance in a new mjData; -1 if friction is impossible."""
+def init(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) -> int:
+    """Store the actuator and the tuple of an instance in a new mjData; -1 if friction is impossible."""
     actuator, which = instance_of(m, instance, at, kinds)
     if which < 0:
         return -1
@@ -109,20 +108,20 @@ def init(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> Any:
 
 
 @njit_inline
-def copy(to: Any, d: Any, instance: Any, of: Any) -> None:
+def copy(to: int, d: int, instance: int, of: Data) -> None:
     """Copy the notes of `init`."""
     words(to, of.plugin_data)[instance] = words(d, of.plugin_data)[instance]
 
 
 @njit_inline
-def reset(m: Any, state: Any, instance: Any, at: Any) -> None:
+def reset(m: int, state: int, instance: int, at: Model) -> None:
     """Forget all signals."""
     for k in range(signals(m, instance, at)):
         numbers_at(state)[k] = 0.0
 
 
 @njit_inline
-def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None:
+def compute(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) -> None:
     """Write the rows of all frictions, the rates of their bristles, and their signals."""
     key, width = words(d, of.plugin_data)[instance], size(m, at.nv)
     e, end = _entries(m, at, key >> 32)
@@ -177,14 +176,14 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
 
 
 @njit_inline
-def _entries(m: Any, at: Any, which: Any) -> Any:
+def _entries(m: int, at: Model, which: int) -> tuple[int, int]:
     """Return the first element of a tuple, and the one after its last."""
     first = integer_in(m, at.tuple_adr, which)
     return first, first + integer_in(m, at.tuple_size, which)
 
 
 @njit_inline
-def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
+def _start(m: int, at: Model, key: int, instance: int) -> tuple[int, int, int]:
     """Return the addresses of the first friction's bristles, loads and signals."""
     bristles = integer_in(m, at.actuator_actadr, key & _LOW)
     loads = bristles + signals(m, instance, at) // SIGNALS
@@ -192,7 +191,7 @@ def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
 
 
 @njit_inline
-def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds: Any) -> None:
+def advance(m: int, d: int, instance: int, at: Model, of: Data, contact: Contact, kinds: Kinds) -> None:
     """Move bristles by (9a), and note the solver's force of each friction, and its next load."""
     key, width = words(d, of.plugin_data)[instance], size(m, at.nv)
     e, end = _entries(m, at, key >> 32)
@@ -231,7 +230,7 @@ def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds
 
 
 @njit_inline
-def _speed(m: Any, d: Any, at: Any, of: Any, element: Any, is_joint: Any) -> Any:
+def _speed(m: int, d: int, at: Model, of: Data, element: int, is_joint: bool) -> float:
     """Return the present speed of a joint, or of a tendon's length along its present arms."""
     speeds = numbers(d, of.qvel)
     if is_joint:

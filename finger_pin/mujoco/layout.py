@@ -59,12 +59,12 @@ Kinds = namedtuple(
 
 
 @cache
-def _structure(name: str) -> Any:
+def _structure(name: str) -> type[ctypes.Structure]:
     """Return a struct of MuJoCo as one of ctypes."""
     return _made(name, structs.STRUCTS[name])
 
 
-def _made(name: str, declared: Any) -> Any:
+def _made(name: str, declared: structs.StructDecl) -> type[ctypes.Structure]:
     fields = [(each.name, _type(each.type)) for each in declared.fields]
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
@@ -92,7 +92,7 @@ def _offsets(owner: str, wanted: Any, **more: int) -> Any:
     return wanted(*(more[name] if name in more else getattr(structure, name).offset for name in wanted._fields))
 
 
-def layout() -> tuple[Any, Any, Any, Any]:
+def layout() -> tuple[Model, Data, Contact, Kinds]:
     """Return offsets in mjModel, mjData and mjContact, bytes, and the numbers of enumerations.
 
     Raises:
@@ -113,7 +113,7 @@ def layout() -> tuple[Any, Any, Any, Any]:
     return model, data, contact, kinds
 
 
-def _kinds() -> Any:
+def _kinds() -> Kinds:
     trn, cnstr, obj = mujoco.mjtTrn, mujoco.mjtConstraint, mujoco.mjtObj
     return Kinds(
         *(int(each) for each in (trn.mjTRN_JOINT, trn.mjTRN_JOINTINPARENT, trn.mjTRN_TENDON)),
@@ -139,7 +139,7 @@ _SAMPLE = """
 <custom><tuple name="t"><element objtype="tendon" objname="f" prm="1"/></tuple></custom></mujoco>"""
 
 
-def _disagreements(at: Any, of: Any, contact: Any) -> list[str]:
+def _disagreements(at: Model, of: Data, contact: Contact) -> list[str]:
     """Return the fields whose addresses are not those of NumPy's views, on a model that has one of each."""
     model = mujoco.MjModel.from_xml_string(_SAMPLE)
     data = mujoco.MjData(model)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from finger_pin.core.jit import njit_inline, power_over
+from finger_pin.core.jit import Pointer, njit_inline, power_over
+from finger_pin.mujoco.layout import Contact, Data, Kinds, Model
 from finger_pin.mujoco.memory import (
     flags,
     integer,
@@ -20,7 +20,7 @@ from finger_pin.mujoco.memory import (
 
 
 @njit_inline
-def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any) -> None:
+def driven(m: int, d: int, at: Model, of: Data, kinds: Kinds, along: Pointer, about: Pointer) -> None:
     """Add the actuators' forces along tendons, N, and on degrees of freedom, N m or N, within their limits.
 
     MuJoCo clamps forces after plugins have been asked, so that they are clamped here.
@@ -43,7 +43,7 @@ def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any)
 
 
 @njit_inline
-def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
+def spring(m: int, d: int, at: Model, of: Data, tendon: int) -> float:
     """Return the force of a tendon's own spring and damper along it, N, negative in tension."""
     stiffness, damping = number_in(m, at.tendon_stiffness, tendon), number_in(m, at.tendon_damping, tendon)
     damped = -damping * number_in(d, of.ten_velocity, tendon) if damping != 0.0 else 0.0
@@ -54,7 +54,7 @@ def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
 
 
 @njit_inline
-def between(points: Any, first: Any, second: Any) -> Any:
+def between(points: Pointer, first: int, second: int) -> tuple[float, float, float]:
     """Return the way from one of MuJoCo's points to another, m."""
     return (
         points[3 * second] - points[3 * first],
@@ -64,7 +64,7 @@ def between(points: Any, first: Any, second: Any) -> Any:
 
 
 @njit_inline
-def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
+def turn_of_path(d: int, of: Data, tendon: int) -> tuple[float, float, float]:
     """Return half turns, rad, and the complex number whose angle is the rest by which a spatial tendon's path turns.
 
     That is up to its first pulley: each branch behind it is a tendon of its own. Of a wrap both tangent points are in
@@ -94,7 +94,7 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
 
 
 @njit_inline
-def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any, found: Any) -> None:
+def held_tensions(m: int, d: int, at: Model, of: Data, kinds: Kinds, found: Pointer) -> None:
     """Add the forces of limits and equalities along tendons, N, by the solver's last forces."""
     kind, which, force = integers(d, of.efc_type), integers(d, of.efc_id), numbers(d, of.efc_force)
     couples, first, second = integers(m, at.eq_type), integers(m, at.eq_obj1id), integers(m, at.eq_obj2id)
@@ -108,7 +108,9 @@ def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any, found: Any) -> N
 
 
 @njit_inline
-def contact_loads(m: Any, d: Any, at: Any, of: Any, contact: Any, kinds: Any, place: Any, act: Any) -> None:
+def contact_loads(
+    m: int, d: int, at: Model, of: Data, contact: Contact, kinds: Kinds, place: Pointer, act: Pointer
+) -> None:
     """Add the contact forces on bodies beyond joints, world frame, N: ``place`` is the index in act, or 0."""
     first = size(d, of.contact)
     parent, carrier = integers(m, at.body_parentid), integers(m, at.geom_bodyid)
@@ -132,7 +134,7 @@ def contact_loads(m: Any, d: Any, at: Any, of: Any, contact: Any, kinds: Any, pl
 
 
 @njit_inline
-def _contact_force(d: Any, of: Any, contact: Any, kinds: Any, one: Any, row: Any) -> Any:
+def _contact_force(d: int, of: Data, contact: Contact, kinds: Kinds, one: int, row: int) -> tuple[float, float, float]:
     """Return the force of a contact on its second geom, world frame, N."""
     exerted, frame = numbers(d, of.efc_force), numbers_at(one + contact.frame)
     dim, kind = integers_at(one + contact.dim)[0], integer_in(d, of.efc_type, row)

@@ -13,7 +13,7 @@ from finger_pin.core.jit import address_of
 from finger_pin.exceptions import InputError
 from finger_pin.exchange import mujoco_friction as table
 from finger_pin.mujoco import kernel
-from finger_pin.mujoco.layout import layout
+from finger_pin.mujoco.layout import Contact, Data, Kinds, Model, layout
 
 _CALLBACKS = (
     *("nstate", "nsensordata", "init", "destroy", "copy", "reset", "compute", "advance", "visualize"),
@@ -34,25 +34,25 @@ class _Plugin(ctypes.Structure):
     )
 
 
-def _callbacks(at: Any, of: Any, contact: Any, kinds: Any) -> dict[str, int]:
+def _callbacks(at: Model, of: Data, contact: Contact, kinds: Kinds) -> dict[str, int]:
     """Return the addresses of the callbacks, of which offsets are constants."""
 
-    def nstate(m: Any, instance: Any) -> Any:
+    def nstate(m: int, instance: int) -> int:
         return kernel.signals(m, instance, at)
 
-    def init(m: Any, d: Any, instance: Any) -> Any:
+    def init(m: int, d: int, instance: int) -> int:
         return kernel.init(m, d, instance, at, of, kinds)
 
-    def copy(to: Any, m: Any, d: Any, instance: Any) -> None:
+    def copy(to: int, m: int, d: int, instance: int) -> None:
         kernel.copy(to, d, instance, of)
 
-    def reset(m: Any, state: Any, data: Any, instance: Any) -> None:
+    def reset(m: int, state: int, data: int, instance: int) -> None:
         kernel.reset(m, state, instance, at)
 
-    def compute(m: Any, d: Any, instance: Any, capability: Any) -> None:
+    def compute(m: int, d: int, instance: int, capability: int) -> None:
         kernel.compute(m, d, instance, at, of, kinds)
 
-    def advance(m: Any, d: Any, instance: Any) -> None:
+    def advance(m: int, d: int, instance: int) -> None:
         kernel.advance(m, d, instance, at, of, contact, kinds)
 
     signatures: dict[Any, str] = {
@@ -66,7 +66,7 @@ def _callbacks(at: Any, of: Any, contact: Any, kinds: Any) -> dict[str, int]:
     return {each.__name__: address_of(made, each, announced=False) for each, made in signatures.items()}
 
 
-def _library() -> Any:
+def _library() -> ctypes.CDLL:
     """Return the MuJoCo that Python has loaded."""
     folder = Path(mujoco.__file__).parent
     for pattern in ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll"):

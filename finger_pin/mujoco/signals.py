@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -45,7 +44,7 @@ class Signals:
         return self.names.index(name)
 
 
-def friction(model: Any, data: Any) -> Signals:
+def friction(model: mujoco.MjModel, data: mujoco.MjData) -> Signals:
     """Return the friction of tendons and joints of a model that `add_friction` has prepared.
 
     Arrays are parts of ``data``, without copies, where the model has one such hand; of several attached ones they are
@@ -71,13 +70,13 @@ def friction(model: Any, data: Any) -> Signals:
     return Signals(tuple(name for each in found for name in each.names), **arrays)
 
 
-def _table(model: Any, actuator: int) -> int | None:
+def _table(model: mujoco.MjModel, actuator: int) -> int | None:
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) or ""
     found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TUPLE, name)
     return found if found >= 0 and name.endswith(NAME) else None
 
 
-def _signals(model: Any, data: Any, actuator: int) -> Signals:
+def _signals(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Signals:
     table = _table(model, actuator)
     assert table is not None
     e = int(model.tuple_adr[table])

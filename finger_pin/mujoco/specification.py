@@ -12,8 +12,8 @@ import numpy as np
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.exchange.mujoco_friction import COUNT, GROUP, LEAST_LOSS, NAME, NO_INPUT, PLUGIN, PluginFriction
 from finger_pin.mujoco.frictions import add_branches, frictions, pulled
+from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose
 from finger_pin.mujoco.registration import register
-from finger_pin.mujoco.selection import JOINT, TENDON_KEYS, choose
 
 Keys = Mapping[str, Mapping[str, Any]]
 
@@ -25,7 +25,7 @@ class MujocoWarning(ScenarioWarning):
     """A MuJoCo model has an option, or a step, with which friction is less than it could be."""
 
 
-def add_friction(spec: Any, tendons: Keys | None = None, joints: Keys | None = None) -> None:
+def add_friction(spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys | None = None) -> None:
     """Add friction that grows with tension, and holds, to a MuJoCo model.
 
     Tendons rub in their canals by (9), (14) and (16), joints on their pins by (9) and (17). Names may have stars
@@ -77,13 +77,13 @@ def add_friction(spec: Any, tendons: Keys | None = None, joints: Keys | None = N
     _write(spec, model, found)
 
 
-def _damping(model: Any, friction: PluginFriction) -> float:
+def _damping(model: mujoco.MjModel, friction: PluginFriction) -> float:
     """Return h D / m of a friction: dampers and servos on it and its row are implicit, and its solver sees none."""
     places = {(friction.of_joint, friction.name), (friction.row_of_joint, friction.row)}
     return float(model.opt.timestep * sum(_damping_rate(model, *each) for each in places))
 
 
-def _damping_rate(model: Any, of_joint: bool, name: str) -> float:
+def _damping_rate(model: mujoco.MjModel, of_joint: bool, name: str) -> float:
     """Return D / m of a joint or a tendon, 1/s."""
     kinds = mujoco.mjtTrn
     if of_joint:
@@ -101,7 +101,7 @@ def _damping_rate(model: Any, of_joint: bool, name: str) -> float:
     return float(gain * weight)
 
 
-def _name_all(spec: Any) -> None:
+def _name_all(spec: mujoco.MjSpec) -> None:
     """Give what has no name one, by which the table and branches know it."""
     named = {"tendon": spec.tendons, "joint": spec.joints, "site": spec.sites, "geom": spec.geoms}
     for what, elements in named.items():
@@ -109,7 +109,7 @@ def _name_all(spec: Any) -> None:
             each.name = each.name or f"{what}_{index}"
 
 
-def _write(spec: Any, model: Any, found: list[PluginFriction]) -> None:
+def _write(spec: mujoco.MjSpec, model: mujoco.MjModel, found: list[PluginFriction]) -> None:
     """Add actuator, tuple and plugin, and prepare the rows."""
     elements = [element for each in found for element in each.elements()]
     kinds, names, values = zip(*elements, strict=True)
@@ -135,7 +135,7 @@ def _write(spec: Any, model: Any, found: list[PluginFriction]) -> None:
         row.frictionloss = max(float(row.frictionloss), abs(each.ratio) * each.least, LEAST_LOSS)
 
 
-def _target(spec: Any, found: list[PluginFriction]) -> tuple[str, Any]:
+def _target(spec: mujoco.MjSpec, found: list[PluginFriction]) -> tuple[str, mujoco.mjtTrn]:
     """Return the target of the actuator, on which it does nothing: something driven, whose tree does not sleep."""
     for each in spec.actuators:
         if each.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_TENDON):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -24,7 +25,7 @@ _T3, _T5, _T7, _T9, _T11, _T13, _T15, _T17, _T19 = (1.0 / k for k in range(3, 20
 
 
 @njit_inline
-def exponential(x: Any) -> Any:
+def exponential(x: float) -> float:
     """Return exp(x) of x <= 0 to 4e-16 of it: by 2^n and Taylor's series of the rest, at most ln 2 / 2."""
     x = _LEAST if x < _LEAST else x
     rounded = x * _PER_LN2 + _ROUND
@@ -39,7 +40,7 @@ def exponential(x: Any) -> Any:
 
 
 @njit_inline
-def angle(real: Any, imaginary: Any) -> Any:
+def angle(real: float, imaginary: float) -> float:
     """Return the angle of a complex number whose imaginary part is not negative, from 0 to pi, to 1e-15.
 
     y / (x + |x + i y|) is the tangent of half of it: three times, and Taylor's series of what is left, at most tan(pi /
@@ -63,12 +64,12 @@ _numpy.exp, _numpy.abs, _numpy.maximum = exponential, np.abs, np.maximum
 
 
 @njit_inline
-def _magnitude(value: Any, _side: Any) -> Any:
+def _magnitude(value: float, _side: float) -> float:
     """Return |x|: here no friction is held on a side."""
     return abs(value)
 
 
-def compiled_law(law: Any) -> Any:
+def compiled_law(law: Callable[..., Any]) -> Callable[..., Any]:
     """Return a law of `finger_pin.laws`, compiled with this exponential in place of NumPy's."""
     known = {"np": _numpy, "magnitude": _magnitude}
     return njit_inline(FunctionType(law.__code__, known, law.__name__, law.__defaults__))

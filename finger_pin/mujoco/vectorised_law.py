@@ -6,9 +6,8 @@ Lane i of field f is number ``WIDTH * f + i`` of a block. Fields up to `DRAG` ar
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from finger_pin.core.jit import njit_inline
+from finger_pin.core.jit import Pointer, njit_inline
 from finger_pin.exchange.mujoco_friction import (
     COULOMB,
     DRAG,
@@ -42,14 +41,14 @@ _coefficient, _capstan, _least = (
 
 
 @njit_inline
-def bent(x: Any, count: Any) -> None:
+def bent(x: Pointer, count: int) -> None:
     """Add the angles of complex numbers to the turns of as many lanes as are said: none, or `WIDTH`."""
     for i in range(count):
         x[WIDTH * BENDS + i] += angle(x[WIDTH * REAL + i], x[WIDTH * IMAGINARY + i])
 
 
 @njit_inline
-def exerted(x: Any, dt: Any) -> None:
+def exerted(x: Pointer, dt: float) -> None:
     """Find the level of each lane by (9b), (16), and its part of a row: F - x, c + b, and the most that it exerts."""
     for i in range(WIDTH):
         of_pin = x[WIDTH * KIND + i] == PIN
@@ -78,14 +77,14 @@ def exerted(x: Any, dt: Any) -> None:
 
 
 @njit_inline
-def slid(force: Any, moved: Any, level: Any) -> Any:
+def slid(force: float, moved: float, level: float) -> tuple[float, float]:
     """Return F^s by (9a) after a way s0 v dt at this speed and level, exactly, and the share of it that is left."""
     steady, decay = math.copysign(level, moved), exponential(-abs(moved) / level)
     return steady + (force - steady) * decay, decay
 
 
 @njit_inline
-def moved_on(x: Any, count: Any) -> None:
+def moved_on(x: Pointer, count: int) -> None:
     """Move bristles on by (9a): F^s, then levels, then ways s0 v dt, as many as are said, a multiple of `WIDTH`."""
     for i in range(count):
         x[i] = slid(x[i], x[2 * count + i], x[count + i])[0]

@@ -22,8 +22,8 @@ from finger_pin.exceptions import InputError, IntegrationError, Interrupted, Sel
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.interrupting import CtrlC
-from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.prepared import Prepared
+from finger_pin.simulation.progress import notebook_bar
 from finger_pin.simulation.recording import refuse_unknown
 from finger_pin.simulation.sampled_trajectory import Quantity
 from finger_pin.simulation.simulate import simulate

@@ -18,7 +18,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.files import write_table, write_text
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
-from finger_pin.simulation.notebook import notebook_bar
+from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import PointList
 from finger_pin.studies.executor import open_executor

@@ -14,7 +14,7 @@ from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
-from finger_pin.simulation.notebook import notebook_bar
+from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
 from finger_pin.studies.executor import open_executor

@@ -5,8 +5,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.commands.application import run
-from finger_pin.description.recordings.columns import read_columns
-from finger_pin.description.recordings.units import in_si
+from finger_pin.description.recordings.columns import in_si, read_columns
 from finger_pin.identification.checkpoint import NAME
 from finger_pin.views.report import summarize_identification, write_report
 

@@ -6,7 +6,7 @@ from sliders import XML
 
 import finger_pin as fp
 from finger_pin.mujoco import MujocoWarning, specification
-from finger_pin.mujoco.known_answer import try_known_answer
+from finger_pin.mujoco.self_test import try_self_test
 
 
 def rope(**options):
@@ -75,7 +75,7 @@ def test_friction_whose_actuator_is_deleted_leaves_a_model_that_moves_and_takes_
 def test_a_mujoco_that_does_not_take_actuators_without_a_control_is_told_by_its_version_in_one_line(monkeypatch):
     monkeypatch.setattr(specification, "NO_INPUT", 1)
     with pytest.raises(fp.InputError) as caught:
-        try_known_answer()
+        try_self_test()
     assert caught.value.entry == f"mujoco {mujoco.__version__}" and "\n" not in str(caught.value)
 
 

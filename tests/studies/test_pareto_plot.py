@@ -27,6 +27,9 @@ def test_designs_front_and_start_lie_where_they_are_and_what_breaks_a_bound_is_l
     for x, y in ([1.0, 2.0], [2.0, 1.0]):
         assert close.get_xlim()[0] < x < close.get_xlim()[1]
         assert close.get_ylim()[0] < y < close.get_ylim()[1]
+    # The frame of the magnified part ends with the panel.
+    (frame,) = axes.patches
+    assert frame.get_clip_box() is not None and frame.get_bbox().x0 == close.get_xlim()[0]
     assert axes.get_xlabel() == "long a (N)"
 
 

@@ -1,5 +1,7 @@
 """Figures of sweeps: which kind is drawn, and that what is drawn is what was found."""
 
+import itertools
+
 import matplotlib.collections
 import numpy as np
 import pytest
@@ -65,25 +67,46 @@ def test_a_map_has_ticks_at_the_values_swept_and_says_in_words_what_is_the_same_
 
 
 @pytest.mark.parametrize("kind", ["sample", "grid"])
-def test_more_keys_and_samples_are_drawn_as_parallel_coordinates_of_all_runs(kind):
+def test_more_keys_and_samples_are_drawn_as_a_point_per_run_over_each_key_with_failures_marked(kind):
     if kind == "sample":
-        result = made({"a": [0.0, 1.0, 3.0], "b": [9.0, 8.0, 7.0]}, ("sample",), m=[4.0, np.nan, 6.0])
-        rows, keys = [[0.0, 1.0, 0.0], [1.0, 0.0, 1.0]], 2
+        keys = {"a": [0.0, 1.0, 3.0], "b": [9.0, 8.0, 7.0]}
+        result = made(keys, ("sample",), m=[4.0, np.nan, 6.0], n=[1.0, 0.0, 2.0])
+        points = {(0, 0): [(0, 4), (3, 6)], (0, 1): [(7, 6), (9, 4)], (1, 0): [(0, 1), (1, 0), (3, 2)]}
+        failures, size = {(0, 0): [1.0], (0, 1): [8.0], (1, 1): [8.0]}, (2, 2)
     else:
-        axis = [0.0, 2.0]
-        values = np.arange(8.0).reshape(2, 2, 2)
+        axis, values = [0.0, 2.0], np.arange(8.0).reshape(2, 2, 2)
         values[0, 0, 1] = np.nan
         result = made({"a": axis, "b": axis, "c": axis}, ("a", "b", "c"), m=values)
-        places = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-        rows, keys = [[i, j, k, values[i, j, k] / 7.0] for i, j, k in places if not np.isnan(values[i, j, k])], 3
-    axes = plot_sweep(result).axes[0]
-    (lines,) = (each for each in axes.collections if isinstance(each, matplotlib.collections.LineCollection))
-    drawn = sorted(segment[:, 1].tolist() for segment in lines.get_segments())
-    assert drawn == sorted(rows)
-    assert any(len(line.get_xdata()) == keys and line.get_linestyle() == ":" for line in axes.lines)
+        # The last key runs fastest.
+        points = {(0, 2): [(0, 0), (0, 2), (0, 4), (0, 6), (2, 3), (2, 5), (2, 7)]}
+        failures, size = {(0, 0): [0.0], (0, 1): [0.0], (0, 2): [2.0]}, (1, 3)
+    figure = plot_sweep(result)
+    panels = np.reshape(figure.axes, size)
+    for place, expected in points.items():
+        drawn = np.stack(panels[place].lines[0].get_data(), axis=1)
+        assert sorted(map(tuple, drawn[np.isfinite(drawn).all(axis=1)])) == expected
+    for place, expected in failures.items():
+        assert panels[place].lines[1].get_xdata().tolist() == expected
+    assert figure.get_suptitle() == f"{result.status.size - 1} runs, 1 failed or missing (crosses)"
+    assert [axes.get_xlabel() for axes in panels[-1]] == [f"{key} (m)" for key in result.coords]
+    assert [axes.get_ylabel() for axes in panels[:, 0]] == ["m (N)", "n (N)"][: size[0]]
 
 
-def test_names_stand_side_by_side_in_lines_maps_and_parallel_coordinates():
+@pytest.mark.parametrize("width", ["column", "page", None])
+def test_the_text_of_many_keys_overlaps_at_no_width(width):
+    keys = {name: 1e-3 * np.arange(1.0, 6.0) for name in (RADIUS, "controller.gain", "c", "simulation.method")}
+    keys["d"] = ["Rodas5P", "BDF", "Rodas5P", "BDF", "BDF"]
+    figure = plot_sweep(made(keys, ("sample",), m=np.arange(5.0)), width=width)
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for axes in figure.axes for text in (axes.xaxis.label, axes.yaxis.label)]
+    for axes in figure.axes:
+        low, high = axes.get_xlim()
+        boxes += [each.get_window_extent() for each in axes.get_xticklabels() if low <= each.get_position()[0] <= high]
+    for first, second in itertools.combinations(boxes, 2):
+        assert not first.padded(-1.0).overlaps(second.padded(-1.0))
+
+
+def test_names_stand_side_by_side_in_lines_maps_and_points():
     methods, switch = ["Rodas4", "Rodas5P", "BDF"], [True, False]
     (axes,) = plot_sweep(made({"simulation.method": methods}, ("simulation.method",), m=[3.0, 1.0, 2.0])).axes
     (line,) = axes.lines
@@ -99,9 +122,8 @@ def test_names_stand_side_by_side_in_lines_maps_and_parallel_coordinates():
     (mesh,) = (each for each in axes.collections if isinstance(each, matplotlib.collections.QuadMesh))
     np.testing.assert_array_equal(mesh.get_array(), values.T)
     axes = plot_sweep(made({"a": ["x", "y", "x"], "b": [1.0, 2.0, 3.0]}, ("sample",), m=[4.0, 5.0, 6.0])).axes[0]
-    (lines,) = (each for each in axes.collections if isinstance(each, matplotlib.collections.LineCollection))
-    assert sorted(segment[0, 1] for segment in lines.get_segments()) == [0.0, 0.0, 1.0]
-    assert {"x", "y"} <= {text.get_text() for text in axes.texts}
+    assert axes.lines[0].get_xdata().tolist() == [0.0, 1.0, 0.0]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["x", "y"]
 
 
 def test_keys_of_one_value_take_no_part():
@@ -114,15 +136,15 @@ def test_a_sweep_of_failures_alone_is_drawn_without_a_number():
         keys = {name: np.arange(1.0, 1.0 + size) for name, size in zip("abc", shape, strict=False)}
         figure = plot_sweep(made(keys, tuple(keys), m=np.full(shape, np.nan)))
         figure.draw_without_rendering()
-        return figure.axes[0]
+        return figure
 
-    values, failures = drawn(1).lines[:2]
+    values, failures = drawn(1).axes[0].lines[:2]
     assert np.isnan(values.get_ydata()).all() and failures.get_xdata().tolist() == [1.0]
-    plane = drawn(2, 2)
+    plane = drawn(2, 2).axes[0]
     (crosses,) = plane.lines
     assert np.stack(crosses.get_data(), axis=1).tolist() == [[1.0, 1.0], [1.0, 2.0], [2.0, 1.0], [2.0, 2.0]]
     assert not plane.collections
-    assert drawn(2, 2, 2).get_title(loc="left").startswith("0 runs, 8 failed")
+    assert drawn(2, 2, 2).get_suptitle().startswith("0 runs, 8 failed")
 
 
 def test_infinite_metrics_leave_the_finite_ones_drawn():

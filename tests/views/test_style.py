@@ -57,7 +57,7 @@ def settings():
 before = settings()
 from finger_pin.exceptions import InputError
 from finger_pin.views import plots
-plots.plot_friction_law()
+plots.plot_critical_friction("ub")
 print("matplotlib.pyplot" in sys.modules, "tkinter" in sys.modules, settings() == before)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -92,23 +92,14 @@ def nothing_overlaps(figure):
 
 @pytest.mark.parametrize("width", ["column", "page"])
 @pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
-def test_nothing_overlaps_and_nothing_is_cut_off_at_any_width_and_after_resizing(draw, width):
-    figure = draw(synthetic(), width=width, titles=False)
+@pytest.mark.parametrize("titles", [True, False])
+def test_nothing_overlaps_and_nothing_is_cut_off_at_any_width_and_after_enlarging(draw, width, titles):
+    figure = draw(synthetic(), width=width, titles=titles)
     assert figure.get_figwidth() == {"column": 3.5, "page": 7.16}[width]
-    assert not any(axes.get_title(loc=side) for axes in figure.axes for side in ("left", "center", "right"))
+    assert titles or not any(axes.get_title(loc="left") for axes in figure.axes)
     for factor in (1.0, 1.4):
         figure.set_size_inches(factor * figure.get_size_inches())
         nothing_overlaps(figure)
-
-
-@pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
-def test_a_figure_that_is_made_half_as_wide_has_its_titles_and_legends_in_more_lines(draw):
-    figure = draw(synthetic())
-    before = [legend.get_window_extent().width for part in figure.findobj(SubFigure) for legend in part.legends]
-    figure.set_size_inches(0.45 * figure.get_figwidth(), figure.get_figheight())
-    nothing_overlaps(figure)
-    after = [legend.get_window_extent().width for part in figure.findobj(SubFigure) for legend in part.legends]
-    assert len(before) == len(after) and max(after) < max(before)
 
 
 def test_a_width_that_is_none_is_refused():
@@ -129,3 +120,11 @@ def test_figures_are_written_in_the_format_that_was_asked_for(tmp_path):
 
 def test_a_notebook_shows_a_figure_though_it_belongs_to_no_window():
     assert plot_friction_law()._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_png_is_drawn_once_and_the_figure_keeps_its_layout(tmp_path, monkeypatch):
+    figure = plots.plot_energy(synthetic(samples=5))
+    line, engine, drawn = figure.axes[0].lines[0], figure.get_layout_engine(), []
+    monkeypatch.setattr(line, "draw", drawn.append)
+    plots.save_figure(figure, tmp_path / "energy.png")
+    assert len(drawn) == 1 and figure.get_layout_engine() is engine

@@ -7,13 +7,13 @@ coefficients do. A culled pair keeps a lower bound of its gap, from which such p
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import RATE
-from finger_pin.core.jit import njit_always_inline, njit_inline
-from finger_pin.core.path_tables import COLUMNS
+from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
+from finger_pin.core.path_tables import COLUMNS, Paths, PathWork
+from finger_pin.core.tables import Tables
 
 # A gap is known so well, m; and a pair is active where so many steps as the last one might close it.
 KNOWN, _AHEAD = 1e-9, 3.0
@@ -22,7 +22,7 @@ _STRAIGHT = 1e-14
 
 
 @njit_always_inline
-def record_start_gaps(tables: Any, own: Any) -> None:
+def record_start_gaps(tables: Tables, own: PathWork) -> None:
     """Record the gap of every active pair at the start of a step."""
     paths = tables.paths
     for e in range(paths.columns.size):
@@ -31,7 +31,7 @@ def record_start_gaps(tables: Any, own: Any) -> None:
 
 
 @njit_inline
-def distance(paths: Any, e: int, own: Any) -> Any:
+def distance(paths: Paths, e: int, own: PathWork) -> float:
     """Return the largest distance of the core of a gap's first body from the origin of its frame, m."""
     total = 0.0
     for c in range(3):
@@ -41,7 +41,7 @@ def distance(paths: Any, e: int, own: Any) -> Any:
 
 
 @njit_always_inline
-def bound_step_motion(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
+def bound_step_motion(dense: Matrix, k: Matrix, x: Vector, end: Vector, size: int, own: PathWork) -> None:
     """Bound the motion of a step: fill its interpolant's Bernstein coefficients and the path of each coordinate."""
     last, control = k.shape[0] - 1, own.control
     for j in range(size):
@@ -59,7 +59,7 @@ def bound_step_motion(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any)
 
 
 @njit_always_inline
-def bound_linear_motion(x: Any, end: Any, size: int, own: Any) -> None:
+def bound_linear_motion(x: Vector, end: Vector, size: int, own: PathWork) -> None:
     """Bound a motion along a straight line: fill its Bernstein coefficients and the path of each coordinate."""
     for j in range(size):
         for i in range(5):
@@ -68,7 +68,7 @@ def bound_linear_motion(x: Any, end: Any, size: int, own: Any) -> None:
 
 
 @njit_inline
-def path_of(tables: Any, e: int, own: Any) -> Any:
+def path_of(tables: Tables, e: int, own: PathWork) -> float:
     """Return a bound of the relative path of a contact's bodies in the bounded motion, m."""
     paths, control = tables.paths, own.control
     endless = np.isinf(paths.extents[e])
@@ -89,7 +89,7 @@ def path_of(tables: Any, e: int, own: Any) -> Any:
 
 
 @njit_inline
-def widened(path: float, turned: float, far: float) -> Any:
+def widened(path: float, turned: float, far: float) -> float:
     """Return a path plus that of a turn about a point as far away as the distance and the path, m."""
     if turned == 0.0:
         return path
@@ -97,20 +97,20 @@ def widened(path: float, turned: float, far: float) -> Any:
 
 
 @njit_inline
-def set_culled(k: int, value: int, culled: Any) -> None:
+def set_culled(k: int, value: int, culled: Indices) -> None:
     """Set or clear the flag `culled` of a contact's rows."""
     for m in range(k, k + 3):
         culled[m] = value
 
 
-def activate_all(tables: Any, own: Any) -> None:
+def activate_all(tables: Tables, own: PathWork) -> None:
     """Make all contact pairs active, outside compiled code."""
     own.culled[:], own.active_pairs[:] = 0, np.arange(own.active_pairs.size)
     own.active_pair_count[0] = tables.touching // COLUMNS
 
 
 @njit_inline
-def list_active_pairs(tables: Any, own: Any) -> None:
+def list_active_pairs(tables: Tables, own: PathWork) -> None:
     """List the active contact pairs."""
     count = 0
     for e in range(tables.touching // COLUMNS):
@@ -121,7 +121,7 @@ def list_active_pairs(tables: Any, own: Any) -> None:
 
 
 @njit_always_inline
-def activate_near(tables: Any, own: Any) -> None:
+def activate_near(tables: Tables, own: PathWork) -> None:
     """Activate the pairs that may close in the bounded motion; fill the paths of all."""
     paths = tables.paths
     for e in range(paths.columns.size):
@@ -135,7 +135,7 @@ def activate_near(tables: Any, own: Any) -> None:
 
 
 @njit_always_inline
-def record_end_gaps(tables: Any, own: Any) -> None:
+def record_end_gaps(tables: Tables, own: PathWork) -> None:
     """Record the gap of every active pair at the end of a bounded motion."""
     paths = tables.paths
     for e in range(paths.columns.size):
@@ -144,7 +144,7 @@ def record_end_gaps(tables: Any, own: Any) -> None:
 
 
 @njit_always_inline
-def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
+def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
     for m in range(k + 1, k + 3):
         if not abs(states[tables.state[m]]) < _STRAIGHT:
@@ -155,7 +155,7 @@ def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
 
 
 @njit_inline
-def update_culling(tables: Any, rows: Any, own: Any, states: Any) -> bool:
+def update_culling(tables: Tables, rows: Matrix, own: PathWork, states: Vector) -> bool:
     """Cull or activate contact pairs at the end of a step, by bounds of their gaps there.
 
     Returns:
@@ -181,7 +181,7 @@ def update_culling(tables: Any, rows: Any, own: Any, states: Any) -> bool:
 
 
 @njit_inline
-def activate_all_pairs(tables: Any, work: Any) -> None:
+def activate_all_pairs(tables: Tables, work: Work) -> None:
     """Make all contact pairs active, as where nothing is known of them."""
     for k in range(tables.touching):
         work.paths.culled[k] = 0
@@ -191,7 +191,7 @@ def activate_all_pairs(tables: Any, work: Any) -> None:
 
 
 @njit_inline
-def activate_since(tables: Any, work: Any, first: Any, second: Any, before: Any, after: Any) -> None:
+def activate_since(tables: Tables, work: Work, first: Matrix, second: Matrix, before: Vector, after: Vector) -> None:
     """Activate the pairs that may have closed between two states, given with their quaternions."""
     for f in range(tables.charts.size):
         # What a free body has turned by: its angles count from its attitude.
@@ -210,7 +210,7 @@ def activate_since(tables: Any, work: Any, first: Any, second: Any, before: Any,
 
 
 @njit_inline
-def cull_distant(tables: Any, work: Any, state: Any, before: Any) -> None:
+def cull_distant(tables: Tables, work: Work, state: Vector, before: Vector) -> None:
     """Cull the pairs that are far apart at a state, and store the state for `activate_since`."""
     record_end_gaps(tables, work.paths)
     update_culling(tables, work.rows, work.paths, state[2 * work.torque.size :])

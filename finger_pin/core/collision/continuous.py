@@ -10,16 +10,20 @@ of its largest second derivative.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
 from finger_pin.core.collision.broad_phase import KNOWN, bound_step_motion, distance, path_of, set_culled, widened
 from finger_pin.core.evaluation.law_code import SIDE
-from finger_pin.core.jit import call_at, njit_always_inline, njit_inline
-from finger_pin.core.path_tables import LOOKS
-from finger_pin.core.tables import END, FIRST, KINK
+from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
+from finger_pin.core.model import Model
+from finger_pin.core.path_tables import LOOKS, PathWork
+from finger_pin.core.stepping.rosenbrock import Integration
+from finger_pin.core.tables import END, FIRST, KINK, Tables
 
+# Bernstein coefficients of a coordinate over a step.
+_Coefficients: TypeAlias = tuple[float, float, float, float, float]
 # Of a step in which all touches have been seen, and of one in which a culled pair may have closed.
 NOTHING, MISSED_BY_CULLING = 2.0, 1.0
 # To this distances are computed, m; and bodies that part are followed until they are so far out, or have moved by so
@@ -32,12 +36,12 @@ _SHARE, _GAP, _NORMAL, _FAR = 0, 1, 2, 5
 
 
 @njit_inline
-def _difference(own: Any, j: int, other: int, i: int) -> Any:
+def _difference(own: PathWork, j: int, other: int, i: int) -> float:
     return own.control[j, i] if other < 0 else own.control[j, i] - own.control[other, i]
 
 
 @njit_always_inline
-def _between(start: float, end: float, b: Any) -> Any:
+def _between(start: float, end: float, b: _Coefficients) -> _Coefficients:
     """Return the Bernstein coefficients of a part of a polynomial."""
     b0, b1, b2, b3, b4 = b
     s, c = end, 1.0 - end
@@ -52,7 +56,7 @@ def _between(start: float, end: float, b: Any) -> Any:
 
 
 @njit_always_inline
-def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
+def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> tuple[float, float]:
     """Return bounds of the path between two moments, and of its distance from its chord, m."""
     paths, far = tables.paths, max(one[_FAR], two[_FAR])
     endless = np.isinf(paths.extents[e])
@@ -92,7 +96,7 @@ def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
 
 
 @njit_always_inline
-def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
+def _clear(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> bool:
     """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
     path, bend = _bounds(tables, own, e, one, two)
     if one[_GAP] < 0.0 or two[_GAP] < 0.0:
@@ -111,7 +115,7 @@ def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
 
 
 @njit_inline
-def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None:
+def _look(integration: Integration, model: Model, e: int, share: float, seen: Vector) -> None:
     """Store a gap and its slopes at a share of the step."""
     own, state = model.work.paths, model.state
     s, c = share, 1.0 - share
@@ -127,7 +131,7 @@ def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None
 
 
 @njit_always_inline
-def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
+def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: Vector) -> float:
     """Return the time just after bodies have met that are apart at one moment and not at another."""
     looks = model.work.paths.looks
     early, late, middle = one[_SHARE], two[_SHARE], looks[LOOKS - 1]
@@ -141,7 +145,7 @@ def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
 
 
 @njit_inline
-def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
+def _scan(integration: Integration, model: Model, e: int, seen: bool) -> float:
     """Return the share of the step to a meeting of bodies that part again before its end, or `NOTHING`.
 
     Those that are not apart at its end have parted too, unless that is ``seen``.
@@ -171,7 +175,7 @@ def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
 
 
 @njit_always_inline
-def _pressed(tables: Any, rows: Any, k: int) -> bool:
+def _pressed(tables: Tables, rows: Matrix, k: int) -> bool:
     """Return whether a contact presses, or would if it were not held open."""
     pressed = False
     for g in range(tables.groups.shape[0]):
@@ -181,7 +185,7 @@ def _pressed(tables: Any, rows: Any, k: int) -> bool:
 
 
 @njit_always_inline
-def detect_missed_contacts(integration: Any, model: Any) -> float:
+def detect_missed_contacts(integration: Integration, model: Model) -> float:
     """Return the share of a tried step after which bodies touch and part again before its end, or `NOTHING`.
 
     It is `MISSED_BY_CULLING` if a culled pair is closed at the end, or may be: it is active now.

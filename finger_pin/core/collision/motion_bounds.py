@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.chains import Chains
-from finger_pin.core.evaluation.rigid_body import PRISMATIC, ROTATION, TRANSLATION
+from finger_pin.core.chains import PRISMATIC, ROTATION, TRANSLATION, Chains
 from finger_pin.mechanism.path_elements import PathElement
 from finger_pin.typing import Array
 

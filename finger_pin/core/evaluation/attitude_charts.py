@@ -8,20 +8,20 @@ angular velocity in the body's frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.chains import ROTATION
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.evaluation.rigid_body import ROTATION
-from finger_pin.core.jit import njit_always_inline, njit_inline
+from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
+from finger_pin.core.tables import Tables
 from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 
 
-def place(frame: Any, q: Any, body: Any) -> None:
+def place(frame: Matrix, q: Vector, body: Vector) -> None:
     """Write the attitude of a quaternion into the placement of the first body that turns, whose z axis is its x axis.
 
     Args:
@@ -40,7 +40,7 @@ def place(frame: Any, q: Any, body: Any) -> None:
         body[ROTATION + 3 * r + 2] = frame[r, 0] * along_x[0] + frame[r, 1] * along_x[1] + frame[r, 2] * along_x[2]
 
 
-def place_all(tables: Any, attitude: Any) -> None:
+def place_all(tables: Tables, attitude: Matrix) -> None:
     """Place all free bodies by their quaternions, shape (f, 4)."""
     for f in range(tables.charts.size):
         place(tables.chart_frames[f], attitude[f], tables.bodies[tables.charts[f]])
@@ -52,7 +52,7 @@ place_bodies = inlined(place_all)
 
 
 @njit_always_inline
-def rechart(tables: Any, x: Any, attitude: Any, drift: Any) -> None:
+def rechart(tables: Tables, x: Vector, attitude: Matrix, drift: Vector) -> None:
     """Move the angles of all free bodies into their quaternions (x, y, z, w), and into the bodies' placements.
 
     The ``drift`` of angles and rates, small changes of them, is that of the new ones afterwards.
@@ -78,8 +78,8 @@ def rechart(tables: Any, x: Any, attitude: Any, drift: Any) -> None:
 
 
 @njit_inline
-def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, angles: Any, rates: Any) -> None:
-    """Replace small changes of angles and rates by those of the angles that begin anew, and of their rates."""
+def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, angles: Vector, rates: Vector) -> None:
+    """Replace small changes of angles and rates by those after the angles are reset to zero."""
     sb, cb, sc, cc = np.sin(b), np.cos(b), np.sin(c), np.cos(c)
     # The angular velocity (x, y), as in `rechart`, and how it changes.
     x, y = da * cb * cc + db * sc, db * cc - da * cb * sc
@@ -95,8 +95,8 @@ def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, an
 
 
 @njit_inline
-def _turn(q: Any, axis: int, angle: float) -> None:
-    """Replace a quaternion q by q times the turn about one of its own axes."""
+def _turn(q: Vector, axis: int, angle: float) -> None:
+    """Replace a quaternion by its product with a turn about a body axis."""
     cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle)
     second, third = (axis + 1) % 3, (axis + 2) % 3
     own, scalar, along, across = q[axis], q[3], q[second], q[third]

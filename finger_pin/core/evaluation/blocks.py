@@ -1,4 +1,4 @@
-"""Blocks: the parts of a step's linear systems that are coupled, found anew for every step.
+"""Blocks: the coupled parts of a step's linear systems, found again at every step.
 
 Without contacts a mechanism falls into atoms, such as the fingers of a hand and what lies around. Contacts that are
 closed join atoms to blocks. One that is open is held open during the step: it exerts nothing, whatever moves, and
@@ -7,21 +7,21 @@ each of its states decays on its own.
 
 from __future__ import annotations
 
-from typing import Any
-
+from finger_pin.core.buffers import Blocks, Work
 from finger_pin.core.evaluation import law_code as at
-from finger_pin.core.jit import njit_always_inline, njit_inline
+from finger_pin.core.jit import Matrix, njit_always_inline, njit_inline
+from finger_pin.core.tables import Tables
 
 
 @njit_inline
-def extent(blocks: Any, b: int) -> Any:
+def extent(blocks: Blocks, b: int) -> tuple[int, int]:
     """Return the numbers of a block's coordinates and columns: r of positions, velocities and states, and time."""
     width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
     return width, 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
 
 
 @njit_always_inline
-def _join(tables: Any, work: Any, blocks: Any) -> None:
+def _join(tables: Tables, work: Work, blocks: Blocks) -> None:
     """Fill the block of every atom."""
     paths, label = tables.paths, blocks.label
     for a in range(label.size):
@@ -49,7 +49,7 @@ def _join(tables: Any, work: Any, blocks: Any) -> None:
 
 
 @njit_always_inline
-def partition(tables: Any, work: Any, blocks: Any, gain: Any) -> None:
+def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
     """Find the blocks of a step, after the slopes of all laws; of contacts that have opened, clear the rows' gains."""
     paths = tables.paths
     for index in range(blocks.touch_start[blocks.number[0]]):

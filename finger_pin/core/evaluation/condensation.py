@@ -12,16 +12,26 @@ r, so the solution is kept as one matrix, and a stage costs one product with it.
 
 from __future__ import annotations
 
-from typing import Any
-
+from finger_pin.core.buffers import Linear
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
-from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, njit_inline, njit_reassociate, unpack
-from finger_pin.core.model import MODEL
+from finger_pin.core.jit import (
+    CompiledFunction,
+    Indices,
+    Matrix,
+    Vector,
+    call_at,
+    njit_always_inline,
+    njit_inline,
+    njit_reassociate,
+    unpack,
+)
+from finger_pin.core.model import MODEL, Model
+from finger_pin.core.tables import Tables
 
 
 @njit_inline
-def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int, out: Any) -> None:
+def _terms(tables: Tables, begin: int, end: int, slope: float, gain: Matrix, wide: int, out: Vector) -> None:
     """Fill the change of a weighted sum of earlier forces, times a slope."""
     for c in range(wide):
         out[c] = 0.0
@@ -32,7 +42,7 @@ def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int
 
 
 @njit_always_inline
-def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
+def _outside(model: Model, address: int, g: float, b: int, width: int, wide: int) -> None:
     """Fill A^T d phi of a block by forces other than its rows': inertial forces, those at tips, and contacts."""
     tables, work, linear, force = model.tables, model.work, model.linear, model.linear.force
     places, last = linear.blocks.coordinates[linear.blocks.coordinate_start[b] :], wide - 1
@@ -51,7 +61,7 @@ def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) 
 
 
 @njit_always_inline
-def _load(model: Any, address: int, k: int, places: Any, width: int, wide: int) -> None:
+def _load(model: Model, address: int, k: int, places: Indices, width: int, wide: int) -> None:
     """Fill the change of a row's load."""
     tables, linear, load = model.tables, model.linear, model.linear.load
     _terms(tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, wide, load)
@@ -64,7 +74,7 @@ def _load(model: Any, address: int, k: int, places: Any, width: int, wide: int) 
 
 
 @njit_always_inline
-def _command(model: Any, k: int, places: Any, width: int, wide: int) -> None:
+def _command(model: Model, k: int, places: Indices, width: int, wide: int) -> None:
     """Fill the change of a row's input."""
     tables, control, linear, command = model.tables, model.control, model.linear, model.linear.command
     _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, wide, command)
@@ -78,7 +88,7 @@ def _command(model: Any, k: int, places: Any, width: int, wide: int) -> None:
 
 @njit_inline
 def _add_motion(
-    model: Any, k: int, width: int, by_length: float, by_speed: float, by_curvature: float, out: Any
+    model: Model, k: int, width: int, by_length: float, by_speed: float, by_curvature: float, out: Vector
 ) -> None:
     """Add slopes by a row's length, speed and curvature, by coordinates and velocities."""
     tables, linear, place = model.tables, model.linear, model.linear.blocks.place
@@ -90,7 +100,7 @@ def _add_motion(
 
 
 @njit_inline
-def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
+def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) -> None:
     """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
     tables, linear, slopes, blocks = model.tables, model.linear, model.work.slopes, model.linear.blocks
     load, command, force, place = linear.load, linear.command, linear.force, blocks.place
@@ -150,7 +160,7 @@ def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) ->
 
 
 @njit_always_inline
-def factorise(matrix: Any, size: int, pivots: Any) -> bool:
+def factorise(matrix: Matrix, size: int, pivots: Indices) -> bool:
     """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
     for c in range(size):
         best = c
@@ -172,7 +182,7 @@ def factorise(matrix: Any, size: int, pivots: Any) -> bool:
 
 
 @njit_always_inline
-def substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> None:
+def substitute(matrix: Matrix, size: int, pivots: Indices, right: Matrix, wide: int) -> None:
     """Replace right-hand sides, one a column, by solutions."""
     for r in range(size):
         best = pivots[r]
@@ -209,7 +219,7 @@ def condense(address: int, g: float) -> int:
 
 
 @njit_inline
-def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
+def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
     """Fill the rows of the solution that belong to a block."""
     linear, blocks = model.linear, model.linear.blocks
     places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
@@ -264,7 +274,7 @@ def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
 
 
 @njit_reassociate
-def solve(linear: Any, r: Any, u: Any) -> None:
+def solve(linear: Linear, r: Vector, u: Vector) -> None:
     """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i. States of culled contacts stay."""
     blocks, right, solution = linear.blocks, linear.right, linear.solution
     whole = linear.mass.shape[0]

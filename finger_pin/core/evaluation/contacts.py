@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from finger_pin.core.buffers import Linear, Work
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
-from finger_pin.core.jit import CompiledFunction, call_value, njit_always_inline, njit_inline, unpack
+from finger_pin.core.jit import CompiledFunction, Vector, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.core.tables import END, FIRST
+from finger_pin.core.tables import END, FIRST, Tables
 
 
 @CompiledFunction
@@ -24,7 +23,7 @@ def measure(address: int, _time: float) -> int:
 
 
 @njit_always_inline
-def _exert(tables: Any, v: Any, z: Any, work: Any) -> None:
+def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
     """Evaluate the contacts, which come before all other rows, but for those culled, and add to A^T phi."""
     rows, paths = work.rows, work.paths
     for g in range(tables.groups.shape[0]):
@@ -53,7 +52,7 @@ def _exert(tables: Any, v: Any, z: Any, work: Any) -> None:
 
 
 @njit_inline
-def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, width: int, out: Any) -> None:
+def _add_inputs(tables: Tables, k: int, weights: tuple[float, ...], linear: Linear, width: int, out: Vector) -> None:
     """Add the change of a contact's gap, speed and slips, with a weight each."""
     place = linear.blocks.place
     for m in range(3):
@@ -65,7 +64,7 @@ def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, width: int, out:
 
 
 @njit_always_inline
-def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any, width: int, wide: int) -> None:
+def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear, width: int, wide: int) -> None:
     """Fill the gains of the three rows of a contact and of its two states, in the columns of its block."""
     slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
     first, second = tables.state[k + 1], tables.state[k + 2]

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from finger_pin.core.buffers import AXIS, Work
 from finger_pin.core.evaluation.inputs import inputs, tip_forces
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE
 from finger_pin.core.evaluation.paths import passes
-from finger_pin.core.evaluation.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
+from finger_pin.core.evaluation.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.evaluation.time_functions import signal_derivatives
-from finger_pin.core.jit import CompiledFunction, call_at, call_value, njit_always_inline, njit_inline, unpack
+from finger_pin.core.jit import CompiledFunction, Vector, call_at, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.core.tables import END, FED, FIRST, PRESSED
+from finger_pin.core.tables import END, FED, FIRST, PRESSED, Tables
 
 
 @njit_always_inline
-def _tips(tables: Any, work: Any) -> None:
+def _tips(tables: Tables, work: Work) -> None:
     """Fill positions and Jacobians of the tips, and J^T F, after `move`."""
     size = tables.parents.size
     for j in range(size):
@@ -42,7 +41,7 @@ def _tips(tables: Any, work: Any) -> None:
 
 
 @njit_always_inline
-def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
+def _pin_load(tables: Tables, k: int, load: float, work: Work) -> float:
     """Return |-e S + F| of (17) for row k, and keep the vector and e."""
     body = tables.pins[k]
     carrier = tables.carriers[body]
@@ -66,7 +65,7 @@ def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
 
 
 @njit_inline
-def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
+def _sum_of_terms(tables: Tables, begin: int, end: int, work: Work) -> float:
     total = 0.0
     for e in range(begin, end):
         total += tables.weights[e] * work.rows[FORCE, tables.terms[e]]
@@ -74,7 +73,7 @@ def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
 
 
 @njit_always_inline
-def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
+def _see(tables: Tables, q: Vector, v: Vector, z: Vector, work: Work) -> None:
     """Fill the arguments of all rows' laws but contacts': positions, velocities, states and inputs from outside.
 
     One entry after the other, whatever row it belongs to: short loops inside a long one would cost twice as much.
@@ -98,7 +97,7 @@ def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
 
 
 @njit_always_inline
-def _act(tables: Any, work: Any) -> None:
+def _act(tables: Tables, work: Work) -> None:
     """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
     rows = work.rows
     for g in range(tables.groups.shape[0]):
@@ -120,7 +119,7 @@ def _act(tables: Any, work: Any) -> None:
 
 
 @njit_always_inline
-def _drive(tables: Any, work: Any, rate: Any) -> None:
+def _drive(tables: Tables, work: Work, rate: Vector) -> None:
     """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
     rows, torque = work.rows, work.torque
     for e in range(tables.arm_start[tables.touching], tables.arm_at.size):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.time_functions import signal_derivative, signal_derivatives, signal_values
-from finger_pin.core.inputs import HELD, SCHEDULED
-from finger_pin.core.jit import njit_always_inline, njit_inline
+from finger_pin.core.inputs import HELD, SCHEDULED, InputTable
+from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.laws import inputs as controller_laws
 
 _proportional_torque = inlined(controller_laws.proportional_torque)
@@ -17,7 +15,7 @@ _internal_level = inlined(controller_laws.internal_level)
 
 
 @njit_inline
-def _coupled(control: Any, values: Any, out: Any) -> None:
+def _coupled(control: InputTable, values: Vector, out: Vector) -> None:
     """Fill a derivative of the desired positions from that of the base signals, by the coupling (20)."""
     for j in range(out.size):
         out[j] = 0.0
@@ -26,7 +24,7 @@ def _coupled(control: Any, values: Any, out: Any) -> None:
 
 
 @njit_inline
-def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) -> None:
+def inputs(control: InputTable, time: float, position: Vector, velocity: Vector, out: Vector) -> None:
     """Fill the inputs: f_hat of (19), (21), (22), or scheduled ones, and held ones."""
     for i in range(out.size):
         out[i] = control.tension[i]
@@ -69,7 +67,7 @@ def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) ->
 
 
 @njit_always_inline
-def input_slopes(control: Any, time: float) -> None:
+def input_slopes(control: InputTable, time: float) -> None:
     """Fill du/dq, du/dv and du/dt after `inputs`, for the active minimum of (22)."""
     by_position, by_time = control.by_position, control.by_time
     if control.kind == HELD:
@@ -98,7 +96,7 @@ def input_slopes(control: Any, time: float) -> None:
 
 
 @njit_inline
-def tip_forces(control: Any, time: float, order: int, out: Any) -> None:
+def tip_forces(control: InputTable, time: float, order: int, out: Matrix) -> None:
     """Fill the varying forces at the tips, or a derivative of them, shape (t, 3)."""
     if control.force.harmonics.shape[0] > 0:
         for t in range(out.shape[0]):

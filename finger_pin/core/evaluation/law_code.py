@@ -15,7 +15,7 @@ from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from finger_pin.core.jit import address_of, njit_inline
+from finger_pin.core.jit import Pointer, address_of, njit_inline
 from finger_pin.core.jit import numbers as _numbers
 from finger_pin.core.jit import put as _put
 from finger_pin.exceptions import InputError
@@ -120,18 +120,18 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
 
 
 @njit_inline
-def _seen(table: Any, stride: int, k: int) -> Any:
+def _seen(table: Pointer, stride: int, k: int) -> Row:
     length, speed, state, load, command, curvature, side = _numbers(table, k, stride, 7)
     return Row(length, speed, state, load, command, curvature, side)
 
 
-def _value(table: Any, numbers: Any, stride: int, begin: int, end: int) -> None:
+def _value(table: Pointer, numbers: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end):
         found = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
         _put(table, FORCE * stride + k, stride, found)
 
 
-def _slopes(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end: int) -> None:
+def _slopes(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end):
         signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
         of_force, of_rate = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), signals)
@@ -139,7 +139,7 @@ def _slopes(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end:
         _put(filled, R_LENGTH * stride + k, stride, of_rate)
 
 
-def _account(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end: int) -> None:
+def _account(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end):
         signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
         force, rate = _numbers(table, FORCE * stride + k, stride, 2)
@@ -148,7 +148,7 @@ def _account(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end
 
 
 @njit_inline
-def _touched(table: Any, stride: int, k: int) -> Any:
+def _touched(table: Pointer, stride: int, k: int) -> Touch:
     gap, speed, state_1, state_2, side = (
         table[LENGTH * stride + k],
         table[SPEED * stride + k],
@@ -159,7 +159,7 @@ def _touched(table: Any, stride: int, k: int) -> Any:
     return Touch(gap, speed, table[SPEED * stride + k + 1], table[SPEED * stride + k + 2], state_1, state_2, side)
 
 
-def _contact_value(table: Any, numbers: Any, stride: int, begin: int, end: int) -> None:
+def _contact_value(table: Pointer, numbers: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end, 3):
         found = _law(_touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
         _put(table, FORCE * stride + k, 1, found[:3])
@@ -167,7 +167,7 @@ def _contact_value(table: Any, numbers: Any, stride: int, begin: int, end: int) 
         _put(table, SIGNALS * stride + k, stride, found[5:])
 
 
-def _contact_slopes(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end: int) -> None:
+def _contact_slopes(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     # The slopes of forces stand in the columns of their rows, those of the states' rates below.
     for k in range(begin, end, 3):
         signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
@@ -181,7 +181,7 @@ def _contact_slopes(table: Any, numbers: Any, filled: Any, stride: int, begin: i
         _put(filled, R_LENGTH * stride + k + 2, stride, rate_2)
 
 
-def _contact_account(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end: int) -> None:
+def _contact_account(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end, 3):
         signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
         forces, rates = _numbers(table, FORCE * stride + k, 1, 3), _numbers(table, RATE * stride + k + 1, 1, 2)

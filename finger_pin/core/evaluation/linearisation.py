@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from finger_pin.core.buffers import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, Linear, Work
 from finger_pin.core.evaluation.inputs import input_slopes, tip_forces
 from finger_pin.core.evaluation.paths import passes
-from finger_pin.core.evaluation.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
+from finger_pin.core.evaluation.rigid_body import inverse_dynamics
 from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, call_at, call_filling, njit_always_inline, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.core.tables import END, FIRST
+from finger_pin.core.tables import END, FIRST, Tables
 
 
 @njit_always_inline
-def _turning_tips(tables: Any, work: Any, linear: Any) -> None:
+def _turning_tips(tables: Tables, work: Work, linear: Linear) -> None:
     """Subtract d(J^T F)/dq from by_position: a column turns with the joints below it and moves with the tip."""
     axes = work.spatial[AXIS]
     for t in range(tables.tip_body.size):
@@ -38,7 +37,7 @@ def _turning_tips(tables: Any, work: Any, linear: Any) -> None:
 
 
 @njit_always_inline
-def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
+def _load_slopes(tables: Tables, work: Work, linear: Linear) -> None:
     """Fill the derivatives of all loads by the sum of earlier forces, and by the posture that turns the pins' links."""
     axes = work.spatial[AXIS]
     for k in range(tables.pins.size):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from finger_pin.core.buffers import AXIS, AXIS_CURVE, FORCE, MOTION
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.evaluation.rigid_body import AXIS, AXIS_CURVE, FORCE, MOTION, inverse_dynamics
+from finger_pin.core.evaluation.rigid_body import inverse_dynamics
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
-from finger_pin.core.evaluation.time_functions import signal_derivative
+from finger_pin.core.evaluation.time_functions import SignalTable, signal_derivative
 from finger_pin.core.jit import CompiledFunction, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.laws import inputs as palm_laws
@@ -16,7 +15,7 @@ _base_motion = inlined(palm_laws.base_motion)
 
 
 @njit_inline
-def _coordinates(signal: Any, time: float, order: int) -> Any:
+def _coordinates(signal: SignalTable, time: float, order: int) -> tuple[float, float, float, float, float, float]:
     return (
         signal_derivative(signal, 0, time, order),
         signal_derivative(signal, 1, time, order),

@@ -5,20 +5,19 @@ The wrenches of a piece turn with the body that carries its frame, and change wi
 
 from __future__ import annotations
 
-from typing import Any
-
+from finger_pin.core.buffers import AXIS, Linear, Work
 from finger_pin.core.evaluation.blocks import partition
 from finger_pin.core.evaluation.law_code import FORCE, LOAD
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
-from finger_pin.core.evaluation.rigid_body import AXIS
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
-from finger_pin.core.jit import CompiledFunction, call_shape, njit_always_inline, njit_inline, unpack
+from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS, WRENCH
+from finger_pin.core.path_tables import COLUMNS, WRENCH, Paths
+from finger_pin.core.tables import Tables
 
 
 @njit_always_inline
-def _seen_from(axis: Any, rotation: Any, point: Any, weight: float, out: Any) -> None:
+def _seen_from(axis: Vector, rotation: Matrix, point: Vector, weight: float, out: Vector) -> None:
     """Fill a frame's view of a point's velocity, for a unit rate of a coordinate."""
     x = weight * (axis[3] + axis[1] * point[2] - axis[2] * point[1])
     y = weight * (axis[4] + axis[2] * point[0] - axis[0] * point[2])
@@ -28,8 +27,8 @@ def _seen_from(axis: Any, rotation: Any, point: Any, weight: float, out: Any) ->
 
 
 @njit_inline
-def _changed(slopes: Any, first: int, dy: Any, rotation: Any, out: Any) -> None:
-    """Fill a vector's change as the base sees it, from the three rows of slopes that begin somewhere."""
+def _changed(slopes: Vector, first: int, dy: Vector, rotation: Matrix, out: Vector) -> None:
+    """Fill a vector's change in base axes, from three rows of slopes."""
     for r in range(3):
         out[r] = 0.0
     for i in range(3):
@@ -41,7 +40,7 @@ def _changed(slopes: Any, first: int, dy: Any, rotation: Any, out: Any) -> None:
 
 
 @njit_inline
-def _slopes_of_piece(paths: Any, e: int, work: Any) -> None:
+def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
     """Fill the derivatives of a piece's wrenches and turn by the coordinates that move it."""
     own = work.paths
     rotation, ends, columns, slopes = own.frame[e], own.ends[e], paths.columns[e], own.slopes
@@ -82,7 +81,7 @@ def _slopes_of_piece(paths: Any, e: int, work: Any) -> None:
 
 
 @njit_always_inline
-def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
+def _add_turns(tables: Tables, work: Work, linear: Linear, index: int) -> None:
     """Add the derivatives of the angle by which a row's path turns."""
     paths, own = tables.paths, work.paths
     k, gather = paths.rows[index], own.gather
@@ -114,7 +113,7 @@ def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
 
 
 @njit_always_inline
-def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
+def _turn_pushes(tables: Tables, work: Work, k: int, by_position: Vector) -> None:
     """Add to a pin's load the change from contacts that turn with the posture at constant forces."""
     paths, own = tables.paths, work.paths
     size = max(work.rows[LOAD, k], 1e-100)

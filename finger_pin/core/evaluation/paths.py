@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from finger_pin.core.buffers import AXIS, Work
 from finger_pin.core.evaluation.law_code import FORCE, SIDE
-from finger_pin.core.evaluation.rigid_body import AXIS, move
+from finger_pin.core.evaluation.rigid_body import move
 from finger_pin.core.evaluation.spatial import dot
-from finger_pin.core.jit import CompiledFunction, call_shape, njit_always_inline, njit_inline, unpack
+from finger_pin.core.jit import (
+    CompiledFunction,
+    Indices,
+    Matrix,
+    Vector,
+    call_shape,
+    njit_always_inline,
+    njit_inline,
+    unpack,
+)
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS, WRENCH
+from finger_pin.core.path_tables import COLUMNS, WRENCH, Paths
+from finger_pin.core.tables import Tables
 
 
 @njit_inline
-def add_moment(point: Any, force: Any, out: Any) -> None:
+def add_moment(point: Vector, force: Vector, out: Vector) -> None:
     """Add the moment of a force at a point."""
     out[0] += point[1] * force[2] - point[2] * force[1]
     out[1] += point[2] * force[0] - point[0] * force[2]
@@ -23,8 +32,8 @@ def add_moment(point: Any, force: Any, out: Any) -> None:
 
 
 @njit_always_inline
-def _frame(paths: Any, e: int, work: Any) -> None:
-    """Place a piece's frame, its points, and its points as the frame sees them."""
+def _frame(paths: Paths, e: int, work: Work) -> None:
+    """Place a piece's frame and its points, and express its points in the frame."""
     own = work.paths
     rotation, origin, ends = own.frame[e], own.origin[e], own.ends[e]
     body = paths.carriers[e, 2]
@@ -55,14 +64,14 @@ def _frame(paths: Any, e: int, work: Any) -> None:
 
 
 @njit_inline
-def turn_out(rotation: Any, out: Any, first: int, vector: Any) -> None:
-    """Fill three numbers of a wrench with a vector that a frame sees."""
+def turn_out(rotation: Matrix, out: Vector, first: int, vector: Vector) -> None:
+    """Fill three numbers of a wrench with a vector given in a frame."""
     for r in range(3):
         vector[r] = rotation[r, 0] * out[first] + rotation[r, 1] * out[first + 1] + rotation[r, 2] * out[first + 2]
 
 
 @njit_inline
-def _look(paths: Any, e: int, work: Any) -> bool:
+def _look(paths: Paths, e: int, work: Work) -> bool:
     """Fill value and wrenches of a piece between placed bodies; return false if it is out of reach."""
     own = work.paths
     _frame(paths, e, work)
@@ -80,7 +89,7 @@ def _look(paths: Any, e: int, work: Any) -> bool:
 
 
 @njit_inline
-def _measure(paths: Any, e: int, work: Any) -> None:
+def _measure(paths: Paths, e: int, work: Work) -> None:
     """Fill the value of a piece, and its wrenches."""
     own = work.paths
     _look(paths, e, work)
@@ -108,7 +117,7 @@ def _measure(paths: Any, e: int, work: Any) -> None:
 
 
 @njit_inline
-def net_wrench(moves: Any, wrench: Any, out: Any) -> None:
+def net_wrench(moves: Indices, wrench: Vector, out: Vector) -> None:
     """Fill the wrench on all of the three bodies that a coordinate moves."""
     first, second = 1.0 * (moves[0] - moves[2]), 1.0 * (moves[1] - moves[2])
     for i in range(6):
@@ -116,7 +125,7 @@ def net_wrench(moves: Any, wrench: Any, out: Any) -> None:
 
 
 @njit_inline
-def angle_between(first: Any, second: Any) -> Any:
+def angle_between(first: Vector, second: Vector) -> tuple[float, float]:
     """Return cosine and sine of the angle between a path's directions before and after a point."""
     cosine = -(first[0] * second[0] + first[1] * second[1] + first[2] * second[2])
     x = first[1] * second[2] - first[2] * second[1]
@@ -135,7 +144,7 @@ def look(address: int, piece: float) -> int:
 
 
 @njit_always_inline
-def measure_paths(tables: Any, work: Any) -> None:
+def measure_paths(tables: Tables, work: Work) -> None:
     """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if active."""
     paths, own, first = tables.paths, work.paths, tables.touching
     closed = 0
@@ -186,7 +195,7 @@ def measure_paths(tables: Any, work: Any) -> None:
 
 
 @njit_always_inline
-def push(tables: Any, work: Any) -> None:
+def push(tables: Tables, work: Work) -> None:
     """Fill the forces of all contacts, after their law."""
     paths, own = tables.paths, work.paths
     for index in range(own.closed_count[0]):
@@ -198,7 +207,7 @@ def push(tables: Any, work: Any) -> None:
 
 
 @njit_inline
-def passes(paths: Any, e: int, body: int) -> float:
+def passes(paths: Paths, e: int, body: int) -> float:
     """Return the count of passages of a contact's force, less its reaction, through the pin of a body."""
     first, second = paths.carriers[e, 0], paths.carriers[e, 2]
     beyond = 0.0

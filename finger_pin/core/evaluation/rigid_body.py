@@ -9,23 +9,27 @@ Inverse dynamics, composite inertias and bias are those of Featherstone, Rigid B
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from finger_pin.core.buffers import (
+    AXIS,
+    AXIS_RATE,
+    CHOLESKY,
+    FORCE,
+    MASS_MATRIX,
+    MOMENTUM,
+    MOTION,
+    SPATIAL_ACCELERATION,
+    Work,
+)
+from finger_pin.core.chains import ARMATURE, CENTRE, INERTIA, MASS, PRISMATIC, ROTATION, TRANSLATION
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
-from finger_pin.core.jit import njit_always_inline, njit_inline
-
-# Columns of the table of bodies.
-ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, ARMATURE, BODY_COLUMNS = 0, 9, 12, 13, 16, 22, 23
-PRISMATIC = 1
-# Layers of work.spatial, one motion or force vector per body, and of work.square.
-AXIS, AXIS_RATE, AXIS_CURVE, MOTION, SPATIAL_ACCELERATION, FORCE, MOMENTUM, SPATIAL_LAYERS = range(8)
-MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
+from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
+from finger_pin.core.tables import Tables
 
 
 @njit_always_inline
-def _place(tables: Any, i: int, angle: float, work: Any) -> None:
+def _place(tables: Tables, i: int, angle: float, work: Work) -> None:
     """Place body i: rotation, origin and joint axis in the base frame."""
     body, parent, rotation, origin = tables.bodies[i], tables.parents[i], work.rotation[i], work.origin[i]
     ax, ay, az = body[ROTATION], body[ROTATION + 1], body[ROTATION + 2]
@@ -47,14 +51,14 @@ def _place(tables: Any, i: int, angle: float, work: Any) -> None:
 
 
 @njit_inline
-def _massless(tables: Any, i: int) -> Any:
+def _massless(tables: Tables, i: int) -> bool:
     """Return whether a body has no inertia, as five of the six of a free object have none."""
     body = tables.bodies[i]
     return body[MASS] == 0.0 and body[INERTIA] == 0.0 and body[INERTIA + 3] == 0.0 and body[INERTIA + 5] == 0.0
 
 
 @njit_always_inline
-def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
+def _inertia_about_origin(tables: Tables, i: int, work: Work) -> None:
     """Express the inertia of body i about O in base axes."""
     body, rotation, origin, out = tables.bodies[i], work.rotation[i], work.origin[i], work.inertia[i]
     if _massless(tables, i):
@@ -83,7 +87,7 @@ def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
 
 
 @njit_inline
-def move(tables: Any, position: Any, velocity: Any, work: Any) -> None:
+def move(tables: Tables, position: Vector, velocity: Vector, work: Work) -> None:
     """Fill axes, velocities and composite inertias of all bodies."""
     for i in range(tables.parents.size):
         parent = tables.parents[i]
@@ -111,7 +115,9 @@ def move(tables: Any, position: Any, velocity: Any, work: Any) -> None:
 
 
 @njit_inline
-def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, torque: Any, moving: bool) -> None:
+def inverse_dynamics(
+    tables: Tables, velocity: Vector, acceleration: Vector, work: Work, torque: Vector, moving: bool
+) -> None:
     """Fill torque = M a + C v + G after `move`, and the accelerations and composite forces of the bodies.
 
     Without ``moving`` the acceleration is taken as zero: the bias forces.
@@ -140,7 +146,7 @@ def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, t
 
 
 @njit_always_inline
-def mass_matrix(tables: Any, work: Any) -> None:
+def mass_matrix(tables: Tables, work: Work) -> None:
     """Fill work.square[MASS_MATRIX] = M after `move`; entries between trees are zero from the start."""
     size = tables.parents.size
     for i in range(size):
@@ -156,7 +162,7 @@ def mass_matrix(tables: Any, work: Any) -> None:
 
 
 @njit_always_inline
-def factorise_mass(tables: Any, size: int, work: Any) -> None:
+def factorise_mass(tables: Tables, size: int, work: Work) -> None:
     """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted, tree by tree."""
     factor = work.square[CHOLESKY]
     for i in range(size):
@@ -168,7 +174,7 @@ def factorise_mass(tables: Any, size: int, work: Any) -> None:
 
 
 @njit_always_inline
-def solve_mass(tables: Any, size: int, work: Any, vector: Any) -> None:
+def solve_mass(tables: Tables, size: int, work: Work, vector: Vector) -> None:
     """Replace a vector by M^-1 vector after `factorise_mass`."""
     factor = work.square[CHOLESKY]
     for i in range(size):

@@ -6,9 +6,7 @@ Vector Algebra, IEEE RA-L 7 (2022), in the conventions of `rigid_body`.
 
 from __future__ import annotations
 
-from typing import Any
-
-from finger_pin.core.evaluation.rigid_body import (
+from finger_pin.core.buffers import (
     AXIS,
     AXIS_CURVE,
     AXIS_RATE,
@@ -18,13 +16,15 @@ from finger_pin.core.evaluation.rigid_body import (
     MOMENTUM,
     MOTION,
     SPATIAL_ACCELERATION,
+    Work,
 )
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
-from finger_pin.core.jit import njit_always_inline, njit_inline
+from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
+from finger_pin.core.tables import Tables
 
 
 @njit_always_inline
-def _coriolis_block(inertia: Any, motion: Any, out: Any) -> None:
+def _coriolis_block(inertia: Vector, motion: Vector, out: Vector) -> None:
     """Fill the upper left block of the body's Coriolis matrix, and its linear momentum in out[9:12].
 
     B(I, v) = ((v x*) I - I (v x) + (I v) x*) / 2 has only two non-zero blocks: this one, and below it minus the
@@ -59,7 +59,7 @@ def _coriolis_block(inertia: Any, motion: Any, out: Any) -> None:
 
 
 @njit_inline
-def inverse_dynamics_derivatives(tables: Any, velocity: Any, work: Any) -> None:
+def inverse_dynamics_derivatives(tables: Tables, velocity: Vector, work: Work) -> None:
     """Fill the derivatives of inverse dynamics by position and velocity after `inverse_dynamics` and `mass_matrix`.
 
     Of bodies that neither carries the other they are zero from the start.

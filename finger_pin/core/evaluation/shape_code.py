@@ -8,7 +8,7 @@ from types import FunctionType
 from typing import Any
 
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.jit import address_of
+from finger_pin.core.jit import Pointer, address_of
 from finger_pin.mechanism.path_elements import PathShape
 
 # Numbers that a shape gives, and their derivatives, at most.
@@ -23,7 +23,7 @@ def shape_addresses(shape: PathShape) -> tuple[int, int]:
     return _address(shape.value), _address(shape.slopes)
 
 
-def _fill(y: Any, p: Any, out: Any) -> None:
+def _fill(y: Pointer, p: Pointer, out: Pointer) -> None:
     _shape(y, p, out)
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from finger_pin.core.buffers import MOTION, Work
+from finger_pin.core.chains import ARMATURE
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.law_code import FORCE
 from finger_pin.core.evaluation.paths import turn_out
-from finger_pin.core.evaluation.rigid_body import ARMATURE, MOTION, move
+from finger_pin.core.evaluation.rigid_body import move
 from finger_pin.core.jit import (
     CompiledFunction,
     Layers,
@@ -22,8 +24,9 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
-from finger_pin.core.model import MODEL
-from finger_pin.core.tables import END, FIRST
+from finger_pin.core.model import MODEL, Model
+from finger_pin.core.path_tables import Paths
+from finger_pin.core.tables import END, FIRST, Tables
 
 
 class States(NamedTuple):
@@ -94,7 +97,7 @@ STATES, MOTIONS = StructType(States), StructType(Motions)
 
 
 @njit_inline
-def book(tables: Any, work: Any, totals: Any) -> None:
+def book(tables: Tables, work: Work, totals: Vector) -> None:
     """Sum up stored energies and powers of all rows after an evaluation."""
     for c in range(totals.size):
         totals[c] = 0.0
@@ -120,7 +123,7 @@ def book(tables: Any, work: Any, totals: Any) -> None:
 
 
 @njit_always_inline
-def _touch(paths: Any, work: Any, out: Any) -> None:
+def _touch(paths: Paths, work: Work, out: Matrix) -> None:
     """Fill the forces of contacts on the second body, the points, and the normals; zero for open ones."""
     own = work.paths
     for index in range(own.closed_count[0]):
@@ -139,7 +142,7 @@ def _touch(paths: Any, work: Any, out: Any) -> None:
 
 
 @njit_always_inline
-def _set(many: Any, model: Any, m: int) -> None:
+def _set(many: States, model: Model, m: int) -> None:
     """Set inputs, forces at the tips and state to the m-th."""
     for i in range(many.commands.shape[1]):
         model.control.tension[i] = many.commands[m, i]
@@ -150,7 +153,7 @@ def _set(many: Any, model: Any, m: int) -> None:
 
 
 @njit_always_inline
-def _evaluate(many: Any, model: Any, m: int) -> None:
+def _evaluate(many: States, model: Model, m: int) -> None:
     """Evaluate the state that is set."""
     if many.rates.shape[0] > 0 or many.bases.shape[0] > 0:
         call_at(model.evaluate, many.model, 0.0)
@@ -160,7 +163,7 @@ def _evaluate(many: Any, model: Any, m: int) -> None:
 
 
 @njit_inline
-def exert_alone(model: Any, address: int, time: float) -> None:
+def exert_alone(model: Model, address: int, time: float) -> None:
     """Fill the rows' forces and rates under known inputs, for powers, which do not need the acceleration."""
     tables, width = model.tables, model.work.torque.size
     # Only some rows need to know where bodies are.
@@ -170,7 +173,7 @@ def exert_alone(model: Any, address: int, time: float) -> None:
 
 
 @njit_always_inline
-def _keep(many: Any, model: Any, m: int) -> None:
+def _keep(many: States, model: Model, m: int) -> None:
     """Fill the m-th place with the latest evaluation."""
     tables, work, rates, rows = model.tables, model.work, many.rates, many.rows
     if rates.shape[0] > 0:
@@ -191,7 +194,7 @@ def _keep(many: Any, model: Any, m: int) -> None:
 
 
 @njit_inline
-def book_moved(model: Any, address: int, moving: bool, totals: Any) -> None:
+def book_moved(model: Model, address: int, moving: bool, totals: Vector) -> None:
     """Book the power of a moving base, or of coordinates led along paths, after a whole evaluation."""
     work, width, last = model.work, model.work.torque.size, totals.size - 1
     if model.base_power != 0 and moving:
@@ -226,7 +229,7 @@ def evaluate_many(address: int, _time: float) -> int:
 
 
 @njit_inline
-def _set_base(bases: Any, m: int, tables: Any, work: Any) -> None:
+def _set_base(bases: Matrix, m: int, tables: Tables, work: Work) -> None:
     """Set the motion of the base to the m-th, or to rest."""
     for k in range(6):
         moved = bases.shape[0] > 0

@@ -5,11 +5,9 @@ Everything is read before anything is written: the compiler cannot know that wha
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from finger_pin.core.jit import njit_inline
+from finger_pin.core.jit import Vector, njit_inline
 
 _QUARTERS = 0.6366197723675814
 # pi / 2 in parts of 33 bits, whose products with small integers are exact.
@@ -22,7 +20,7 @@ _LARGE = 1e5
 
 
 @njit_inline
-def motion_cross(a: Any, b: Any, out: Any) -> None:
+def motion_cross(a: Vector, b: Vector, out: Vector) -> None:
     """Fill out = a x b for motion vectors."""
     x = a[1] * b[2] - a[2] * b[1]
     y = a[2] * b[0] - a[0] * b[2]
@@ -34,7 +32,7 @@ def motion_cross(a: Any, b: Any, out: Any) -> None:
 
 
 @njit_inline
-def add_force_cross(a: Any, f: Any, out: Any) -> None:
+def add_force_cross(a: Vector, f: Vector, out: Vector) -> None:
     """Add a x* f to out, a motion vector acting on a force vector."""
     x = out[0] + a[1] * f[2] - a[2] * f[1] + a[4] * f[5] - a[5] * f[4]
     y = out[1] + a[2] * f[0] - a[0] * f[2] + a[5] * f[3] - a[3] * f[5]
@@ -46,7 +44,7 @@ def add_force_cross(a: Any, f: Any, out: Any) -> None:
 
 
 @njit_inline
-def apply_inertia(inertia: Any, a: Any, out: Any) -> None:
+def apply_inertia(inertia: Vector, a: Vector, out: Vector) -> None:
     """Fill out = I a; an inertia is (mass, first moment h, second moment about O: xx xy xz yy yz zz)."""
     m, hx, hy, hz = inertia[0], inertia[1], inertia[2], inertia[3]
     x = inertia[4] * a[0] + inertia[5] * a[1] + inertia[6] * a[2] + hy * a[5] - hz * a[4]
@@ -59,13 +57,13 @@ def apply_inertia(inertia: Any, a: Any, out: Any) -> None:
 
 
 @njit_inline
-def dot(a: Any, b: Any) -> Any:
+def dot(a: Vector, b: Vector) -> float:
     """Return the scalar product of a motion and a force vector."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 
 
 @njit_inline
-def sine_cosine(angle: float) -> Any:
+def sine_cosine(angle: float) -> tuple[float, float]:
     """Return sine and cosine of an angle, rad."""
     if not abs(angle) < _LARGE:
         return np.sin(angle), np.cos(angle)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def no_signal() -> SignalTable:
 
 
 @njit_inline
-def _piece(signal: Any, time: float) -> Any:
+def _piece(signal: SignalTable, time: float) -> tuple[int, float]:
     """Return the piece that a time is in, and the time since its knot, both clipped to the knots.
 
     The search begins where even knots would have it, and doubles its stride until the time is between: samples at even
@@ -61,7 +61,7 @@ def _piece(signal: Any, time: float) -> Any:
 
 
 @njit_inline
-def signal_values(signal: Any, time: float, out: Any) -> None:
+def signal_values(signal: SignalTable, time: float, out: Vector) -> None:
     """Fill the values of the functions."""
     table = signal.harmonics
     for j in range(table.shape[0]):
@@ -76,7 +76,7 @@ def signal_values(signal: Any, time: float, out: Any) -> None:
 
 
 @njit_inline
-def signal_derivative(signal: Any, j: int, time: float, order: int) -> Any:
+def signal_derivative(signal: SignalTable, j: int, time: float, order: int) -> float:
     """Return a time derivative of function j, of order 0 to 3."""
     table, knots = signal.harmonics, signal.knots
     circular = 2.0 * np.pi * table[j, 2]
@@ -96,7 +96,7 @@ def signal_derivative(signal: Any, j: int, time: float, order: int) -> Any:
 
 
 @njit_inline
-def signal_derivatives(signal: Any, time: float, order: int, out: Any) -> None:
+def signal_derivatives(signal: SignalTable, time: float, order: int, out: Vector) -> None:
     """Fill a time derivative of the functions, as many as there is room for; without functions nothing changes."""
     for j in range(min(out.size, signal.harmonics.shape[0])):
         out[j] = signal_derivative(signal, j, time, order)

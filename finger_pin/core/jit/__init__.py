@@ -33,7 +33,7 @@ from finger_pin.core.jit.functions import (
     njit_inline,
     njit_reassociate,
 )
-from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, StructType, Vector, unpack
+from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, Pointer, StructType, Vector, unpack
 from finger_pin.core.jit.tables import (
     Block,
     alike,
@@ -55,6 +55,7 @@ __all__ = [
     "Indices",
     "Layers",
     "Matrix",
+    "Pointer",
     "StructType",
     "Vector",
     "add_at",

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, MutableSequence, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
 from finger_pin.core.jit.functions import njit_inline
+from finger_pin.core.jit.struct_types import Matrix, Vector
 
 # Callers see another signature than numba's.
 _generated: Any = intrinsic
+#: A signature, and the function that builds the code.
+_Generated: TypeAlias = tuple[Any, Callable[..., ir.Value]]
 
 
 @_generated
-def call_at(_typing: Any, function: Any, address: Any, number: Any) -> Any:
+def call_at(_typing: Any, function: types.Type, address: types.Type, number: types.Type) -> _Generated:
     """Call the function at an address with the address of a block and a number; return an integer."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         integer = ir.IntType(64)
         kind = ir.FunctionType(integer, [integer, ir.DoubleType()])
         return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
@@ -28,24 +32,26 @@ def call_at(_typing: Any, function: Any, address: Any, number: Any) -> Any:
 
 
 @_generated
-def add_at(_typing: Any, address: Any, number: Any) -> Any:
+def add_at(_typing: Any, address: types.Type, number: types.Type) -> _Generated:
     """Add to the integer at an address that other threads add to as well; return what stood there before."""
     return types.int64(types.int64, types.int64), partial(_shared, "add")
 
 
 @_generated
-def put_at(_typing: Any, address: Any, number: Any) -> Any:
+def put_at(_typing: Any, address: types.Type, number: types.Type) -> _Generated:
     """Put an integer in the place of one at such an address, which is returned."""
     return types.int64(types.int64, types.int64), partial(_shared, "xchg")
 
 
 @_generated
-def look_at(_typing: Any, address: Any) -> Any:
+def look_at(_typing: Any, address: types.Type) -> _Generated:
     """Return the integer at such an address."""
     return types.int64(types.int64), partial(_shared, "")
 
 
-def _shared(operation: str, _context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+def _shared(
+    operation: str, _context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Sequence[ir.Value]
+) -> ir.Value:
     # Who sees a new integer sees all that was written before it.
     place = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
     if not operation:
@@ -54,10 +60,10 @@ def _shared(operation: str, _context: Any, builder: Any, _signature: Any, argume
 
 
 @_generated
-def _call(_typing: Any, function: Any, words: Any) -> Any:
+def _call(_typing: Any, function: types.Type, words: types.Type) -> _Generated:
     """Call the function at an address with some words: addresses of numbers, and numbers of rows."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         given = [builder.extract_value(arguments[1], index) for index in range(signature.args[1].count)]
         kind = ir.FunctionType(ir.VoidType(), [each.type for each in given])
         builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), given)
@@ -67,28 +73,30 @@ def _call(_typing: Any, function: Any, words: Any) -> Any:
 
 
 @njit_inline
-def call_value(address: int, rows: Any, parameters: Any, begin: int, end: int) -> None:
+def call_value(address: int, rows: Matrix, parameters: Matrix, begin: int, end: int) -> None:
     """Evaluate the law at an address for a range of rows."""
     _call(address, (rows.ctypes.data, parameters.ctypes.data, rows.shape[1], begin, end))
 
 
 @njit_inline
-def call_filling(address: int, rows: Any, parameters: Any, filled: Any, begin: int, end: int) -> None:
+def call_filling(address: int, rows: Matrix, parameters: Matrix, filled: Matrix, begin: int, end: int) -> None:
     """Fill slopes, or energies and powers, by the law at an address for a range of rows."""
     _call(address, (rows.ctypes.data, parameters.ctypes.data, filled.ctypes.data, rows.shape[1], begin, end))
 
 
 @njit_inline
-def call_shape(address: int, y: Any, p: Any, out: Any) -> None:
+def call_shape(address: int, y: Vector, p: Vector, out: Vector) -> None:
     """Call the function of a shape at an address with three rows of numbers."""
     _call(address, (y.ctypes.data, p.ctypes.data, out.ctypes.data))
 
 
 @_generated(prefer_literal=True)
-def numbers(_typing: Any, table: Any, first: Any, stride: Any, count: Any) -> Any:
+def numbers(
+    _typing: Any, table: types.Type, first: types.Type, stride: types.Type, count: types.IntegerLiteral
+) -> _Generated:
     """Return a tuple of numbers of a table, ``stride`` apart; their count is a constant."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         found, place = ir.Constant(context.get_value_type(signature.return_type), ir.Undefined), arguments[1]
         for index in range(signature.return_type.count):
             found = builder.insert_value(found, builder.load(builder.gep(arguments[0], [place])), index)
@@ -99,10 +107,10 @@ def numbers(_typing: Any, table: Any, first: Any, stride: Any, count: Any) -> An
 
 
 @_generated
-def put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
+def put(_typing: Any, table: types.Type, first: types.Type, stride: types.Type, values: Any) -> _Generated:
     """Write a tuple of numbers into a table, ``stride`` apart."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         place = arguments[1]
         for index, kind in enumerate(values):
             value = context.cast(builder, builder.extract_value(arguments[3], index), kind, types.float64)
@@ -113,12 +121,12 @@ def put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
     return types.void(table, types.int64, types.int64, values), generate
 
 
-def load(kind: Any) -> Any:
+def load(kind: types.Type) -> Callable[[int], Any]:
     """Return a function that reads one number of a type at an address."""
 
     @_generated
-    def load(_typing: Any, address: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def load(_typing: Any, address: types.Type) -> _Generated:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
             return builder.load(builder.inttoptr(arguments[0], context.get_value_type(kind).as_pointer()))
 
         return kind(address), generate
@@ -126,15 +134,15 @@ def load(kind: Any) -> Any:
     return load
 
 
-def view(kind: Any) -> Any:
+def view(kind: types.Type) -> Callable[[int], MutableSequence[Any]]:
     """Return a function that gives the numbers of a type at an address, by index.
 
     An array of numba's would ask of each index whether it is negative.
     """
 
     @_generated
-    def view(_typing: Any, address: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def view(_typing: Any, address: types.Type) -> _Generated:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
             return builder.inttoptr(arguments[0], context.get_data_type(kind).as_pointer())
 
         return types.CPointer(kind)(address), generate
@@ -143,20 +151,20 @@ def view(kind: Any) -> Any:
 
 
 @_generated
-def scratch(_typing: Any, count: Any) -> Any:
+def scratch(_typing: Any, count: types.Type) -> _Generated:
     """Return the address of room for numbers on the caller's stack: an array of NumPy's would be allocated anew."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         return builder.ptrtoint(builder.alloca(ir.DoubleType(), size=arguments[0]), ir.IntType(64))
 
     return types.int64(types.int64), generate
 
 
 @_generated
-def two_to_the(_typing: Any, rounded: Any) -> Any:
+def two_to_the(_typing: Any, rounded: types.Type) -> _Generated:
     """Return 2^n of a number with the integer n in its last bits, as bits of its exponent."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         word = ir.IntType(64)
         exponent = builder.shl(builder.bitcast(arguments[0], word), word(52))
         return builder.bitcast(builder.add(exponent, word(1023 << 52)), ir.DoubleType())
@@ -165,10 +173,10 @@ def two_to_the(_typing: Any, rounded: Any) -> Any:
 
 
 @_generated
-def power_over(_typing: Any, value: Any) -> Any:
+def power_over(_typing: Any, value: types.Type) -> _Generated:
     """Return the power of two from 1 / x to 2 / x, by the bits of a positive number's exponent."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         word = ir.IntType(64)
         exponent = builder.and_(builder.bitcast(arguments[0], word), word(2047 << 52))
         return builder.bitcast(builder.sub(word(2046 << 52), exponent), ir.DoubleType())
@@ -177,14 +185,14 @@ def power_over(_typing: Any, value: Any) -> Any:
 
 
 @njit_inline
-def copy(source: Any, target: Any) -> None:
+def copy(source: Vector, target: Vector) -> None:
     """Copy a vector; an assignment to a slice would take a second more to compile, for its error's text."""
     for index in range(source.size):
         target[index] = source[index]
 
 
 @njit_inline
-def copy_matrix(source: Any, target: Any) -> None:
+def copy_matrix(source: Matrix, target: Matrix) -> None:
     """Copy a matrix, as `copy` does."""
     for r in range(source.shape[0]):
         for c in range(source.shape[1]):

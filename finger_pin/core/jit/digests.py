@@ -97,14 +97,14 @@ def _values(function: FunctionType, names: frozenset[str]) -> Iterator[tuple[str
             yield name, value
 
 
-def _is_ours(value: Any) -> bool:
+def _is_ours(value: object) -> bool:
     return (getattr(value, "__module__", None) or "").startswith(_OURS)
 
 
 def _described(value: Any, names: frozenset[str], above: tuple[FunctionType, ...]) -> str:
     """Return a text that differs for constants that differ; of a module, for the attributes of some names."""
 
-    def described(each: Any) -> str:
+    def described(each: object) -> str:
         return _described(each, names, above)
 
     if isinstance(value, _PLAIN):

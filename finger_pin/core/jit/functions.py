@@ -59,7 +59,7 @@ class CompiledFunction:
     """A function of an address and a number that returns an integer, compiled on first use, or found on disk."""
 
     def __init__(self, function: Callable[[int, float], int]) -> None:
-        """Compile nothing yet."""
+        """Keep the function, which is compiled on first use."""
         assert isinstance(function, FunctionType)
         self._function, self.__module__ = function, function.__module__
 

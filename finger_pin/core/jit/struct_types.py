@@ -7,9 +7,11 @@ function for each field of each table, by which the core takes half as long agai
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple, get_type_hints
+from collections.abc import Callable, MutableSequence, Sequence
+from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, get_type_hints
 
 import numpy as np
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, lower_getattr_generic, models, register_model
 from numpy.typing import NDArray
@@ -32,20 +34,24 @@ Matrix = Annotated[Array, Numbers("float64", 2)]
 Layers = Annotated[Array, Numbers("float64", 3)]
 IndexTable = Annotated[NDArray[np.int64], Numbers("int64", 2)]
 Indices = Annotated[NDArray[np.int64], Numbers("int64", 1)]
+#: Floats in memory, by index: an address to compiled code.
+Pointer: TypeAlias = MutableSequence[float]
+
+_Table = TypeVar("_Table", bound=tuple[Any, ...])
 
 _SCALARS = {int: types.int64, float: types.float64, bool: types.boolean}
 # Callers see another signature than numba's.
 _generated: Any = intrinsic
 
 
-class StructType(types.Record):  # type: ignore[misc]
+class StructType(types.Record, Generic[_Table]):  # type: ignore[misc]
     """The type of a table: a NamedTuple whose fields are arrays of the types above, numbers, or such tables.
 
     Attributes:
         kinds: By name, the types of fields: of numbers ``int``, ``float`` or ``bool``.
     """
 
-    def __init__(self, table: Any) -> None:
+    def __init__(self, table: type[_Table]) -> None:
         """Read the annotations. An array takes the words of its address and of its sizes, every number one word."""
         self.kinds: dict[str, Any] = {}
         fields: list[Any] = []
@@ -61,14 +67,14 @@ class StructType(types.Record):  # type: ignore[misc]
         # Tables of the same layout stay apart.
         self.name = f"{table.__module__}.{table.__qualname__}"
 
-    def typeof(self, key: str) -> Any:
+    def typeof(self, key: str) -> types.Type:
         """Return the type that compiled code sees in a field."""
         kind = self.kinds[key]
         if isinstance(kind, Numbers):
             return types.Array(getattr(types, kind.dtype), kind.dimensions, "C")
         return _SCALARS.get(kind, kind)
 
-    def can_convert_to(self, typingctx: Any, other: Any) -> None:
+    def can_convert_to(self, typingctx: Any, other: types.Type) -> None:
         """Convert to no other table, though its first fields may be the same."""
 
 
@@ -76,15 +82,15 @@ register_model(StructType)(models.OpaqueModel)
 
 
 @lower_getattr_generic(StructType)  # type: ignore[untyped-decorator]
-def _field(context: Any, builder: Any, table: StructType, value: Any, name: str) -> Any:
+def _field(context: Any, builder: ir.IRBuilder, table: StructType[Any], value: ir.Value, name: str) -> ir.Value:
     """Load a field, marked as constant, so that the optimiser loads it once, whatever is stored meanwhile."""
     kind, place, found = table.kinds[name], table.offset(name), table.typeof(name)
     integer = context.get_value_type(types.int64)
 
-    def at(offset: int) -> Any:
+    def at(offset: int) -> ir.Value:
         return builder.gep(value, [integer(offset)])
 
-    def load(offset: int, to: Any) -> Any:
+    def load(offset: int, to: ir.Type) -> ir.Value:
         loaded = builder.load(builder.bitcast(at(offset), to.as_pointer()))
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
@@ -107,11 +113,17 @@ def _field(context: Any, builder: Any, table: StructType, value: Any, name: str)
     return array._getvalue()
 
 
-@_generated
-def unpack(_typing: Any, address: Any, kind: Any) -> Any:
-    """Return the table at the address of a block that `pack` has filled."""
+class _Unpack(Protocol):
+    def __call__(self, address: int, kind: StructType[_Table], /) -> _Table: ...
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+
+@_generated
+def _unpack(_typing: Any, address: types.Type, kind: Any) -> tuple[Any, Callable[..., ir.Value]]:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
     return kind.instance_type(types.int64, kind), generate
+
+
+#: Return the table at the address of a block that `pack` has filled.
+unpack: _Unpack = _unpack

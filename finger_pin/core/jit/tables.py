@@ -18,7 +18,7 @@ _Table = TypeVar("_Table", bound=tuple[Any, ...])
 _DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
 
 
-def refuse_copy(holder: Any) -> NoReturn:
+def refuse_copy(holder: object) -> NoReturn:
     """Refuse to copy or pickle an object that holds addresses, as its method ``__reduce__``.
 
     A copy would lead compiled code to the memory of the original, which may be gone, or in another process. Owners that
@@ -39,7 +39,7 @@ class Block:
 
     __slots__ = ("_table", "_words", "address")
 
-    def __init__(self, table: Any, words: list[int]) -> None:
+    def __init__(self, table: tuple[Any, ...], words: list[int]) -> None:
         """Keep a table and its machine words."""
         self._table, self._words = table, np.array(words, dtype=np.int64)
         self.address = int(self._words.ctypes.data)
@@ -47,7 +47,7 @@ class Block:
     __reduce__ = refuse_copy
 
 
-def pack(table: Any, kind: StructType) -> Block:
+def pack(table: _Table, kind: StructType[_Table]) -> Block:
     """Return a block that holds a table for `unpack`.
 
     Raises:
@@ -58,7 +58,7 @@ def pack(table: Any, kind: StructType) -> Block:
     return Block(table, words)
 
 
-def call(unit: CompiledFunction, table: Any, kind: StructType) -> int:
+def call(unit: CompiledFunction, table: _Table, kind: StructType[_Table]) -> int:
     """Call a unit with a table."""
     block = pack(table, kind)
     return unit(block.address)
@@ -154,7 +154,7 @@ def taken(like: _Table, places: _Table, table: tuple[Any, ...], before: tuple[An
     return type(like)(*found)
 
 
-def _is_of_numbers(value: Any) -> bool:
+def _is_of_numbers(value: object) -> bool:
     return isinstance(value, np.ndarray) and value.dtype == float
 
 
@@ -175,7 +175,7 @@ def _address(array: Any) -> int:
     return int(array.ctypes.data)
 
 
-def _write(table: Any, kind: StructType, words: list[int]) -> None:
+def _write(table: tuple[Any, ...], kind: StructType[Any], words: list[int]) -> None:
     for value, own in zip(table, kind.kinds.values(), strict=True):
         if isinstance(own, Numbers):
             fitting = isinstance(value, np.ndarray) and value.ndim == own.dimensions and value.flags.c_contiguous

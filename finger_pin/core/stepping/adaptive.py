@@ -11,16 +11,16 @@ from finger_pin.core.collision.continuous import MISSED_BY_CULLING, NOTHING
 from finger_pin.core.evaluation.attitude_charts import rechart
 from finger_pin.core.inputs import HELD
 from finger_pin.core.jit import CompiledFunction, call_at, copy, copy_matrix, njit_always_inline, njit_inline, unpack
-from finger_pin.core.model import MODEL
+from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.error_norm import step_error, worst
-from finger_pin.core.stepping.rosenbrock import try_step
+from finger_pin.core.stepping.rosenbrock import Integration, try_step
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
 
 @njit_always_inline
-def _begin(integration: Any, model: Any, end: float) -> None:
+def _begin(integration: Integration, model: Model, end: float) -> None:
     """Prepare to advance to a time, with the present active contact pairs."""
     memory, control = integration.memory, model.control
     list_active_pairs(model.tables, model.work.paths)
@@ -36,7 +36,7 @@ def _begin(integration: Any, model: Any, end: float) -> None:
 
 
 @njit_always_inline
-def _stop_status(integration: Any, width: int) -> int:
+def _stop_status(integration: Integration, width: int) -> int:
     """Return `RUNAWAY` or `STALLED` if the integration should be abandoned, else `DONE`."""
     memory, x = integration.memory, integration.x
     if memory.fresh[0] > 0.0:
@@ -54,7 +54,7 @@ def _stop_status(integration: Any, width: int) -> int:
 
 
 @njit_inline
-def _note_limiting_state(integration: Any) -> None:
+def _note_limiting_state(integration: Integration) -> None:
     """Store the index of the state with the largest error."""
     k = integration.k
     worst_state = worst(integration.x, k[k.shape[0] - 1], integration.rtol, integration.atol)
@@ -62,7 +62,7 @@ def _note_limiting_state(integration: Any) -> None:
 
 
 @njit_inline
-def try_counted(integration: Any, model: Any, h: float) -> int:
+def try_counted(integration: Integration, model: Model, h: float) -> int:
     """Try a step, and count its evaluations; return its outcome, as `try_step` does."""
     memory, tables = integration.memory, model.tables
     fresh, count = memory.fresh[0] > 0.0, integration.tableau.nodes.size
@@ -81,7 +81,7 @@ def try_counted(integration: Any, model: Any, h: float) -> int:
 
 
 @njit_inline
-def _fitting(integration: Any, error: float) -> Any:
+def _fitting(integration: Integration, error: float) -> float:
     """Return the factor by which a step is lengthened so that its error fits the tolerance."""
     if not error <= 1e30:
         return 0.1
@@ -89,7 +89,7 @@ def _fitting(integration: Any, error: float) -> Any:
 
 
 @njit_always_inline
-def _growth(integration: Any, h: float, error: float, clipped: bool) -> Any:
+def _growth(integration: Integration, h: float, error: float, clipped: bool) -> float:
     """Return the factor by which the step after an accepted one may be longer."""
     memory, factor = integration.memory, _fitting(integration, error)
     if memory.last_step_size[0] > 0.0 and not clipped:
@@ -101,7 +101,7 @@ def _growth(integration: Any, h: float, error: float, clipped: bool) -> Any:
 
 
 @njit_inline
-def _shorten(integration: Any, h: float, whole: float) -> None:
+def _shorten(integration: Integration, h: float, whole: float) -> None:
     """Reject a try, and set the shorter size of the next one and the size before a cut at a kink."""
     memory = integration.memory
     memory.rejected_steps[0] += 1
@@ -109,7 +109,7 @@ def _shorten(integration: Any, h: float, whole: float) -> None:
 
 
 @njit_always_inline
-def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) -> None:
+def _pace(integration: Integration, h: float, error: float, final: bool, clipped: bool) -> None:
     """Count an accepted step, and set the size of the next."""
     memory = integration.memory
     factor = _growth(integration, h, error, clipped)
@@ -127,7 +127,7 @@ def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) 
 
 
 @njit_always_inline
-def accept_step(args: Any, integration: Any, model: Any, time: float) -> None:
+def accept_step(args: Any, integration: Integration, model: Model, time: float) -> None:
     """Move to the end of an accepted step, and store the step if there is a record."""
     x, attitude, tables, taken = integration.x, integration.attitude, model.tables, args.taken[0]
     first = 2 * model.linear.mass.shape[0]
@@ -151,7 +151,7 @@ def accept_step(args: Any, integration: Any, model: Any, time: float) -> None:
 
 
 @njit_always_inline
-def _still(integration: Any, model: Any, first: int) -> None:
+def _still(integration: Integration, model: Model, first: int) -> None:
     """Clear the rates and errors of the states of culled contacts, which are zero and stay so."""
     tables = model.tables
     for row in range(0, tables.touching, 3):

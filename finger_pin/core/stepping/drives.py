@@ -72,7 +72,7 @@ ADVANCE_DRIVEN_ARGS = StructType(AdvanceDrivenArgs)
 
 
 @njit_always_inline
-def _sample(drives: Any, x: Any, tension: Any) -> None:
+def _sample(drives: Any, x: Vector, tension: Vector) -> None:
     """Take a sample of all motors, and set their voltages."""
     last = drives.goals.shape[0] - 1
     k = min(drives.taken[0], last)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from finger_pin.core.jit import njit_always_inline, njit_inline
+from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
 
 
 @njit_inline
-def step_error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any:
+def step_error(x: Vector, end: Vector, difference: Vector, rtol: float, atol: Vector) -> float:
     """Return the error of a step as a multiple of the tolerance, root mean square over the state.
 
     It is infinite where the end is not finite: an infinite scale would make any error small.
@@ -25,7 +23,7 @@ def step_error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any
 
 
 @njit_always_inline
-def worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
+def worst(x: Vector, difference: Vector, rtol: float, atol: Vector) -> int:
     """Return the index of the first state whose error is no number, else of that with the largest error.
 
     Errors are compared as multiples of the tolerance.

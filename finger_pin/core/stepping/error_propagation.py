@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.core.buffers import Linear
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, njit_inline, unpack
-from finger_pin.core.model import MODEL
+from finger_pin.core.jit import CompiledFunction, Vector, call_at, njit_always_inline, njit_inline, unpack
+from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.interpolation import between
 from finger_pin.core.stepping.kink_sides import unfreeze_branch
+from finger_pin.core.stepping.rosenbrock import Integration
 
 # Terms of the flow. With three, vibrations that steps of a radian or two follow would be damped, and with them what a
 # loop that hunts makes of small errors; with six they are not.
@@ -63,8 +65,16 @@ def propagate_error(address: int, h: float) -> int:
 
 @njit_always_inline
 def carry(
-    linear: Any, h: float, gamma: float, global_error: Any, difference: Any, behind: float, turned: bool, r: Any, u: Any
-) -> Any:
+    linear: Linear,
+    h: float,
+    gamma: float,
+    global_error: Vector,
+    difference: Vector,
+    behind: float,
+    turned: bool,
+    r: Vector,
+    u: Vector,
+) -> float:
     """Propagate the error from the middle of the last step to that of this one, and add the local error.
 
     There the linearisation at this step's start is central. One that lags behind reversals damps what vibrates. Where
@@ -98,7 +108,7 @@ def carry(
 
 
 @njit_always_inline
-def defect(integration: Any, model: Any, time: float, h: float, share: float) -> None:
+def defect(integration: Integration, model: Model, time: float, h: float, share: float) -> None:
     """Replace the difference of the two methods in the last stage by the integrated defect of the rates along a step.
 
     At a kink both methods err alike. What a step's interpolant should have grown by is integrated after Lobatto
@@ -130,7 +140,7 @@ def defect(integration: Any, model: Any, time: float, h: float, share: float) ->
 
 
 @njit_inline
-def weigh(part: Any, width: int, global_error: Any) -> Any:
+def weigh(part: Any, width: int, global_error: Vector) -> float:
     """Return the mean square of some coordinates' errors, rad2 or m2, at most one.
 
     Beyond a radian the linearised flow says nothing more: their errors, and those of their velocities and of all that
@@ -152,7 +162,7 @@ def weigh(part: Any, width: int, global_error: Any) -> Any:
 
 
 @njit_inline
-def _flow(linear: Any, g: float, share: float, global_error: Any, r: Any, u: Any) -> None:
+def _flow(linear: Linear, g: float, share: float, global_error: Vector, r: Vector, u: Vector) -> None:
     """Multiply by exp(share J / g) = sum of (-D)^k L_k(share), D = J / (g - J), Laguerre polynomials with alpha = -1.
 
     The last term of the sum makes it vanish for fast decay.

@@ -99,14 +99,14 @@ def begin_step(b: Any, step: int) -> None:
 
 
 @njit_inline
-def within(b: Any, step: int, time: float, out: Any) -> None:
+def within(b: Any, step: int, time: float, out: Vector) -> None:
     """Fill the state at a time within a step, which has begun."""
     begin = begin_of(b, step)
     between(b.before, b.states[step], b.dense[step], (time - begin) / (b.ends[step] - begin), out)
 
 
 @njit_inline
-def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None:
+def between(before: Vector, after: Vector, dense: Matrix, share: float, out: Vector) -> None:
     """Fill the state after a share of a step, from the states at its ends and its row of ``dense``."""
     last, rest = dense.shape[0] - 1, 1.0 - share
     # Whole rows at a time, so that the compiler can use vector instructions.
@@ -120,7 +120,7 @@ def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None
 
 
 @njit_always_inline
-def interpolant(tableau: Any, k: Any, dense: Any) -> None:
+def interpolant(tableau: Any, k: Matrix, dense: Matrix) -> None:
     """Fill the coefficients of a step's interpolant from its stages k, shape (s, size)."""
     for row in range(dense.shape[0]):
         bend = dense[row]
@@ -133,7 +133,7 @@ def interpolant(tableau: Any, k: Any, dense: Any) -> None:
 
 
 @njit_inline
-def cut(before: Any, after: Any, dense: Any, share: float) -> None:
+def cut(before: Vector, after: Vector, dense: Matrix, share: float) -> None:
     """Cut a step to a share: replace the state at its end and its row of ``dense`` by those of that part."""
     highest, inverse = share ** (dense.shape[0] + 1), 1.0 / share
     for c in range(before.size):
@@ -148,7 +148,7 @@ def cut(before: Any, after: Any, dense: Any, share: float) -> None:
 
 
 @njit_always_inline
-def reset_angles(charts: Any, width: int, x: Any) -> None:
+def reset_angles(charts: Any, width: int, x: Vector) -> None:
     """Reset the angles of free bodies to zero, as `rechart` does: their rates become the angular velocity."""
     for f in range(charts.size):
         i = charts[f]

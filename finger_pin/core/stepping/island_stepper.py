@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
+from finger_pin.core.chains import PRISMATIC
 from finger_pin.core.collision.broad_phase import activate_all
 from finger_pin.core.evaluation.attitude_charts import place_all
-from finger_pin.core.evaluation.rigid_body import PRISMATIC
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import Block, CompiledFunction, copied, pack
 from finger_pin.core.stepping import rosenbrock as core

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import SIDE, SPEED
-from finger_pin.core.jit import call_at, copy, njit_always_inline, njit_inline
+from finger_pin.core.jit import Matrix, Vector, call_at, copy, njit_always_inline, njit_inline
+from finger_pin.core.model import Model
 from finger_pin.core.stepping.error_norm import step_error
 from finger_pin.core.stepping.interpolation import between, cut
-from finger_pin.core.tables import END, FIRST, KINK
+from finger_pin.core.tables import END, FIRST, KINK, Tables
 
 # A step after a kink that is rejected costs as much as two that grow.
 _SHARE = 0.25
@@ -23,7 +24,7 @@ _BEHIND, _WANTED, _TRIALS = 0.02, 0.5, 6
 
 
 @njit_inline
-def unfreeze_branch(tables: Any, rows: Any) -> None:
+def unfreeze_branch(tables: Tables, rows: Matrix) -> None:
     """Let the branches of all rows follow the motion."""
     for g in range(tables.groups.shape[0]):
         if tables.groups[g, KINK] >= 0:
@@ -32,7 +33,7 @@ def unfreeze_branch(tables: Any, rows: Any) -> None:
 
 
 @njit_always_inline
-def freeze_branch(tables: Any, rows: Any, kinks: Any, given: bool) -> None:
+def freeze_branch(tables: Tables, rows: Matrix, kinks: Vector, given: bool) -> None:
     """Freeze all rows on the present branch of their law, or on that given by the signs of ``kinks``."""
     for g in range(tables.groups.shape[0]):
         column = tables.groups[g, KINK]
@@ -44,7 +45,7 @@ def freeze_branch(tables: Any, rows: Any, kinks: Any, given: bool) -> None:
 
 
 @njit_inline
-def leaving_share(tables: Any, rows: Any, kinks: Any) -> Any:
+def leaving_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
     """Return the least share of the way to here after which a frozen row leaves its branch, above 1 if none has.
 
     It is taken to go on at its mean rate.
@@ -61,13 +62,13 @@ def leaving_share(tables: Any, rows: Any, kinks: Any) -> Any:
 
 
 @njit_inline
-def left_branch(tables: Any, rows: Any, kinks: Any) -> Any:
+def left_branch(tables: Tables, rows: Matrix, kinks: Vector) -> Any:
     """Return the least share of the step after which a frozen row has left its branch, 1 if none has."""
     return min(1.0, leaving_share(tables, rows, kinks))
 
 
 @njit_inline
-def switch_left_branches(tables: Any, rows: Any, kinks: Any) -> None:
+def switch_left_branches(tables: Tables, rows: Matrix, kinks: Vector) -> None:
     """Switch the branch of the frozen rows that have left theirs."""
     for g in range(tables.groups.shape[0]):
         column = tables.groups[g, KINK]
@@ -78,7 +79,7 @@ def switch_left_branches(tables: Any, rows: Any, kinks: Any) -> None:
 
 
 @njit_inline
-def branch_error(integration: Any, model: Any, time: float, h: float) -> Any:
+def branch_error(integration: Any, model: Model, time: float, h: float) -> float:
     """Return the error of rows that are frozen on a branch that they have left, as a multiple of the tolerance."""
     tables, rows, kinks, size = model.tables, model.work.rows, integration.kinks, integration.x.size
     r = integration.r
@@ -94,7 +95,7 @@ def branch_error(integration: Any, model: Any, time: float, h: float) -> Any:
 
 
 @njit_always_inline
-def max_step_after_event(h: float, share: float, cost: float, rtol: float, tableau: Any) -> Any:
+def max_step_after_event(h: float, share: float, cost: float, rtol: float, tableau: Any) -> float:
     """Return the maximum step size after a branch change, s.
 
     Stiff methods damp what they are too long for, and both of a pair alike: of a vibration of y radians in a step the
@@ -109,7 +110,7 @@ def max_step_after_event(h: float, share: float, cost: float, rtol: float, table
 
 
 @njit_always_inline
-def midpoint_violation(integration: Any, model: Any, time: float, h: float) -> Any:
+def midpoint_violation(integration: Any, model: Model, time: float, h: float) -> float:
     """Return the share of a step after which a row has left its branch at too great an error, else 1.
 
     A row that is back at the end would not be seen there.
@@ -127,7 +128,9 @@ def midpoint_violation(integration: Any, model: Any, time: float, h: float) -> A
 
 
 @njit_always_inline
-def locate_event(integration: Any, model: Any, time: float, h: float, share: float, cost: float) -> Any:
+def locate_event(
+    integration: Any, model: Model, time: float, h: float, share: float, cost: float
+) -> tuple[float, float, float, int]:
     """End a step a little behind the first branch change, at the interpolant's state.
 
     Args:

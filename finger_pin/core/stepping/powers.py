@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from finger_pin.core.buffers import Work
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.inputs import inputs
@@ -20,6 +21,7 @@ from finger_pin.core.jit import (
 )
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.interpolation import Between, step_at, within
+from finger_pin.core.tables import Tables
 
 
 class Powers(NamedTuple):
@@ -48,7 +50,7 @@ def _attitude(b: Any, step: int) -> Any:
 
 
 @njit_always_inline
-def _keep(tables: Any, work: Any, state: Any, booked: Any, out: Any) -> None:
+def _keep(tables: Tables, work: Work, state: Vector, booked: Any, out: Vector) -> None:
     """Fill the powers of the rows, which are booked last, and that of the forces at the tips."""
     count, width = out.size - 1, work.torque.size
     for i in range(count):

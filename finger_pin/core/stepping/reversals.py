@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import RATE, SIDE, SPEED, STATE
-from finger_pin.core.jit import call_value, njit_always_inline, njit_inline
-from finger_pin.core.tables import END, FIRST, KINK
+from finger_pin.core.jit import Matrix, call_value, njit_always_inline, njit_inline
+from finger_pin.core.model import Model
+from finger_pin.core.stepping.rosenbrock import Integration
+from finger_pin.core.tables import END, FIRST, KINK, Tables
 
 # A step is taken as a whole if what is misled in it is so much of the tolerance at most. One that is cut ends a little
 # behind the reversal, so that the next one begins on the other side: by so much at least, by so much if it can be.
@@ -29,7 +31,7 @@ _BEYOND, _BENT, _SLOW = 2.0, 0.1, 1e-9
 
 
 @njit_inline
-def before_reversal(integration: Any, model: Any, h: float) -> Any:
+def before_reversal(integration: Integration, model: Model, h: float) -> float:
     """Return the share of a step that is taken: all of it, or to a little behind the first reversal of sliding.
 
     By how much bristles are misled in that is filled into ``integration.end``.
@@ -53,7 +55,7 @@ def before_reversal(integration: Any, model: Any, h: float) -> Any:
 
 
 @njit_always_inline
-def _misled(integration: Any, model: Any, h: float, share: float) -> Any:
+def _misled(integration: Integration, model: Model, h: float, share: float) -> tuple[float, float]:
     """Return the error of bristles misled in a share of a step, in tolerances, and the share at which that begins."""
     tables, rows, off, total, first = model.tables, model.work.rows, integration.end, 0.0, 1.0
     size, width = integration.x.size, model.linear.mass.shape[0]
@@ -74,7 +76,7 @@ def _misled(integration: Any, model: Any, h: float, share: float) -> Any:
 
 
 @njit_always_inline
-def _way_back(integration: Any, model: Any, k: int, share: float) -> Any:
+def _way_back(integration: Integration, model: Model, k: int, share: float) -> Any:
     """Return the mean speed of a row against its side in a share of a step, the fastest, and the share at its begin."""
     tables, dense, branch = model.tables, integration.dense, model.work.rows[SIDE, k]
     start, end = branch * integration.kinks[k], branch * model.work.rows[SPEED, k]
@@ -103,7 +105,7 @@ def _way_back(integration: Any, model: Any, k: int, share: float) -> Any:
 
 
 @njit_always_inline
-def _more(tables: Any, rows: Any, g: int, k: int, speed: float) -> Any:
+def _more(tables: Tables, rows: Matrix, g: int, k: int, speed: float) -> float:
     """Return the rate of a row's state at a speed, held on the other side, less that on this side."""
     branch, own, more = rows[SIDE, k], rows[SPEED, k], 0.0
     # As it is held, on the other side, and at last as it was.
@@ -116,7 +118,7 @@ def _more(tables: Any, rows: Any, g: int, k: int, speed: float) -> Any:
 
 
 @njit_always_inline
-def bristles_over_limit(integration: Any, model: Any) -> Any:
+def bristles_over_limit(integration: Integration, model: Model) -> bool:
     """Return whether bristles far beyond their limit have bent further in a step.
 
     No motion does that: by (9a) |F^s|' <= sigma_0 |v| (1 - |F^s| / level). But implicit methods damp what grows, too.
@@ -134,7 +136,7 @@ def bristles_over_limit(integration: Any, model: Any) -> Any:
 
 
 @njit_inline
-def bristle_load_ratio(model: Any, g: int, k: int, way: float) -> Any:
+def bristle_load_ratio(model: Model, g: int, k: int, way: float) -> float:
     """Return the ratio of a row's bristle deflection to its limit at its speed in a direction of sliding."""
     rows, parameters, law = model.work.rows, model.tables.parameters, model.tables.laws[g, 0]
     branch, speed, bent = rows[SIDE, k], rows[SPEED, k], rows[STATE, k]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from finger_pin.core.collision.broad_phase import record_start_gaps
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import Indices, Layers, Matrix, StructType, Vector, call_at, njit_always_inline
+from finger_pin.core.model import Model
 from finger_pin.core.stepping.kink_sides import freeze_branch, left_branch, unfreeze_branch
 from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.typing import Array
@@ -169,7 +170,7 @@ INTEGRATION, ADVANCE_ARGS = StructType(Integration), StructType(AdvanceArgs)
 
 
 @njit_always_inline
-def try_step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> int:
+def try_step(integration: Integration, model: Model, time: float, h: float, fresh: bool) -> int:
     """Try one step: fill the increments k and, in model.state, the state at its end.
 
     What depends on the start alone, f(t, x) and the linearisation, is kept for a second try.

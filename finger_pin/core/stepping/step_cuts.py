@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger_pin.core.collision.continuous import detect_missed_contacts
 from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, unpack
-from finger_pin.core.model import MODEL
+from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.interpolation import cut, interpolant
 from finger_pin.core.stepping.kink_sides import (
@@ -19,6 +17,7 @@ from finger_pin.core.stepping.kink_sides import (
     midpoint_violation,
 )
 from finger_pin.core.stepping.reversals import before_reversal, bristles_over_limit
+from finger_pin.core.stepping.rosenbrock import Integration
 
 # What a step that is cut at a kink keeps of its length at least and at most, and one that holds what runs away.
 _SHORTEST, _LONGEST, _SHORTENED = 0.1, 0.9, 0.25
@@ -51,7 +50,7 @@ def find_missed_contacts(address: int, _h: float) -> int:
 
 
 @njit_always_inline
-def _kept_at_kinks(integration: Any, model: Any, h: float, outcome: int) -> Any:
+def _kept_at_kinks(integration: Integration, model: Model, h: float, outcome: int) -> tuple[float, float, float]:
     """Return the share of a step that is taken, that of another try, and that after which a row leaves its branch.
 
     Returns:
@@ -83,7 +82,7 @@ def _kept_at_kinks(integration: Any, model: Any, h: float, outcome: int) -> Any:
 
 
 @njit_always_inline
-def _part_before_reversal(integration: Any, model: Any, h: float) -> Any:
+def _part_before_reversal(integration: Integration, model: Model, h: float) -> float:
     """End a step a little behind the first reversal of sliding; return the share that is taken, 1 without one."""
     memory, part = integration.memory, before_reversal(integration, model, h)
     if part < 1.0:

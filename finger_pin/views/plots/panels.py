@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from functools import partial
-from typing import Literal
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -17,7 +15,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from finger_pin.typing import Array
-from finger_pin.views.plots.style import Width, fit, inches, new_figure, power_of_ten, settings
+from finger_pin.views.plots.style import Width, inches, new_figure, power_of_ten, settings
 
 # Parts are drawn at this share of their own width before they go below each other.
 _NARROWEST = 0.62
@@ -109,27 +107,19 @@ def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[flo
 
 def title(axes: Axes, text: str) -> None:
     """Write a title, unless the figure has none."""
-    figure = axes.get_figure(root=True)
-    if getattr(figure, "titled", True):
-        fit(figure, partial(_write_title, axes, text, _points("axes.titlesize"), settings["axes.titlelocation"]))
-
-
-def _write_title(axes: Axes, text: str, points: float, place: Literal["left", "center", "right"]) -> None:
-    spot, part = axes.get_subplotspec(), axes.get_figure()
-    assert part is not None
-    width = part.bbox.width / part.dpi / (1.0 if spot is None else spot.get_gridspec().ncols)
-    # Left of the panel are the labels of ticks and of the axis, of two lines at most; letters of titles are wide.
-    axes.set_title(_wrap(text, min(0.86 * width, width - 8.0 * points / 72.0), points), loc=place)
+    if getattr(axes.get_figure(root=True), "titled", True):
+        spot, part = axes.get_subplotspec(), axes.get_figure()
+        assert part is not None
+        width = part.bbox.width / part.dpi / (1 if spot is None else spot.get_gridspec().ncols)
+        points = _points("axes.titlesize")
+        # Left of the panel are the labels of ticks and of the axis, of two lines at most; letters of titles are wide.
+        axes.set_title(_wrap(text, min(0.86 * width, width - 8.0 * points / 72.0), points))
 
 
 def heading(figure: Figure, text: str) -> None:
     """Write a title of a whole figure, unless it has none."""
     if getattr(figure, "titled", True):
-        fit(figure, partial(_write_heading, figure, text, _points("figure.titlesize")))
-
-
-def _write_heading(figure: Figure, text: str, points: float) -> None:
-    figure.suptitle(_wrap(text, 0.92 * figure.get_figwidth(), points), x=0.02, ha="left", fontsize=points)
+        figure.suptitle(_wrap(text, 0.92 * figure.get_figwidth(), _points("figure.titlesize")), x=0.02, ha="left")
 
 
 def _wrap(text: str, width: float, points: float) -> str:
@@ -138,8 +128,9 @@ def _wrap(text: str, width: float, points: float) -> str:
     return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.splitlines())
 
 
-def _points(size: str) -> float:
-    return float(FontProperties(size=settings[size]).get_size_in_points())
+def _points(setting: str) -> float:
+    """Return a size of text in points."""
+    return float(FontProperties(size=settings[setting]).get_size_in_points())
 
 
 def flatten_rounding(axes: Axes) -> None:
@@ -159,19 +150,13 @@ def cut_spikes(axes: Axes, *signals: Array) -> None:
 def legend(part: Figure | SubFigure, handles: Sequence[Artist]) -> None:
     """Write a legend below a part, in as many columns as its width holds, if there is anything to name."""
     if handles:
-        fit(part.get_figure(root=True), partial(_write_legend, part, handles, _points("legend.fontsize")))
-
-
-def _write_legend(part: Figure | SubFigure, handles: Sequence[Artist], points: float) -> None:
-    for earlier in list(part.legends):
-        earlier.remove()
-    longest = max(len(str(each.get_label())) for each in handles)
-    entry = _HANDLE + _LETTER * points * longest / 72.0
-    columns = max(1, min(len(handles), int(part.bbox.width / part.dpi / entry)))
-    # As many columns as the rows that these make need: the last one is no stump.
-    columns = -(-len(handles) // -(-len(handles) // columns))
-    part.legend(handles=handles, ncols=columns, columnspacing=1.2, handletextpad=0.5, borderaxespad=0.2, frameon=False,
-                loc="outside lower center", fontsize=points)  # fmt: skip
+        longest = max(len(str(each.get_label())) for each in handles)
+        entry = _HANDLE + _LETTER * _points("legend.fontsize") * longest / 72.0
+        rows = -(-len(handles) // max(1, int(part.bbox.width / part.dpi / entry)))
+        # As many columns as the rows need: the last one is no stump.
+        columns = -(-len(handles) // rows)
+        part.legend(handles=handles, ncols=columns, frameon=False, loc="outside lower center", columnspacing=1.2,
+                    handletextpad=0.5, borderaxespad=0.2)  # fmt: skip
 
 
 def logarithmic(axes: Axes) -> None:
@@ -188,7 +173,7 @@ def plain(axis: Axis) -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def labelled(name: str, unit: str) -> str:
-    """Return the label of a strip: its name and unit, on two lines if long."""
-    whole = unit.replace(" ", "\N{NO-BREAK SPACE}")
-    return textwrap.fill(f"{name} ({whole})", 13, break_long_words=False)
+def labelled(name: str, unit: str | None) -> str:
+    """Return the label of a strip: its name and unit if any, on several lines if long."""
+    whole = name if unit is None else " ".join([name, f"({unit})".replace(" ", "\N{NO-BREAK SPACE}")])
+    return textwrap.fill(whole, 13, break_long_words=False)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from finger_pin.views.plots.panels import grid, legend, title
@@ -102,10 +103,8 @@ def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: s
             close.annotate(str(front[row]), (x[row], y[row]), **spot)
     title(close, f"the front: {len(order)} designs")
     close.xaxis.set_major_locator(MaxNLocator(6))
-    whole.indicate_inset(
-        (*(e[0] for e in (close.get_xlim(), close.get_ylim())), *map(np.ptp, (close.get_xlim(), close.get_ylim()))),
-        edgecolor=colour(GREY), alpha=0.8,
-    )  # fmt: skip
+    (left, right), (low, high) = close.get_xlim(), close.get_ylim()
+    whole.add_patch(Rectangle((left, low), right - left, high - low, fill=False, edgecolor=colour(GREY), alpha=0.8))
 
 
 def _course(result: xr.Dataset, name: str, width: Width, titles: bool) -> Figure:

@@ -1,26 +1,26 @@
-"""Metrics of a sweep: lines over one key, maps over two, parallel coordinates over more."""
+"""Metrics of a sweep: lines over one key, maps over two, points over each of more."""
 
 from __future__ import annotations
 
-import textwrap
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.collections import LineCollection
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import MaxNLocator, NullLocator
 
 from finger_pin.typing import Array
-from finger_pin.views.plots.panels import grid, plain, sheet, title
-from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled
+from finger_pin.views.plots.panels import grid, heading, labelled, plain, title
+from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, Width, colour, inches, new_figure, styled
 
 _MAP = "cividis"
 # Values that differ by more than this factor are coloured by their logarithm.
 _WIDE = 50.0
+# Look of a run among many.
+_RUNS: Any = {"markersize": 3.5, "alpha": 0.6, "markeredgewidth": 0.0}
 # Most ticks along an axis of a map.
 _TICKS = 7
 # Parts of a key that a label does not need.
@@ -29,10 +29,10 @@ _SILENT = {"finger", "joints", "link", "tendons", "crossings"}
 
 @styled
 def plot_sweep(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw the metrics of a sweep: lines over one key, maps over two, parallel coordinates over more or over samples.
+    """Draw the metrics of a sweep: lines over one key, maps over two, points over each of more or of samples.
 
-    Runs that failed are marked in lines and maps; in parallel coordinates they end at the last key. The values of a key
-    that holds names stand side by side. What is the same at every point of a map is said in words.
+    Runs that failed are marked by crosses. The values of a key that holds names stand side by side. What is the same at
+    every point of a map is said in words.
 
     Args:
         result: Dataset of `sweep`.
@@ -48,7 +48,7 @@ def plot_sweep(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
         return _lines(result, keys[0], width, titles)
     if len(keys) == 2 and "sample" not in result.dims:
         return _maps(result, keys[0], keys[1], width, titles)
-    return _parallel(result, keys, width, titles)
+    return _scatter(result, keys, width, titles)
 
 
 def short_key(key: str) -> str:
@@ -83,11 +83,7 @@ def _lines(result: xr.Dataset, key: str, width: Width, titles: bool) -> Figure:
         if not np.any(np.nan_to_num(found)):
             axes.set_ylim(0.0, 1.0)
         axes.set_ylabel(_unit(result, name))
-        if failed.any():
-            low = np.full(int(failed.sum()), 0.03)
-            marks: Any = axes.get_xaxis_transform()
-            look: Any = {"color": colour(VERMILLION), "transform": marks, "clip_on": False}
-            axes.plot(values[failed], low, "x", label="failed", **look)
+        _mark_failures(axes, values[failed])
     _legend(figure, panels)
     _name_axes(panels, _label(result, key), None)
     return figure
@@ -123,50 +119,37 @@ def _maps(result: xr.Dataset, first: str, second: str, width: Width, titles: boo
     return figure
 
 
-def _parallel(result: xr.Dataset, keys: list[str], width: Width, titles: bool) -> Figure:
+def _scatter(result: xr.Dataset, keys: list[str], width: Width, titles: bool) -> Figure:
+    """Draw every run as a point over each key: a row per metric, a column per key."""
     metrics = _metrics(result)
-    columns = [*keys, *metrics]
-    table = np.stack([_column(result, name) for name in columns], axis=1)
-    figure, (part,) = sheet([(max(8.0, 1.45 * len(columns) + 1.6), 5.2)], width, titles)
-    axes = part.subplots()
-    low, high = (pick(table, axis=0, where=np.isfinite(table), initial=start) for pick, start in _EXTREMES)
-    low, high = (np.where(np.isfinite(each), each, 0.0) for each in (low, high))
-    span = np.where(high > low, high - low, 1.0)
-    heights = np.where(high > low, (table - low) / span, np.where(np.isfinite(table), 0.5, np.nan))
-    done = np.isfinite(table).all(axis=1)
-    colours = table[:, len(keys)]
-    order = np.argsort(-colours[done])
-    places = np.arange(len(columns))
-    thickness, opacity = (1.2, 0.8) if len(table) <= 200 else (0.6, 0.45)
-    lines = [np.column_stack([places, row]) for row in heights[done][order]]
-    norm = Normalize(low[len(keys)], high[len(keys)])
-    drawn = LineCollection(lines, array=colours[done][order], cmap=_MAP, norm=norm, linewidth=thickness, alpha=opacity)
-    axes.add_collection(drawn)
-    for row in heights[~done]:
-        axes.plot(places[: len(keys)], row[: len(keys)], color=colour(GREY), linewidth=0.6, linestyle=":", alpha=0.7)
-    for place, (least, most) in enumerate(zip(low, high, strict=True)):
-        axes.axvline(place, color=colour(BLACK if place >= len(keys) else GREY), linewidth=1.0)
-        names = result[columns[place]].attrs.get("names")
-        marks = enumerate(names) if names else ((value, f"{value:.3g}") for value in dict.fromkeys((least, most)))
-        for value, word in marks:
-            height = (value - least) / (most - least) if most > least else 0.5
-            text = axes.annotate(word, (place, height), xytext=(3, 0), textcoords="offset points", fontsize="small")
-            text.set(va={0.0: "top", 1.0: "bottom"}.get(height, "center"))
-    axes.set_xlim(-0.15, len(columns) - 0.5)
-    axes.set_ylim(-0.06, 1.06)
-    axes.set_yticks([])
-    axes.grid(visible=False)
-    axes.spines[["left", "bottom"]].set_visible(False)
-    axes.tick_params(axis="x", length=0.0)
-    labels = [_label(result, key) for key in keys] + [f"{_spaced(n)} ({result[n].attrs['units']})" for n in metrics]
-    axes.set_xticks(places, [textwrap.fill(label, 16) for label in labels])
-    count = f"{done.sum()} runs" + (f", {(~done).sum()} failed or missing (dotted)" if (~done).any() else "")
-    title(axes, f"{count}; coloured by {_spaced(metrics[0])}")
-    part.colorbar(drawn, ax=axes, label=f"{_spaced(metrics[0])} ({result[metrics[0]].attrs['units']})", pad=0.01)
+    across = inches(width) or max(6.5, 2.3 * len(keys) + 0.8)
+    figure = new_figure(across, 1.0 + 1.5 * len(metrics), titles=titles)
+    panels = figure.subplots(len(metrics), len(keys), squeeze=False, sharex="col", sharey="row")
+    failed = result["status"].values.ravel() != "done"
+    for name, row in zip(metrics, panels, strict=True):
+        row[0].set_ylabel(labelled(_spaced(name), result[name].attrs["units"]))
+        for key, axes in zip(keys, row, strict=True):
+            axes.plot(_column(result, key), _column(result, name), "o", **_RUNS, color=colour(BLUE))
+            axes.xaxis.set_major_locator(MaxNLocator(max(1, int(1.6 * across / len(keys) - 0.8))))
+            axes.yaxis.set_major_locator(MaxNLocator(4))
+            _scale(axes.set_xscale, axes.xaxis, result[key])
+            _mark_failures(axes, _column(result, key)[failed])
+    for key, axes in zip(keys, panels[-1], strict=True):
+        axes.set_xlabel(labelled(short_key(key), result[key].attrs.get("units")))
+        if "names" in result[key].attrs or across < 1.1 * len(keys):
+            axes.margins(x=0.2)
+            axes.tick_params(axis="x", rotation=90)
+    count = f"{(~failed).sum()} runs" + (f", {failed.sum()} failed or missing (crosses)" if failed.any() else "")
+    heading(figure, count)
+    figure.align_labels()
     return figure
 
 
-_EXTREMES: tuple[tuple[Any, float], ...] = ((np.min, np.inf), (np.max, -np.inf))
+def _mark_failures(axes: Axes, places: Array) -> None:
+    """Draw crosses along the horizontal axis where runs failed."""
+    if places.size:
+        look: Any = {"color": colour(VERMILLION), "transform": axes.get_xaxis_transform(), "clip_on": False}
+        axes.plot(places, np.full(places.size, 0.03), "x", label="failed", **look)
 
 
 def _column(result: xr.Dataset, name: str) -> Array:

@@ -16,7 +16,7 @@ _SLIDER = """
 <actuator><motor tendon="rope"/><motor joint="x"/></actuator></mujoco>"""
 
 
-def try_known_answer() -> None:
+def try_self_test() -> None:
     """Hold a slider below the limit of its tendon's friction, T (1 - exp(-mu phi)) of tension T, and release it above.
 
     Raises:
