@@ -79,8 +79,8 @@ def run(
     # It says why, where an error that is large or unknown says that alone.
     stiff = too_stiff(result, loop.finger, scenario.simulation.atol_scale)
     inaccurate = stiff or inaccurate
-    # Close to self-locking, the warning of that is enough.
-    if stiff or (inaccurate and not close):
+    # Close to self-locking the warning of that is enough; an unknown error is no warning, but said in the result.
+    if stiff or (inaccurate and np.isfinite(error) and not close):
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=5)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
