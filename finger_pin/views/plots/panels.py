@@ -113,7 +113,9 @@ def title(axes: Axes, text: str) -> None:
         width = part.bbox.width / part.dpi / (1 if spot is None else spot.get_gridspec().ncols)
         points = _points("axes.titlesize")
         # Left of the panel are the labels of ticks and of the axis, of two lines at most; letters of titles are wide.
-        axes.set_title(_wrap(text, min(0.86 * width, width - 8.0 * points / 72.0), points))
+        written = _wrap(text, min(0.86 * width, width - 8.0 * points / 72.0), points)
+        # Panels in three dimensions do not look up the place.
+        axes.set_title(written, loc=settings["axes.titlelocation"])
 
 
 def heading(figure: Figure, text: str) -> None:
