@@ -23,7 +23,8 @@ _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
 # The estimate is seldom below a third of the error and sometimes far above it: the warning comes from so many times the
 # expected error on. A linearised flow says nothing of an error as large as the last number, rad or m.
 _DOUBTED, _MOST_BELIEVED = 3.0, 0.1
-_NOT_JUDGED = "the error of the run was not judged: "
+#: Where the error of a run is not known.
+NOT_JUDGED = "the error of the run was not judged: "
 _BEYOND = "small errors grow beyond all bounds, as over many impacts or of a body that tumbles"
 _CHECK = (
     "compare it with a run at a tighter tolerance (--check, check_convergence), "
@@ -65,9 +66,9 @@ def judge_error(scenario: Scenario, trajectory: Trajectory, *, margin: float) ->
     if np.isnan(error) or trajectory.failure or trajectory.interrupted:
         return error, ""
     if margin < _CLOSE_TO_LOCKING:
-        return np.nan, f"{_NOT_JUDGED}close to self-locking, a linearised flow does not show how far slips go; {_CHECK}"
+        return np.nan, f"{NOT_JUDGED}close to self-locking, a linearised flow does not show how far slips go; {_CHECK}"
     if not error < _MOST_BELIEVED:
-        return np.nan, f"{_NOT_JUDGED}{_BEYOND}; {_CHECK}"
+        return np.nan, f"{NOT_JUDGED}{_BEYOND}; {_CHECK}"
     if error > _DOUBTED * expected_error(scenario):
         return error, (
             f"the run errs by about {error:.1g} rad rms, as far as its linearised flow shows: the motion is sensitive, "

@@ -12,6 +12,7 @@ from finger_pin.description.scene_metadata import read_scene
 from finger_pin.mechanism.canals import BRANCHES, CANALS
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.tree import STATEFUL, STATELESS
+from finger_pin.simulation.accuracy import NOT_JUDGED
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.recording import is_tracking
 from finger_pin.typing import Array
@@ -62,7 +63,9 @@ def _own(result: xr.Dataset) -> list[str]:
 
 def _warnings(result: xr.Dataset) -> list[str]:
     told = [result.attrs[name] for name in _WARNINGS if name in result.attrs]
-    return [line for each in told for line in textwrap.wrap(f"Warning: {each}", 80)]
+    return [
+        line for each in told for line in textwrap.wrap(f"{'Note' if NOT_JUDGED in each else 'Warning'}: {each}", 80)
+    ]
 
 
 def _tracking(result: xr.Dataset) -> list[str]:

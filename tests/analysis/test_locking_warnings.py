@@ -26,8 +26,10 @@ def test_a_simulation_close_to_locking_warns_whoever_calls_it_and_its_summary_sa
         result = fp.simulate(steps(coefficient, 0.02))
     assert [each.filename for each in caught] == [__file__]
     assert result.attrs["self_locking_margin"] == pytest.approx(0.7418e-3 / coefficient, rel=1e-3)
-    line, further = [line for line in summarize(result).splitlines() if "Warning" in line]
-    assert said in line and "the error of the run was not judged" in further
+    summary = summarize(result).splitlines()
+    (line,) = [line for line in summary if "Warning" in line]
+    (note,) = [line for line in summary if line.startswith("Note")]
+    assert said in line and "the error of the run was not judged" in note
     assert "estimated_error" not in result.attrs
 
 
