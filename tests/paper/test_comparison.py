@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from paper.comparison import CASES, compare, csv_rows
+from paper.controllers import controllers
 from paper.plot_controllers import plot_controllers
 
 import finger_pin as fp
-from finger_pin.commands.application import run
+from finger_pin.commands.application import run_function
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_the_figure_shows_the_errors_and_the_bars(runs, rows):
 def script(monkeypatch):
     short = {"controller.sampling.period": 1e-3, "simulation.duration": 1.02}
     monkeypatch.setattr("paper.comparison.CASES", {"paper": short, "all friction": {**short, **CASES["all friction"]}})
-    return partial(run, "controllers")
+    return partial(run_function, controllers)
 
 
 def test_the_script_shows_the_table_and_writes_it_with_the_figure(script, tmp_path, capsys):
