@@ -64,11 +64,6 @@ def _spread(form: Rows, places: Indices, width: int) -> Rows:
     return form.spread(places, width)
 
 
-@memoised(lambda contacts, body, placed: (contacts, body.form, placed.tobytes()))
-def _check_start(contacts: Rows, body: RigidBody, placed: Array) -> None:
-    check_start(contacts, body, placed)
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Objects around a finger.
@@ -188,8 +183,7 @@ class Scene:
             InputError: Naming the pair.
         """
         placed = _placed(state)
-        # Many runs start alike.
-        _check_start(self.contacts, self.body, placed)
+        check_start(self.contacts, self.body, placed)
 
     @property
     def mass(self) -> Array:

@@ -132,7 +132,6 @@ def build_hand(hand: HandSettings) -> RigidBody:
     pulled = {"gravity": hand.gravity}
     parts = {name: build_rigid_body(finger.model_copy(update=pulled)) for name, finger in hand.built().items()}
     placed = tuple((name, each.position, each.orientation) for name, each in hand.fingers.items())
-
     return _weighed_hand(hand, placed, parts)
 
 

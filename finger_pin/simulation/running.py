@@ -14,7 +14,6 @@ from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.stepping.trajectory import Stop, Trajectory
 from finger_pin.description.caching import memoised
-from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import (
@@ -54,7 +53,7 @@ def run(
     """
     loop = loop or ClosedLoop.from_scenario(scenario)
     check_memory(scenario.simulation, loop.finger)
-    driving = _driving(scenario.finger)
+    driving = micro_damping_advice(scenario.finger)
     if driving:
         warnings.warn(driving, MicroDampingWarning, stacklevel=5)
     setup = Setup.of(scenario, loop, own, control_period)
@@ -125,8 +124,3 @@ def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
 @memoised(lambda scenario, reference: (scenario,))
 def _quick_margin(scenario: Scenario, reference: LoopReference) -> float:
     return quick_margin(scenario, reference)
-
-
-@memoised(lambda finger: (finger,))
-def _driving(finger: FingerDescription) -> str:
-    return micro_damping_advice(finger)
