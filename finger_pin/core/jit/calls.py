@@ -160,30 +160,6 @@ def scratch(_typing: Any, count: types.Type) -> _Generated:
     return types.int64(types.int64), generate
 
 
-@_generated
-def two_to_the(_typing: Any, rounded: types.Type) -> _Generated:
-    """Return 2^n from a number that holds the integer n in its last bits."""
-
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
-        word = ir.IntType(64)
-        exponent = builder.shl(builder.bitcast(arguments[0], word), word(52))
-        return builder.bitcast(builder.add(exponent, word(1023 << 52)), ir.DoubleType())
-
-    return types.float64(types.float64), generate
-
-
-@_generated
-def power_over(_typing: Any, value: types.Type) -> _Generated:
-    """Return the power of two from 1 / x to 2 / x, by the bits of a positive number's exponent."""
-
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
-        word = ir.IntType(64)
-        exponent = builder.and_(builder.bitcast(arguments[0], word), word(2047 << 52))
-        return builder.bitcast(builder.sub(word(2046 << 52), exponent), ir.DoubleType())
-
-    return types.float64(types.float64), generate
-
-
 @njit_inline
 def copy(source: Vector, target: Vector) -> None:
     """Copy a vector; an assignment to a slice would take a second more to compile, for its error's text."""
