@@ -23,9 +23,8 @@ from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import with_tighter
 from finger_pin.simulation.initial_state import own_parts, packed_state
-from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.recording import RunArrays, attributes_of, record, recorded, refuse_unknown
-from finger_pin.simulation.running import run
+from finger_pin.simulation.running import interruptible, run
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
 from finger_pin.simulation.setup import Setup

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
+from finger_pin.cancellation import CancelToken
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.trajectory import Stop
@@ -21,7 +22,6 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.prepared import Prepared
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.simulation.recording import refuse_unknown
@@ -81,9 +81,9 @@ def simulate_many(
     progress = progress or notebook_bar("runs")
     found: dict[int, xr.Dataset | FailedTask] = {}
     texts = [""] * len(runs)
-    with CtrlC() as interrupted, open_executor(executor, workers) as pool:
+    with CancelToken() as token, open_executor(executor, workers) as pool:
         compile_for(pool, lambda: runs[0])
-        for index, result in run_tasks(pool, run, runs, interrupted):
+        for index, result in run_tasks(pool, run, runs, token):
             if isinstance(result, FailedTask) and isinstance(result.error, InputError):
                 raise result.error
             found[index] = result
@@ -93,7 +93,7 @@ def simulate_many(
                 progress(len(found), len(runs))
     # To fill gigabytes for runs that there are not would take longer than a user waits.
     stacked = _stack(runs, dict(sorted(found.items())), texts)
-    if interrupted.pressed:
+    if token.cancelled:
         raise Interrupted(math.nan, stacked, f"after {len(found)} of {len(runs)} runs")
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
