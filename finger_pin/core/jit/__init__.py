@@ -8,7 +8,6 @@ below.
 from numba import types
 
 from finger_pin.core.jit.calls import (
-    add_at,
     call_at,
     call_filling,
     call_shape,
@@ -16,10 +15,8 @@ from finger_pin.core.jit.calls import (
     copy,
     copy_matrix,
     load,
-    look_at,
     numbers,
     put,
-    put_at,
     scratch,
     view,
 )
@@ -56,7 +53,6 @@ __all__ = [
     "Pointer",
     "StructType",
     "Vector",
-    "add_at",
     "address_of",
     "alike",
     "cache_place",
@@ -71,7 +67,6 @@ __all__ = [
     "fits",
     "indices",
     "load",
-    "look_at",
     "njit_always_inline",
     "njit_inline",
     "njit_reassociate",
@@ -79,7 +74,6 @@ __all__ = [
     "numbers",
     "pack",
     "put",
-    "put_at",
     "refill",
     "refuse_copy",
     "scratch",
