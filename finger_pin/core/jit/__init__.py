@@ -34,19 +34,7 @@ from finger_pin.core.jit.functions import (
     njit_reassociate,
 )
 from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, Pointer, StructType, Vector, unpack
-from finger_pin.core.jit.tables import (
-    Block,
-    alike,
-    call,
-    copied,
-    fits,
-    indices,
-    numbered,
-    pack,
-    refill,
-    refuse_copy,
-    taken,
-)
+from finger_pin.core.jit.tables import Block, call, copied, indices, nothing, pack, refuse_copy
 
 __all__ = [
     "Block",
@@ -60,7 +48,6 @@ __all__ = [
     "Vector",
     "add_at",
     "address_of",
-    "alike",
     "cache_place",
     "call",
     "call_at",
@@ -70,23 +57,20 @@ __all__ = [
     "copied",
     "copy",
     "copy_matrix",
-    "fits",
     "indices",
     "load",
     "look_at",
     "njit_always_inline",
     "njit_inline",
     "njit_reassociate",
-    "numbered",
+    "nothing",
     "numbers",
     "pack",
     "power_over",
     "put",
     "put_at",
-    "refill",
     "refuse_copy",
     "scratch",
-    "taken",
     "two_to_the",
     "types",
     "unpack",
