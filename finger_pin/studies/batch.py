@@ -14,7 +14,6 @@ import xarray as xr
 from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.cancellation import CancelToken
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
@@ -76,8 +75,7 @@ def simulate_many(
     finger = resolve_finger(finger, runs[0])
     _check_alike(runs)
     _check_kept(runs, variables or (), finger)
-    bindings: list[Bindings] = []
-    run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables), bindings=bindings)
+    run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
     found: dict[int, xr.Dataset | FailedTask] = {}
     texts = [""] * len(runs)
@@ -107,16 +105,14 @@ def simulate_many(
     return stacked
 
 
-def _run(
-    scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None, bindings: list[Bindings]
-) -> xr.Dataset:
+def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None) -> xr.Dataset:
     failure = ""
     try:
         # The study has a bar of its own.
         result = (
             simulate(scenario, finger=finger, progress=lambda time: None, stop=stop)
             if keep is None
-            else _prepared(scenario, finger, keep, bindings).run(stop=stop).dataset()
+            else _prepared(scenario, finger, keep).run(stop=stop).dataset()
         )
     except IntegrationError as error:
         assert error.result is not None
@@ -124,14 +120,14 @@ def _run(
     return result.assign_attrs(failure=failure)
 
 
-def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...], bindings: list[Bindings]) -> Prepared:
+def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...]) -> Prepared:
     family = ParametrisedScenario(with_finger(scenario, finger), ())
     try:
-        return Prepared(family, keep, finger, bindings)
+        return Prepared(family, keep, finger)
     except InputError:
         # It may lack what others have.
         known = known_variables(ClosedLoop.from_scenario(scenario, finger=finger))
-        return Prepared(family, tuple(name for name in keep if name in known), finger, bindings)
+        return Prepared(family, tuple(name for name in keep if name in known), finger)
 
 
 def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:

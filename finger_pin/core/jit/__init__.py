@@ -29,19 +29,7 @@ from finger_pin.core.jit.functions import (
     njit_reassociate,
 )
 from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, Pointer, StructType, Vector, unpack
-from finger_pin.core.jit.tables import (
-    Block,
-    alike,
-    call,
-    copied,
-    fits,
-    indices,
-    numbered,
-    pack,
-    refill,
-    refuse_copy,
-    taken,
-)
+from finger_pin.core.jit.tables import Block, call, copied, indices, nothing, pack, refuse_copy
 
 __all__ = [
     "Block",
@@ -54,7 +42,6 @@ __all__ = [
     "StructType",
     "Vector",
     "address_of",
-    "alike",
     "cache_place",
     "call",
     "call_at",
@@ -64,20 +51,17 @@ __all__ = [
     "copied",
     "copy",
     "copy_matrix",
-    "fits",
     "indices",
     "load",
     "njit_always_inline",
     "njit_inline",
     "njit_reassociate",
-    "numbered",
+    "nothing",
     "numbers",
     "pack",
     "put",
-    "refill",
     "refuse_copy",
     "scratch",
-    "taken",
     "types",
     "unpack",
     "view",
