@@ -67,11 +67,17 @@ def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
     Args:
         finger: A finger.
         position: theta, shape (n,), rad.
+
+    Raises:
+        InputError: If the posture is wrong, or tendons of a tree rub at several bends.
     """
     finger = as_finger(finger)
     theta = finite_vector("position", position, len(finger.routing.joints))
     if finger.paths is None:
         return finger
+    if any(len(places) > 1 for places in finger.tendons.wraps):
+        allowed = 'must be "canal" for statics of tendons along paths through space'
+        raise InputError("finger.tendon_friction.place", allowed, finger.description.tendon_friction.place)
     coupling, actuated = finger.coupling_at(theta), finger.routing.actuated
     turns = dict(zip(finger.paths.routes, finger.paths.turn(theta), strict=True))
     added = [turns.get(str(tendon.along), 0.0) for tendon in finger.description.tendons.values()]

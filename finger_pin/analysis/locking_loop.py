@@ -122,9 +122,9 @@ class FrictionLoop:
         for taut in product((True, False), repeat=routing.passive):
             halves = np.repeat(self.passive * np.array(taut, dtype=float)[:, None], 2, axis=1)
             strands = np.concatenate([self.command[:, :actuated], halves], axis=1)
-            delivered = scale[:, None, :, None] * strands
-            balance = routing.strand_coupling.T @ delivered
-            friction_torque = weights[:, None, :, None] * (routing.loads @ delivered)
+            # Tensions by case, cell, strand and torque, at every joint.
+            balance = np.einsum("sj,msj,csk->mcjk", routing.strand_coupling, scale, strands)
+            friction_torque = weights[:, None, :, None] * np.einsum("js,msj,csk->mcjk", routing.loads, scale, strands)
             # A canal so curved that nothing arrives, or everything stays, leaves no balance to look at.
             finite = np.isfinite(balance).all(axis=(2, 3)) & np.isfinite(friction_torque).all(axis=(2, 3))
             balance = np.where(finite[..., None, None], balance, np.eye(len(torque[0])))
@@ -178,8 +178,8 @@ class FrictionLoop:
         growth = np.zeros(len(position))
         torque = np.zeros_like(weights)
         for _ in range(_TURNS):
-            strands = scale * routing.strand_tension(tension)
-            torque = torque + weights * (strands @ routing.loads.T) - strands @ routing.strand_coupling
+            pull, reaction = self._of_joints(scale * routing.strand_tension(tension)[..., None])
+            torque = torque + weights * reaction - pull
             size = np.maximum(np.max(np.abs(torque), axis=1, keepdims=True), np.finfo(float).tiny)
             growth, torque = size[:, 0], torque / size
             minimal = torque @ inverse.T
@@ -207,9 +207,9 @@ class FrictionLoop:
             minimal = torque[going] @ inverse.T
             level = np.max((minimum - minimal) / internal, axis=1, keepdims=True)
             tension = minimal + level * internal
-            strands = np.maximum(scale[going] * routing.strand_tension(tension) - drag[going], 0.0)
-            residual = strands @ routing.strand_coupling - weights[going] * (strands @ routing.loads.T)
-            residual -= weight[going]
+            strands = np.maximum(scale[going] * routing.strand_tension(tension)[..., None] - drag[going], 0.0)
+            pull, reaction = self._of_joints(strands)
+            residual = pull - weights[going] * reaction - weight[going]
             span = np.max(np.abs(tension), axis=1)
             arm = np.max(np.abs(routing.strand_coupling))
             done = np.max(np.abs(residual), axis=1) <= _SETTLED * arm * span
@@ -226,7 +226,7 @@ class FrictionLoop:
 
         The balance has one kernel: f = f_0 + l k, delivered by tendons and, of passive ones, the mean. f_hat is f over
         the shares that arrive, and l the least at which all of it is at f0 or above; without a positive kernel it
-        locks. All ways must slide passive tendons alike.
+        locks. All ways must slide passive tendons alike, and each tendon rubs at one place.
 
         Args:
             position: theta, shape (m, n), rad.
@@ -238,11 +238,10 @@ class FrictionLoop:
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
         count, size = len(self.internal), len(position)
         cases, own = (size, count), np.where(np.arange(count) < actuated, 0.0, sliding[0])
-        arriving = (
-            self._shares(position, np.broadcast_to(own, cases))[:, :, None] * routing.strand_tension(np.eye(count)).T
-        )
+        shares, drags = (of(position, np.broadcast_to(own, cases))[..., 0] for of in (self._shares, self._drags))
         arms = routing.strand_coupling.T - weights[:, None] * routing.loads
-        balance, needed = arms @ arriving, weight + self._drags(position, np.broadcast_to(own, cases)) @ arms.T
+        balance = arms @ (shares[:, :, None] * routing.strand_tension(np.eye(count)).T)
+        needed = weight + drags @ arms.T
         turned, lengths, axes = np.linalg.svd(balance)
         kernel = axes[:, -1] * np.sign(axes[:, -1].sum(axis=1, keepdims=True))
         base = np.einsum("mit,mi->mt", axes[:, :-1], np.einsum("mji,mj->mi", turned, needed) / lengths)
@@ -252,8 +251,8 @@ class FrictionLoop:
         share, drag = np.ones_like(base), np.zeros_like(base)
         for way in sliding if moves.any() else ():
             ways = np.broadcast_to(way, base.shape)
-            share[:, :actuated] = self._shares(at, ways)[:, :actuated]
-            drag[:, :actuated] = self._drags(at, ways)[:, :actuated]
+            share[:, :actuated] = self._shares(at, ways)[:, :actuated, 0]
+            drag[:, :actuated] = self._drags(at, ways)[:, :actuated, 0]
             # A tendon at f0 that does not overcome its drag delivers nothing.
             least = np.max((np.maximum(minimum * share - drag, 0.0) - base) / kernel, axis=1, keepdims=True)
             delivered = base + least * kernel
@@ -261,20 +260,26 @@ class FrictionLoop:
             found[moves] = np.maximum(found[moves], command[:, :actuated].max(axis=1))
         return found
 
+    def _of_joints(self, strands: Array) -> tuple[Array, Array]:
+        """Return the torques of strands of tensions at every joint, (m, s, n), and what loads the pins, (m, n) each."""
+        routing = self.tendons.routing
+        pull, load = (np.einsum("msj,sj->mj", strands, each) for each in (routing.strand_coupling, routing.loads.T))
+        return pull, load
+
     def _shares(self, position: Array, sliding: Array) -> Array:
-        """Return the tension of every strand over the command or the mean tension of its tendon, shape (m, s)."""
+        """Return the tension of every strand at every joint over the command or its tendon's mean, shape (m, s, n)."""
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
-        friction = sliding * capstan_coefficient(self.tendons.surface, routing.curvature(position))
-        share = (1.0 - friction[:, :actuated]) / (1.0 + friction[:, :actuated])
-        drawn = sliding[:, :actuated]
-        share = share * np.where(drawn > 0.0, self.gears[0], np.where(drawn < 0.0, self.gears[1], 1.0))
-        pairs = np.stack([1.0 + friction[:, actuated:], 1.0 - friction[:, actuated:]], axis=-1)
-        return np.concatenate([share, pairs.reshape(len(position), -1)], axis=1)
+        friction = (sliding * capstan_coefficient(self.tendons.surface, routing.curvature(position)))[:, actuated:]
+        share, drawn = self.tendons.in_sliding(position, sliding)[0][:, :actuated], sliding[:, :actuated]
+        gears = np.where(drawn > 0.0, self.gears[0], np.where(drawn < 0.0, self.gears[1], 1.0))
+        pairs = np.stack([1.0 + friction, 1.0 - friction], axis=-1).reshape(len(position), -1)
+        halves = np.repeat(pairs[..., None], share.shape[-1], axis=-1)
+        return np.concatenate([share * gears[..., None], halves], axis=1)
 
     def _drags(self, position: Array, sliding: Array) -> Array:
-        """Return the drag on every strand besides, shape (m, s), N."""
+        """Return the drag on every strand besides, at every joint, shape (m, s, n), N."""
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
-        friction = sliding * capstan_coefficient(self.tendons.surface, routing.curvature(position))
-        lost = sliding * self.tendons.drag
-        halves = np.repeat(0.5 * lost[:, actuated:], 2, axis=1) * np.tile([-1.0, 1.0], routing.passive)
-        return np.concatenate([lost[:, :actuated] / (1.0 + friction[:, :actuated]), halves], axis=1)
+        lost = self.tendons.in_sliding(position, sliding)[1][:, :actuated]
+        of_passive = sliding[:, actuated:] * self.tendons.drag[actuated:]
+        halves = np.repeat(0.5 * of_passive, 2, axis=1) * np.tile([-1.0, 1.0], routing.passive)
+        return np.concatenate([lost, np.repeat(halves[..., None], lost.shape[-1], axis=-1)], axis=1)

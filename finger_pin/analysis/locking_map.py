@@ -108,7 +108,7 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
     weight = np.array([finger.static_torque(theta) for theta in positions])
     loop, static = FrictionLoop.of(finger.tendons, None), finger.joint_friction.static
     coefficient, tension = np.full(count, np.inf), np.zeros(count)
-    alone = len(routing.tendons) == size + 1
+    alone = len(routing.tendons) == size + 1 and not loop.tendons.several
     counted = slice(None)
     if alone:
         # The friction of actuated tendons scales columns of the balance in f, and leaves where f_i = 0 as it was. With
@@ -117,7 +117,9 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
     mattering = np.zeros_like(sliding)
     mattering[:, counted] = sliding[:, counted]
     locking = np.unique(np.hstack([signs, mattering]), axis=0)
-    curved = np.abs(positions) @ routing.curvature_matrix[counted].T
+    bends = routing.curvature_matrix[counted]
+    # Of tendons that rub at several places, each of them counts.
+    curved = np.abs(positions) @ (np.diag(bends.any(axis=0)) if loop.tendons.several else bends.T)
     _, first_of, same = np.unique(curved.round(12), axis=0, return_index=True, return_inverse=True)
     closest = np.zeros(len(locking))
     for index, case in enumerate(locking):

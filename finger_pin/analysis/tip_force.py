@@ -142,12 +142,12 @@ def _least(
     found = statics.solve(cost, np.zeros((n, 1)), [*largest, *bounds], demand, below_largest)
     if found.status != 0:
         return None
-    strands = found.x[1 + a : 1 + a + s]
+    tensions, segments = found.x[1 + a : 1 + a + s], statics.segments
     # A radius r of a strand enters its joint's row as r f: d(value) = -(multiplier) f dr.
-    by_strand = -np.asarray(found.eqlin.marginals)[:n, None] * strands * (finger.routing.loads > 0.0)
-    halves = by_strand[:, a:].reshape(n, -1, 2).sum(axis=2)
-    by_radius = np.hstack([by_strand[:, :a], halves]).T
-    return RequiredTension(float(found.x[0]), found.x[1 : 1 + a], strands, by_radius)
+    by_segment = -np.asarray(found.eqlin.marginals)[:n, None] * tensions * (segments.loads > 0.0)
+    by_radius = np.zeros((len(finger.routing.tendons), n))
+    np.add.at(by_radius, segments.tendon, by_segment.T)
+    return RequiredTension(float(found.x[0]), found.x[1 : 1 + a], tensions[segments.strands], by_radius)
 
 
 def _unit(direction: Sequence[float] | Array) -> Array:

@@ -43,6 +43,7 @@ from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 
 #: What scipy's linear programmes report.
@@ -75,6 +76,77 @@ class Slip:
 
 
 @dataclass(frozen=True, eq=False)
+class Segments:
+    """The strands of a finger at a posture, cut where tendons rub; k places of friction, s segments.
+
+    Attributes:
+        coupling: Arms of the segments, shape (s, n), m.
+        loads: Which segments load which joints, shape (n, s).
+        tendon: Tendon of every segment, shape (s,).
+        strands: Segment at the end of every strand.
+        near: What pulls at the near end of every place, shape (k,), an index among commands and segments.
+        far: Likewise at the far end.
+        friction_of: Tendon of every place, shape (k,).
+        loss: exp(-mu_e phi) of every place, shape (k,).
+        drag: What drag takes of what arrives there, shape (k,), N.
+    """
+
+    coupling: Array
+    loads: Array
+    tendon: NDArray[np.intp]
+    strands: NDArray[np.intp]
+    near: NDArray[np.intp]
+    far: NDArray[np.intp]
+    friction_of: NDArray[np.intp]
+    loss: Array
+    drag: Array
+
+    @classmethod
+    def of(cls, tendons: Tendons, theta: Array) -> Segments:
+        """Cut the strands at theta, shape (n,)."""
+        routing, a = tendons.routing, tendons.routing.actuated
+        whole, everywhere = routing.curvature(theta), np.ones(len(routing.joints), dtype=bool)
+        coupling, loads = list[Array](), list[Array]()
+        tendon, strands = list[int](), list[int]()
+        # Of every place: tendon, near and far end, curvature, and the tendon's number of places.
+        places: list[tuple[int, int, int, float, int]] = []
+        for k in range(a):
+            own = tendons.several.get(k)
+            cuts = own or [(routing.curvature_matrix[k], routing.curvature_offset[k], everywhere)]
+            for number, (bends, offset, beyond) in enumerate(cuts):
+                after = cuts[number + 1][2] if number + 1 < len(cuts) else ~everywhere
+                here = a + len(tendon)
+                places.append((k, here - 1 if number else k, here, float(np.abs(theta) @ bends + offset), len(cuts)))
+                # What the first place has before it is that of the whole.
+                on = (beyond if number else everywhere) & ~after
+                coupling.append(routing.strand_coupling[k] * on)
+                loads.append(routing.loads[:, k] * on)
+                tendon.append(k)
+            strands.append(len(tendon) - 1)
+        for k in range(a, len(routing.tendons)):
+            proximal, here = routing.strand(routing.tendons[k]), a + len(tendon)
+            places.append((k, here, here + 1, float(whole[k]), 1))
+            for half in (proximal, proximal + 1):
+                coupling.append(routing.strand_coupling[half])
+                loads.append(routing.loads[:, half])
+                strands.append(len(tendon))
+                tendon.append(k)
+        friction_of, near, far, turn, count = (np.array(each) for each in zip(*places, strict=True))
+        surface = tendons.surface[friction_of]
+        return cls(
+            coupling=np.array(coupling),
+            loads=np.array(loads).T,
+            tendon=np.array(tendon),
+            strands=np.array(strands),
+            near=near,
+            far=far,
+            friction_of=friction_of,
+            loss=np.exp(-surface * turn),
+            drag=tendons.drag[friction_of] / count / (1.0 + capstan_coefficient(surface, turn)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class TipStatics:
     """The linear constraints on x = (f^a, f, tau^f) that do not depend on E, and J^T.
 
@@ -84,6 +156,7 @@ class TipStatics:
         below: Rows that are at most zero, likewise.
         torque: Rows (n) of H_c2^T f - tau^f.
         weight: G and the torque of springs, shape (n,), N m.
+        segments: The strands, those of tendons that rub at several places from place to place.
         sizes: a, s, n.
     """
 
@@ -92,30 +165,29 @@ class TipStatics:
     below: Array
     torque: Array
     weight: Array
+    segments: Segments
     sizes: tuple[int, int, int]
 
     @classmethod
     def of(cls, finger: Finger, theta: Array, friction: Friction, slip: Slip | None = None) -> TipStatics:
         """Collect the constraints; ``slip`` serves HINDERING alone."""
-        routing, tendons = finger.routing, finger.tendons
-        a, (s, n) = routing.actuated, routing.strand_coupling.shape
-        turn = routing.curvature(theta)
-        loss = np.exp(-tendons.surface * turn)[:, None]
-        drag = (tendons.drag / (1.0 + capstan_coefficient(tendons.surface, turn)))[:, None]
+        a, segments = finger.routing.actuated, Segments.of(finger.tendons, theta)
+        s, n = segments.coupling.shape
+        loss, drag = segments.loss[:, None], segments.drag[:, None]
         command, strand, joint, one = np.split(np.eye(a + s + n + 1), [a, a + s, a + s + n])
-        # What pulls at either end of a friction: of passive tendons the proximal and the distal half.
-        near, far = np.vstack([command, strand[a::2]]), np.vstack([strand[:a], strand[a + 1 :: 2]])
-        reaction = finger.joint_friction.kinetic[:, None] * (routing.loads @ strand)
+        ends = np.vstack([command, strand])
+        near, far = ends[segments.near], ends[segments.far]
+        reaction = finger.joint_friction.kinetic[:, None] * (segments.loads @ strand)
         below: list[Array] = []
         if friction is Friction.NONE:
             equal = [far - near, joint]
         elif friction is Friction.HINDERING:
             assert slip is not None
-            ahead, idle = slip.tendons[:, None] > 0.0, slip.idle[:, None]
+            ahead, idle = slip.tendons[segments.friction_of][:, None] > 0.0, slip.idle[segments.friction_of][:, None]
             source, target = np.where(ahead, near, far), np.where(ahead, far, near)
             arriving = loss * source - drag * one
             equal = [np.where(idle, target, target - arriving), joint - slip.joints[:, None] * reaction]
-            below = [arriving[slip.idle]]
+            below = [arriving[idle[:, 0]]]
         else:
             equal = []
             below = [loss * near - far - drag * one, loss * far - near - drag * one]
@@ -125,8 +197,9 @@ class TipStatics:
             jacobian=finger.rigid_body.jacobian(theta),
             equal=np.concatenate([np.zeros((0, width + 1)), *equal]),
             below=np.concatenate([np.zeros((0, width + 1)), *below]),
-            torque=(routing.strand_coupling.T @ strand - joint)[:, :width],
+            torque=(segments.coupling.T @ strand - joint)[:, :width],
             weight=finger.static_torque(theta),
+            segments=segments,
             sizes=(a, s, n),
         )
 

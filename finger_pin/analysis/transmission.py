@@ -102,10 +102,10 @@ def coupling_in_motion(tendons: Tendons, position: Array, velocity: Array) -> Ar
         velocity: theta', shape (n,), rad/s; signs and ratios matter.
     """
     routing, actuated = tendons.routing, tendons.routing.actuated
+    direction = np.sign(sliding_velocity(tendons, velocity))
+    share = tendons.in_sliding(position, direction)[0][:actuated]
     kinetic = capstan_coefficient(tendons.surface, routing.curvature(position))
-    loss = np.sign(sliding_velocity(tendons, velocity)) * kinetic
-    share = ((1.0 - loss) / (1.0 + loss))[:actuated, None]
-    part = loss[actuated:, None]
+    part = (direction * kinetic)[actuated:, None]
     passive = (1.0 + part) * routing.proximal_coupling + (1.0 - part) * routing.distal_coupling
     return np.concatenate([share * routing.actuated_coupling, passive])
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from finger_pin.description.validation import Description, Numbers, problem, quantity, reals, suggestion
+from finger_pin.description.validation import Description, Numbers, choice, problem, quantity, reals, suggestion
 from finger_pin.exceptions import toml_like
 
 #: Laws of the joints' friction by name.
@@ -17,6 +17,12 @@ JOINT_LAWS = ("lugre", "dahl", "coulomb")
 class TendonFrictionSettings(Description):
     """Law (9) for tendons: one number for all, or one per tendon."""
 
+    place: Annotated[Literal["canal", "bends"], choice("canal", "bends")] = Field(
+        "canal",
+        description='Where tendons rub. "canal": at one place before the joints, as in the paper, by all of their '
+        'curvature. "bends": at every crossing that bends them and at every bend of a path, each at its own '
+        "tension and sliding speed; stiffness, viscous, micro_damping and drag are then shared among the places.",
+    )
     coulomb: Annotated[Numbers, reals(0.0, 10.0)] = quantity(
         0.11, unit="1", source="Sec. IV-B", doc="mu_e, Coulomb coefficient between tendon and canal."
     )

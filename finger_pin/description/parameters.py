@@ -129,6 +129,9 @@ class Crossing(Description):
         ..., unit="m", source="(3)", doc="r, signed: positive where tension turns the joint positively."
     )
     bends: bool = Field(False, strict=True, description="Whether the joint's rotation bends the path (15), which rubs.")
+    curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
+        0.0, unit="rad", source="(15)", doc="Curvature of the path here at theta = 0, beside the tendon's."
+    )
 
 
 class Tendon(Description):
@@ -138,7 +141,7 @@ class Tendon(Description):
         "actuated", unit="1", source="Sec. III", doc="Pulled by an actuator, or anchored at both ends."
     )
     curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
-        0.0, unit="rad", source="(15)", doc="phi_off, curvature of the path at theta = 0."
+        0.0, unit="rad", source="(15)", doc="phi_off, curvature of the path at theta = 0, beside its crossings'."
     )
     crossings: dict[Name, Crossing] = Field({}, description="By joint, in order along the tendon.")
     along: Name | None = Field(None, description="In place of crossings: the tendon of the tree whose path it takes.")

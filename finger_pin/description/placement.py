@@ -127,8 +127,9 @@ def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dic
     order = sorted(range(len(of_all)), key=of_all.__getitem__)
     found: dict[str, Any] = {}
     for entry in type(tables[0]).model_fields:
-        if entry == "law":
-            found[entry] = _one([table.law for table in tables])  # type: ignore[attr-defined]
+        if entry in ("law", "place"):
+            group = "joint_friction" if entry == "law" else "tendon_friction"
+            found[entry] = _one(f"{group}.{entry}", [getattr(table, entry) for table in tables])
             continue
         pairs = zip(tables, kinds, strict=True)
         numbers = [number for table, own in pairs for number in _each(getattr(table, entry), len(own))]
@@ -136,15 +137,15 @@ def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dic
     return found
 
 
-def _one(laws: Sequence[str]) -> str:
-    """Return the law of all fingers.
+def _one(key: str, values: Sequence[str]) -> str:
+    """Return the value of all fingers.
 
     Raises:
         InputError: If they have several.
     """
-    if len({*laws}) > 1:
-        raise InputError("hand.fingers", f"must have one joint_friction.law, not {', '.join(dict.fromkeys(laws))}")
-    return laws[0]
+    if len({*values}) > 1:
+        raise InputError("hand.fingers", f"must have one {key}, not {', '.join(dict.fromkeys(values))}")
+    return values[0]
 
 
 def _each(value: Numbers, size: int) -> Sequence[float]:

@@ -84,7 +84,12 @@ class Routing:
             coupling=np.array(coupling).reshape(-1, len(joints)),
             strand_coupling=np.array(strands).reshape(-1, len(joints)),
             curvature_matrix=np.array(curvature).reshape(-1, len(joints)),
-            curvature_offset=np.array([t.curvature_offset for t in description.tendons.values()]),
+            curvature_offset=np.array(
+                [
+                    tendon.curvature_offset + sum(each.curvature_offset for each in tendon.crossings.values())
+                    for tendon in description.tendons.values()
+                ]
+            ),
             loads=np.array(loads).reshape(-1, len(joints)).T,
             fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
         )

@@ -107,6 +107,25 @@ class Tree(Description):
             before = movers
         return [(divisor, frozenset(joints)) for divisor, joints in found]
 
+    def legs(self, tendon: str) -> list[list[tuple[bool, frozenset[str]]]]:
+        """Return for each part of a tendon's path and every leg whether it wraps, and the joints that change it."""
+        found: list[list[tuple[bool, frozenset[str]]]] = [[]]
+        before: set[str] | None = None
+        wrapped: set[str] | None = None
+        for each in (self.tendons[tendon].path or {}).values():
+            if each.kind == "pulley":
+                before, wrapped = None, None
+                found.append([])
+            elif each.kind != "point":
+                wrapped = self._movers(each.body)
+            else:
+                movers = self._movers(each.body)
+                if before is not None:
+                    about = before if wrapped is None else wrapped
+                    found[-1].append((wrapped is not None, frozenset((movers ^ before) | (about ^ before))))
+                before, wrapped = movers, None
+        return found
+
     @property
     def rubbing(self) -> tuple[str, ...]:
         """Names of the tendons that rub as they are pulled by springs, ranges, actuators or what drives their joint.

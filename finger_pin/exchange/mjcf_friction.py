@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from finger_pin.description.finger import FingerDescription
+from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import (
     COUNT,
     GROUP,
@@ -24,7 +25,13 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
     """Add friction of tendons (9), (14), (16) and of joints (9), (17) to an MJCF that has both.
 
     A passive tendon without its mass is a spring, and rubs as a driven tendon that its spring pulls.
+
+    Raises:
+        InputError: If tendons rub at several bends: a tendon of MuJoCo has one force along all of its length.
     """
+    if any(len(places) > 1 for places in tendons.wraps):
+        allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
+        raise InputError("finger.tendon_friction.place", allowed, description.tendon_friction.place)
     found = [*_of_tendons(description, tendons, massless), *_of_joints(description, tendons)]
     elements = {(each.tag, each.get("name")): each for kind in ("joint", "fixed") for each in root.iter(kind)}
     for each in found:
@@ -58,7 +65,7 @@ def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool
     for index, (name, tendon) in enumerate(description.tendons.items()):
         numbers = [float(getattr(tendons, each)[index]) for each in _TENDON]
         numbers += [float(tendons.lag[index] * tendons.stiffness[index]), float(tendons.drag[index])]
-        law = (*numbers, tendon.curvature_offset)
+        law = (*numbers, float(tendons.routing.curvature_offset[index]))
         crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
         if tendon.kind == "actuated":
             found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))

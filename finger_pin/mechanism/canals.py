@@ -1,27 +1,36 @@
-"""Friction of tendons that other rows pull (14), (16): tendons of a tree, and branches behind pulleys.
+"""Friction of tendons that other rows pull (14), (16): tendons of a tree, branches behind pulleys, further wraps.
 
 A tendon of a tree is pulled by its spring, its range, actuators, or what drives the joint that it winds about; its
 friction is a row that exerts what the canal changes of their tension. A pulley divides the tension that friction has
 left, and each branch behind it rubs by its own bend at its own tension, as it slides by itself.
+
+Where tendons rub at their bends, each wrap is such a row: along the tendon from there to its end, pulled by what the
+wraps before have left. With T_(k-1) and T_k before and behind wrap k, joints between it and the next one feel T_k, and
+sum_k r_k theta_k' T_k = v_1 T_0 - sum_k v_k (T_(k-1) - T_k): what each wrap takes at its own speed v_k is lost.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
+from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths, Wrap, find_wraps
 from finger_pin.mechanism.tendons import BRISTLES, LOSSES, SLACK, SOURCES, Tendons
 from finger_pin.mechanism.tree import table_of
 from finger_pin.typing import Array
 
-#: The tables, in the order of evaluation.
-CORDS, CANALS, BRANCHES = "tendon_cords", "tendon_canals", "tendon_branches"
+#: The tables, in the order of evaluation; those of further wraps have a number, from 2, at the end.
+CORDS, WRAPS, CANALS, BRANCHES = "tendon_cords", "tendon_wraps", "tendon_canals", "tendon_branches"
+
+
+def is_canal(group: str) -> bool:
+    """Return whether a table of rows is friction of canals or wraps."""
+    return group.startswith((WRAPS, CANALS, BRANCHES))
 
 
 @dataclass
@@ -38,6 +47,7 @@ class _Canal:
         offset: Curvature that its path does not show, rad.
         bends: Curvature per joint angle, shape (n,), of a sum of joint positions.
         drag: Level without load, N.
+        wraps: The places where it rubs.
     """
 
     name: str
@@ -49,14 +59,16 @@ class _Canal:
     offset: float = 0.0
     bends: Array = field(default_factory=lambda: np.zeros(0))
     drag: float = 0.0
+    wraps: tuple[Wrap, ...] = ()
 
 
 class Canals:
-    """Canals of a tree's tendons, other than those pulled by ideal sources or drives.
+    """Canals of a tree's tendons, and wraps of the finger's own beyond their first.
 
     Attributes:
         tables: Their rows, none without any.
         loads: By table, weights with which rows load the pins of joints, shape (n, rows).
+        wraps: By table of the own tendons' wraps, which row is of which tendon, shape (t, rows).
     """
 
     def __init__(
@@ -80,34 +92,91 @@ class Canals:
         """
         self.tables: list[Rows] = []
         self.loads: dict[str, Array] = {}
-        if routes is None or description.tree is None:
+        self.wraps: dict[str, Array] = {}
+        self._description, self._tree, self._tendons = description, description.tree, tendons
+        self._joints, self._width = tuple(description.joints), width
+        self._known = known = {table.group: table for table in rows}
+        # They load the pins by themselves.
+        self._pressing = {"driven_tendons", *pulled}
+        own = [self._own(index, name, routes, pulled) for index, name in enumerate(description.actuated_names)]
+        left = {each.name: {("driven_tendons", each.name): 1.0} for each in own}
+        self._rub(WRAPS, own, left, 2)
+        for table in self.tables:
+            tendon = {row: index for index, each in enumerate(own) for _, row in left[each.name]}
+            self.wraps[table.group] = np.eye(len(tendons.routing.tendons))[:, [tendon[name] for name in table.names]]
+        if routes is None or self._tree is None:
             return
-        self._tree, self._joints = description.tree, tuple(description.joints)
-        known = {table.group: table for table in rows}
         cords = {name: shares for name in self._tree.rubbing if (shares := self._tree.linked(name))}
         if cords:
             known[CORDS] = self._cords(cords, known, width)
             self.tables.append(known[CORDS])
-        trunks = [self._trunk(name, routes, tendons) for name in self._tree.rubbing]
-        branches = [each for trunk in trunks for each in self._behind(trunk, trunk.name, {(CANALS, trunk.name): 1.0})]
-        for index, (name, tendon) in enumerate(description.tendons.items()):
-            if tendon.along is not None:
-                drives = {
-                    (group, known[group].names[k]): float(weights[index, k])
-                    for group, weights in pulled.items()
-                    for k in np.flatnonzero(weights[index])
-                }
-                own = _Canal(name, index, routes.routes[tendon.along], True, frozenset(), drives)
-                branches += self._behind(own, tendon.along, {("driven_tendons", name): 1.0})
-        for group, canals in ((CANALS, trunks), (BRANCHES, branches)):
-            if canals:
-                known[group] = self._table(group, canals, tendons, known, width)
-                self.tables.append(known[group])
-                self._press(canals, known, {"driven_tendons", *pulled})
+        trunks = [self._trunk(name, routes) for name in self._tree.rubbing]
+        left |= {each.name: {} for each in trunks}
+        self._rub(CANALS, trunks, left)
+        branches = [branch for each in trunks for branch in self._behind(each, each.name, left[each.name])]
+        for each in own:
+            along = description.tendons[each.name].along
+            if along is not None:
+                branches += self._behind(each, along, left[each.name])
+        self._rub(BRANCHES, branches, {each.name: {} for each in branches})
 
-    def _trunk(self, name: str, routes: TendonPaths, tendons: Tendons) -> _Canal:
-        """Return the canal of a tendon of the tree before its first pulley."""
-        tree, tendon = self._tree, self._tree.tendons[name]
+    def _rub(
+        self, group: str, canals: Sequence[_Canal], left: dict[str, dict[tuple[str, str], float]], first: int = 1
+    ) -> None:
+        """Add tables of wraps, the first of every canal, then the second, and note by canal what changes its tension.
+
+        Args:
+            group: Name of the tables.
+            canals: Canals.
+            left: By canal, rows that change its tension by their forces; those of wraps are added.
+            first: Which wrap is the first, from 1.
+        """
+        for level in range(first, 1 + max((len(each.wraps) for each in canals), default=0)):
+            own = f"{group}_{level}" if level > 1 else group
+            found = [(each, self._at(each, level, left[each.name])) for each in canals if len(each.wraps) >= level]
+            self._known[own] = self._table(own, [wrapped for _, wrapped in found])
+            self.tables.append(self._known[own])
+            self._press(own, [wrapped for _, wrapped in found], whole=level == 1)
+            for canal, wrapped in found:
+                left[canal.name][own, wrapped.name] = 1.0
+
+    def _at(self, canal: _Canal, level: int, left: dict[tuple[str, str], float]) -> _Canal:
+        """Return a canal at one of its wraps, from 1."""
+        wrap = canal.wraps[level - 1]
+        beyond = canal.wraps[level].crossed if level < len(canal.wraps) else frozenset()
+        here, on = (np.array([name in each for name in self._joints]) for each in (wrap.crossed - beyond, wrap.crossed))
+        coefficients = canal.route.coefficients * (on if level > 1 else 1.0)
+        return replace(
+            canal,
+            name=canal.name if level == 1 else f"{canal.name}.{wrap.name}",
+            route=canal.route.beyond(wrap, coefficients),
+            crossed=canal.crossed if level == 1 else wrap.crossed,
+            sources=canal.sources | left,
+            offset=wrap.offset,
+            bends=canal.bends * here if canal.bends.size else canal.bends,
+            drag=canal.drag * wrap.share,
+            wraps=(wrap,),
+        )
+
+    def _own(self, index: int, name: str, routes: TendonPaths | None, pulled: Mapping[str, Array]) -> _Canal:
+        """Return the canal of an actuated tendon of the finger, pulled by its drives besides what its source leaves."""
+        tendon = self._description.tendons[name]
+        drives = {
+            (group, self._known[group].names[k]): float(weights[index, k])
+            for group, weights in pulled.items()
+            for k in np.flatnonzero(weights[index])
+        }
+        route = TendonPath(-self._tendons.routing.coupling[index], ())
+        if tendon.along is not None and routes is not None:
+            route = routes.routes[tendon.along]
+        bends, wraps = self._tendons.routing.curvature_matrix[index], self._tendons.wraps[index]
+        return _Canal(name, index, route, True, frozenset(), drives, bends=bends, wraps=wraps)
+
+    def _trunk(self, name: str, routes: TendonPaths) -> _Canal:
+        """Return the canal of a tendon of the tree before its first pulley, at the first of its wraps."""
+        tree = self._tree
+        assert tree is not None
+        tendon = tree.tendons[name]
         sources: dict[tuple[str, str], float] = {}
         # No path through space has a length below zero, at which its spring or its range would push.
         one_way = not tendon.friction
@@ -125,45 +194,50 @@ class Canals:
             sources[CORDS, name] = 1.0
         around = tendon.joints or {}
         bends = np.array([float(bool(around.get(joint))) for joint in self._joints])
-        index = len(tendons.routing.tendons) + tree.rubbing.index(name)
-        crossed = tree.crossed(name)[0][1]
+        index = len(self._tendons.routing.tendons) + tree.rubbing.index(name)
+        crossed, wraps = tree.crossed(name)[0][1], find_wraps(self._description, name)
         route = routes.routes[name]
-        return _Canal(name, index, route, one_way, crossed, sources, tendon.curvature_offset, bends, tendon.friction)
+        return _Canal(name, index, route, one_way, crossed, sources, 0.0, bends, tendon.friction, wraps)
 
     def _behind(self, trunk: _Canal, tendon: str, friction: dict[tuple[str, str], float]) -> list[_Canal]:
         """Return the branches of a tendon: what pulls them is what the trunk's friction leaves, divided."""
+        assert self._tree is not None
         found, parts = [], zip(trunk.route.branches, self._tree.crossed(tendon)[1:], strict=True)
         for number, ((divisor, legs), (_, crossed)) in enumerate(parts, start=1):
             if legs:
                 sources = {key: weight / divisor for key, weight in (trunk.sources | friction).items()}
                 route = TendonPath(np.zeros(len(self._joints)), legs)
-                found.append(_Canal(f"{trunk.name}.{number}", trunk.tendon, route, trunk.one_way, crossed, sources))
+                wraps = find_wraps(self._description, tendon, number)
+                name = f"{trunk.name}.{number}"
+                found.append(_Canal(name, trunk.tendon, route, trunk.one_way, crossed, sources, wraps=wraps))
         return found
 
     def _cords(self, cords: Mapping[str, Mapping[str, float]], known: Mapping[str, Rows], width: int) -> Rows:
         """Return the tensions of cords that turn joints."""
-        actuators = self._tree.actuators
+        tree = self._tree
+        assert tree is not None
+        actuators = tree.actuators
         shares = [{(table_of(actuators[key]), key): share for key, share in each.items()} for each in cords.values()]
         return Rows(
             group=CORDS,
             law=CORD_TENSION,
             names=tuple(cords),
-            parameters=np.array([[float(not self._tree.opposed(name)) for name in cords]]),
+            parameters=np.array([[float(not tree.opposed(name)) for name in cords]]),
             arm=np.zeros((len(cords), width)),
             inputs=_wired(shares, known),
             powers=(SOURCES,),
         )
 
-    def _table(self, group: str, canals: list[_Canal], tendons: Tendons, known: Mapping[str, Rows], width: int) -> Rows:
+    def _table(self, group: str, canals: Sequence[_Canal]) -> Rows:
         # Drawn in, a tendon gets shorter.
         routes = [each.route.times(-1.0) for each in canals]
-        arm, bends = np.zeros((2, len(canals), width))
+        arm, bends = np.zeros((2, len(canals), self._width))
         for k, (each, route) in enumerate(zip(canals, routes, strict=True)):
             arm[k, : len(self._joints)] = route.coefficients
             bends[k, : each.bends.size] = each.bends
-        numbers = tendons.canals[:, [each.tendon for each in canals]]
-        # Drag is that of the whole tendon.
-        numbers[-1] = np.maximum(numbers[-1], [each.drag for each in canals]) * (group == CANALS)
+        numbers = self._tendons.at([each.tendon for each in canals], [each.wraps[0] for each in canals])
+        # Drag is that of the whole tendon, before it is divided.
+        numbers[-1] = np.maximum(numbers[-1], [each.drag for each in canals]) * (not group.startswith(BRANCHES))
         one_way = np.array([each.one_way for each in canals], dtype=float)
         return Rows(
             group=group,
@@ -171,7 +245,7 @@ class Canals:
             names=tuple(each.name for each in canals),
             parameters=np.vstack([numbers, one_way]),
             arm=arm,
-            inputs=_wired([each.sources for each in canals], known),
+            inputs=_wired([each.sources for each in canals], self._known),
             bends=bends,
             curvature_offset=np.array([each.offset for each in canals]),
             paths=tuple(route.legs for route in routes),
@@ -179,20 +253,17 @@ class Canals:
             powers=(*LOSSES, SLACK),
         )
 
-    def _press(self, canals: list[_Canal], known: Mapping[str, Rows], counted: set[str]) -> None:
-        """Record how tensions load the pins of the joints crossed by canals.
-
-        Those of the tables that are counted already load them by themselves.
-        """
-        own = self.tables[-1].group
+    def _press(self, own: str, canals: Sequence[_Canal], *, whole: bool) -> None:
+        """Record how the friction of canals, and as a whole what pulls through them, load the joints they cross."""
         for joint, name in enumerate(self._joints):
-            if not self._tree.joints[name].bearing:
+            if self._tree is not None and not self._tree.joints[name].bearing:
                 continue
             for each in canals:
-                for (group, row), weight in (each.sources | {(own, each.name): 1.0}).items():
-                    if name in each.crossed and group not in counted:
-                        press = self.loads.setdefault(group, np.zeros((len(self._joints), known[group].count)))
-                        press[joint, known[group].names.index(row)] += weight
+                pressing = each.sources if whole else {}
+                for (group, row), weight in (pressing | {(own, each.name): 1.0}).items():
+                    if name in each.crossed and group not in self._pressing:
+                        press = self.loads.setdefault(group, np.zeros((len(self._joints), self._known[group].count)))
+                        press[joint, self._known[group].names.index(row)] += weight
 
 
 def _wired(sources: Sequence[Mapping[tuple[str, str], float]], known: Mapping[str, Rows]) -> dict[str, Array]:

@@ -46,6 +46,7 @@ class Finger:
         mechanism: All of it as coordinates and rows.
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
+        wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         pulled: Weights with which drives and passive tendons' hysteresis pull the strands, by table, shape (s, k).
         constructor_args: The rigid body, the rows and the objects that it was given.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
@@ -96,6 +97,7 @@ class Finger:
         self.pulled = self.tendons.pulled(drives)
         tables, canals = parts.tables(description, self.paths, before, drives, self.pulled)
         last = (*parts.hysteresis_rows(), *(table for table in of_tree if table not in before), *rows)
+        self.wraps = canals.wraps
         self.further = (*before, *canals.tables, *last)
         mechanism = Mechanism(
             self.rigid_body,
@@ -271,12 +273,19 @@ class Finger:
         """Return an evaluation of the mechanism by the names of the paper."""
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
         bodies, pulling = int(self.mechanism.body.model.nv), partial(self.tendon_torque, x, found.rows)
-        return FingerSignals(self.layout.unpack(x), inputs, force, found, bodies, self.pulled, pulling)
+        return FingerSignals(self.layout.unpack(x), inputs, force, found, bodies, self.pulled, self.wraps, pulling)
+
+    @property
+    def wrap_names(self) -> tuple[str, ...]:
+        """Names of the places of tendons that rub at several: all first ones, all second ones, and so on."""
+        own = list(zip(self.routing.tendons, self.tendons.wraps, strict=False))
+        first = [f"{name}.{places[0].name}" for name, places in own if len(places) > 1]
+        return (*first, *(name for table in self.further if table.group in self.wraps for name in table.names))
 
     @property
     def pulling(self) -> tuple[str, ...]:
         """The tables of rows that are tendons."""
-        return "passive_halves", "driven_tendons", *self.pulled
+        return "passive_halves", "driven_tendons", *self.pulled, *self.wraps
 
     def tendon_torque(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
         """Return H_c2^T f, the torque of the tendons (11), at packed states, shape (..., n), N m."""

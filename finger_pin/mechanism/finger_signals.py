@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
+from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.rows import RowSignals, combined
 from finger_pin.mechanism.state import State
@@ -23,49 +25,86 @@ class TendonForces:
         passive: Those of passive tendons.
         strands: f of (12), shape (..., s), N.
         passive_acceleration: p_5'', shape (..., p), m/s2, (13).
+        beyond: Signals of wraps beyond the first ones, and which row is of which tendon, shape (t, k).
     """
 
     driven: RowSignals
     passive: RowSignals
     strands: Array
     passive_acceleration: Array
+    beyond: Sequence[tuple[RowSignals, Array]] = ()
 
     def _both(self, of: Callable[[RowSignals], Array]) -> Array:
         return np.concatenate([of(self.driven), of(self.passive)], axis=-1)
 
+    def _sum(self, of: Callable[[RowSignals], Array]) -> Array:
+        """Return the sum over all places where a tendon rubs."""
+        return sum((combined(of(wraps), weights.T) for wraps, weights in self.beyond), self._both(of))
+
+    def at_wraps(self, of: Callable[[RowSignals], Array]) -> Array:
+        """Return a signal at every place of the tendons that rub at several, in the order of `Finger.wrap_names`."""
+        return np.concatenate([of(self.driven)[..., self._first], *(of(wraps) for wraps, _ in self.beyond)], axis=-1)
+
+    @property
+    def wrap_tension(self) -> Array:
+        """Tension behind every place of the tendons that rub at several, N."""
+        acting = self.driven.rows.parameters[self.driven.rows.law.parameters.index("acting")]
+        first = self.driven.force + acting * self.driven.row.command
+        behind = (wraps.row.command + wraps.force for wraps, _ in self.beyond)
+        return np.concatenate([first[..., self._first], *behind], axis=-1)
+
+    @property
+    def _first(self) -> NDArray[np.intp]:
+        return np.flatnonzero(self._several[: self.driven.rows.count])
+
     @property
     def curvature(self) -> Array:
         """phi, rad, (15)."""
-        return self._both(lambda tendons: tendons.row.curvature)
+        return self._sum(lambda tendons: tendons.row.curvature)
 
     @property
     def coefficient(self) -> Array:
-        """mu^d, (16)."""
-        return self._both(lambda tendons: tendons["coefficient"])
+        """mu^d, (16), of all curvature together."""
+        whole = self._both(lambda tendons: tendons["coefficient"])
+        if not self.beyond:
+            return whole
+        surface = np.concatenate([self.driven.rows.parameters[0], self.passive.rows.parameters[0]])
+        return np.where(self._several, capstan_coefficient(surface, self.curvature), whole)
+
+    @property
+    def _several(self) -> NDArray[np.bool_]:
+        """Which tendons rub at several places, shape (t,)."""
+        found: NDArray[np.bool_] = np.any([np.any(weights, axis=1) for _, weights in self.beyond], axis=0)
+        return found
 
     @property
     def velocity(self) -> Array:
-        """v, m/s; (H_c theta')_i, and p_5' for a passive tendon."""
+        """v, m/s, at the first place; (H_c theta')_i, and p_5' for a passive tendon."""
         return self._both(lambda tendons: tendons.row.speed)
 
     @property
     def friction(self) -> Array:
-        """f^f, N, (9c)."""
-        return self._both(lambda tendons: tendons["friction"])
+        """f^f, N, (9c), at all places together."""
+        return self._sum(lambda tendons: tendons["friction"])
 
     @property
     def normal(self) -> Array:
         """F^n = |f| + |f^a|, N, (14), with f before micro-damping."""
-        return self._both(lambda tendons: tendons["normal_force"])
+        of_first = self._both(lambda tendons: tendons["normal_force"])
+        if not self.beyond:
+            return of_first
+        actuated = self.driven.rows.count
+        ends = np.abs(self.strands[..., :actuated]) + np.abs(self.driven.row.command)
+        return np.where(self._several, np.concatenate([ends, of_first[..., actuated:]], axis=-1), of_first)
 
     @property
     def level(self) -> Array:
-        """max(F^n M, g_min), N."""
-        return self._both(lambda tendons: tendons["level"])
+        """max(F^n M, g_min), N, at all places together."""
+        return self._sum(lambda tendons: tendons["level"])
 
     @property
     def stiction_rate(self) -> Array:
-        """F^s', N/s, (9a)."""
+        """F^s', N/s, (9a), at the first place."""
         return self._both(lambda tendons: tendons.rate)
 
     @property
@@ -121,6 +160,7 @@ class FingerSignals:
         mechanism: The same of the mechanism, with what every row does.
         bodies: Number of velocities of the rigid body, before those of passive tendons.
         pulled: Weights with which further tables pull the strands, by table, as of `Tendons.pulled`.
+        wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         pulling: Returns the torque of the tendons, as `Finger.tendon_torque`.
     """
 
@@ -130,6 +170,7 @@ class FingerSignals:
     mechanism: Evaluation
     bodies: int
     pulled: Mapping[str, Array]
+    wraps: Mapping[str, Array]
     pulling: Callable[[], Array]
 
     @cached_property
@@ -140,7 +181,11 @@ class FingerSignals:
         strands = np.concatenate([driven.force, found.rows["passive_halves"].force], axis=-1)
         for table, weights in self.pulled.items():
             strands = strands + combined(found.rows[table].force, weights.T)
-        return TendonForces(driven, passive, strands, found.acceleration[..., self.bodies : self.bodies + masses])
+        beyond = [(found.rows[table], weights) for table, weights in self.wraps.items()]
+        for wraps, weights in beyond:
+            strands = strands + combined(wraps.force, weights.T @ np.eye(len(weights), strands.shape[-1]))
+        acceleration = found.acceleration[..., self.bodies : self.bodies + masses]
+        return TendonForces(driven, passive, strands, acceleration, beyond)
 
     @property
     def joints(self) -> JointForces:

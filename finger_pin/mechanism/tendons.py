@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.actuator import ACTUATOR
-from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
+from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coefficient
 from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.joints import OF_TENDONS, bristles, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows, pulled
-from finger_pin.typing import Array
+from finger_pin.mechanism.tendon_paths import Wrap, find_wraps
+from finger_pin.typing import Array, Number
 
 #: What ideal sources of force supply.
 SOURCES = Energy("actuators", "actuators")
@@ -53,6 +55,9 @@ class Tendons:
         hysteresis: h, shape (p,).
         mass: m_5, shape (p,), kg.
         canals: Numbers of friction of the finger's tendons and of the canals of its tree, shape (f, t + c).
+        wraps: The places where each of them rubs.
+        several: By index of tendons that cross joints and rub at several places, for each place its joints' mask in
+            (15), its offset, rad, and the mask of the joints from there on.
     """
 
     routing: Routing
@@ -69,6 +74,8 @@ class Tendons:
     hysteresis: Array
     mass: Array
     canals: Array
+    wraps: tuple[tuple[Wrap, ...], ...]
+    several: Mapping[int, Sequence[tuple[Array, float, NDArray[np.bool_]]]]
 
     @classmethod
     def from_description(cls, description: FingerDescription) -> Tendons:
@@ -78,14 +85,51 @@ class Tendons:
         size, among = len(routing.tendons), len(routing.tendons) + len(description.canals)
         friction = {"surface": expand(law.coulomb, among), "stiction_ratio": expand(law.stiction_ratio, among)}
         friction |= bristles(law, among) | {"drag": expand(law.drag, among)}
+        wraps = [find_wraps(description, name) for name in (*routing.tendons, *description.canals)]
         return cls(
             routing=routing,
             **{name: each[:size] for name, each in friction.items()},
             canals=np.array([friction[_NAMES.get(name, name)] for name in PASSIVE_FRICTION.parameters]),
+            wraps=tuple(wraps),
+            several={
+                k: _places(routing, k, wraps[k])
+                for k, tendon in enumerate(description.tendons.values())
+                if len(wraps[k]) > 1 and tendon.along is None
+            },
             half_stiffness=2.0 * expand(passive.stiffness, routing.passive),
             hysteresis=expand(passive.hysteresis, routing.passive),
             mass=expand(passive.mass, routing.passive),
         )
+
+    def in_sliding(self, position: Array, direction: Array) -> tuple[Array, Array]:
+        """Return what of tendons' tensions arrives at every joint in steady sliding at M^d: a share, less a drag.
+
+        All places of a tendon slide the same way.
+
+        Args:
+            position: theta, shape (..., n), rad.
+            direction: 1 for a tendon that is drawn in, -1 for one that is let out, shape (..., t); 0 without friction.
+
+        Returns:
+            Shares, and what drag takes besides, N, shape (..., t, n) each; the last where it does not cross a joint.
+        """
+        routing = self.routing
+        joints = len(routing.joints)
+
+        def at_place(surface: Number, curvature: Array, way: Array, drag: Number) -> tuple[Array, Array]:
+            part = way * capstan_coefficient(surface, curvature)
+            return (1.0 - part) / (1.0 + part), way * drag / (1.0 + part)
+
+        whole = at_place(self.surface, routing.curvature(position), direction, self.drag)
+        share, lost = (np.repeat(each[..., None], joints, axis=-1) for each in whole)
+        for k, places in self.several.items():
+            left, taken, drag = np.ones_like(direction[..., k]), 0.0 * direction[..., k], self.drag[k] / len(places)
+            for bends, offset, beyond in places:
+                turned = np.abs(position) @ bends + offset
+                ratio, lower = at_place(self.surface[k], turned, direction[..., k], drag)
+                left, taken = left * ratio, taken * ratio + lower
+                share[..., k, beyond], lost[..., k, beyond] = left[..., None], taken[..., None]
+        return share, lost
 
     def stretch(self, position: Array, passive_position: Array) -> tuple[Array, Array]:
         """Return the stretch of the proximal and distal halves, shapes (..., p), m; negative when slack."""
@@ -167,14 +211,22 @@ class Tendons:
             passive.numbered(friction[:, actuated:]),
         ]
 
-    @memoised(lambda self, drives, motors: (self.routing, *(each.form for each in drives), motors))
+    @memoised(lambda self, drives, motors: (self.routing, self.wraps, *(each.form for each in drives), motors))
     def _wired(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
         return self._rows(drives, motors)
 
     @property
     def _friction(self) -> Array:
-        """The numbers of friction in the canals by those of its law, shape (f, t)."""
-        return self.canals[:, : len(self.routing.tendons)]
+        """The numbers of friction by those of its law, at the first place of every tendon, shape (f, t)."""
+        size = len(self.routing.tendons)
+        return self.at(range(size), [places[0] for places in self.wraps[:size]])
+
+    def at(self, tendons: Sequence[int], wraps: Sequence[Wrap]) -> Array:
+        """Return the numbers of friction, as in ``canals``, of some tendons at some of their places, shape (f, k)."""
+        found: Array = self.canals[:, tendons]
+        shared = [PASSIVE_FRICTION.parameters.index(name) for name in ("stiffness", "viscous", "drag")]
+        found[shared] *= [wrap.share for wrap in wraps]
+        return found
 
     def _rows(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
         routing, joints = self.routing, len(self.routing.joints)
@@ -184,6 +236,11 @@ class Tendons:
         driven[:, :joints] = routing.coupling
         driven[actuated:] = np.eye(passive, width, joints)
         bends[:, :joints] = routing.curvature_matrix
+        offset = routing.curvature_offset.copy()
+        for k, places in enumerate(self.wraps[: len(routing.tendons)]):
+            if len(places) > 1:
+                # `Canals` has the others.
+                bends[k, :joints], offset[k], _ = _places(routing, k, places)[0]
         friction, names = self._friction, routing.passive_names
         wired = pulled(drives, routing.tendons[:actuated])
         taken = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
@@ -203,7 +260,7 @@ class Tendons:
                 channels=np.where(taken, -1, np.arange(actuated)),
                 inputs=wired,
                 bends=bends[:actuated],
-                curvature_offset=routing.curvature_offset[:actuated],
+                curvature_offset=offset[:actuated],
                 stored=BRISTLES,
                 powers=(SOURCES, *LOSSES, SLACK),
             ),
@@ -215,8 +272,15 @@ class Tendons:
                 arm=driven[actuated:],
                 loads=loads,
                 bends=bends[actuated:],
-                curvature_offset=routing.curvature_offset[actuated:],
+                curvature_offset=offset[actuated:],
                 stored=BRISTLES,
                 powers=LOSSES,
             ),
         ]
+
+
+def _places(routing: Routing, tendon: int, wraps: Sequence[Wrap]) -> list[tuple[Array, float, NDArray[np.bool_]]]:
+    beyond = [np.array([name in wrap.crossed for name in routing.joints]) for wrap in wraps]
+    ends = [*beyond[1:], np.zeros(len(routing.joints), dtype=bool)]
+    bends = routing.curvature_matrix[tendon]
+    return [(bends * (own & ~after), wrap.offset, own) for own, after, wrap in zip(beyond, ends, wraps, strict=True)]

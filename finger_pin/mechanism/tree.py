@@ -24,7 +24,7 @@ from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
-from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, rotation
+from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, find_wraps, rotation
 from finger_pin.mechanism.tendons import SOURCES
 from finger_pin.typing import Array
 
@@ -98,7 +98,10 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
 
 
 def along_paths(description: FingerDescription, routes: TendonPaths, table: Rows) -> Rows:
-    """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter."""
+    """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter.
+
+    The curvature of driven ones is that of the first place where they rub.
+    """
     assert description.tree is not None
     if table.group != "driven_tendons" and not table.pulls:
         return table
@@ -108,7 +111,8 @@ def along_paths(description: FingerDescription, routes: TendonPaths, table: Rows
     for k, name in enumerate(table.pulls or table.names):
         along = description.tendons[name].along
         if along is not None:
-            route = routes.routes[along].times(-1.0)
+            route, first = routes.routes[along].times(-1.0), find_wraps(description, name)[0]
+            route = route.beyond(first, route.coefficients)
             arm[k, : len(rest)], paths[k] = route.coefficients, route.legs
             offset[k] += lengths[along]
     return replace(table, arm=arm, measure=arm, offset=offset, paths=tuple(paths))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.canals import BRANCHES, CANALS
+from finger_pin.mechanism.canals import is_canal
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import BLOCKS, State
 from finger_pin.mechanism.tree import STATEFUL
@@ -82,10 +82,10 @@ def _last_states(finger: Finger, last: xr.Dataset, sizes: dict[str, Array]) -> d
         InputError: If a result lacks them.
     """
     tables = [table for table in finger.further if table.states and not table.pulls]
-    early = (STATEFUL,), (CANALS, BRANCHES)
-    others = tuple(table.group for table in tables if table.group not in (*early[0], *early[1]))
+    canals = [table.group for table in tables if is_canal(table.group)]
+    others = [table.group for table in tables if table.group not in (STATEFUL, *canals)]
     found = {}
-    for part, groups in (("actuator_state", early[0]), ("canal_stiction", early[1]), ("further", others)):
+    for part, groups in (("actuator_state", [STATEFUL]), ("canal_stiction", canals), ("further", others)):
         names = [f"{table.group}_state" for table in tables if table.group in groups]
         for name in names:
             if name not in last:

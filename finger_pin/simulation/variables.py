@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.rows import LOST, Rows
+from finger_pin.mechanism.rows import LOST, Rows, RowSignals
 from finger_pin.mechanism.state import BLOCKS
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.energy import flows, stores
@@ -73,11 +73,34 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     }
     if loop.finger.layout.names_of("joint_stiction"):
         table["joint_stiction"] = _of_state("joint_stiction")
-    table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _measured(loop) | _more(loop)
+    table |= _of_wraps(loop) | _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _measured(loop) | _more(loop)
     for name, each in table.items():
         if frame := _frame(name, each):
             table[name] = each._replace(frame=frame)
     return table
+
+
+def _of_wraps(loop: ClosedLoop) -> dict[str, Quantity]:
+    """Return the signals of tendons that rub at several places."""
+    if not loop.finger.wraps:
+        return {}
+
+    def at(of: SampledTrajectory, signal: Callable[[RowSignals], Array]) -> Array:
+        return of.finger.tendons.at_wraps(signal)
+
+    signals: dict[str, tuple[Callable[[RowSignals], Array], str, str]] = {
+        "wrap_friction": (lambda wraps: wraps["friction"], "N", "friction force at every bend of a tendon"),
+        "wrap_velocity": (lambda wraps: wraps.row.speed, "m/s", "sliding velocity at every bend of a tendon"),
+        "wrap_curvature": (lambda wraps: wraps.row.curvature, "rad", "curvature of every bend of a tendon"),
+        "wrap_level": (lambda wraps: wraps["level"], "N", "friction of steady sliding at every bend of a tendon"),
+    }
+    tension = Quantity(
+        ("time", "wrap"), lambda of: of.finger.tendons.wrap_tension, "N", "tension behind every bend of a tendon"
+    )
+    return {"wrap_tension": tension} | {
+        name: Quantity(("time", "wrap"), partial(at, signal=signal), unit, text)
+        for name, (signal, unit, text) in signals.items()
+    }
 
 
 def _of_state(block: str, single: bool = False) -> Quantity:
@@ -272,6 +295,8 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
     found |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
         found["finger"] = list(scenario.hand.fingers)
+    if finger.wraps:
+        found["wrap"] = ("wrap", list(finger.wrap_names), {"long_name": "bend of a tendon"})
     if routing.passive > 1:
         found["passive_tendon"] = list(routing.passive_names)
     if finger.actuators.names:

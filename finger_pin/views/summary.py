@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.description.scene_metadata import read_scene
-from finger_pin.mechanism.canals import BRANCHES, CANALS
+from finger_pin.mechanism.canals import WRAPS, is_canal
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.tree import STATEFUL, STATELESS
 from finger_pin.simulation.accuracy import NOT_JUDGED
@@ -106,9 +106,10 @@ def _joints(result: xr.Dataset) -> list[str]:
 
 def _actuators(result: xr.Dataset) -> list[list[str]]:
     found = []
+    canals = [name for name in map(str, result.dims) if is_canal(name) and not name.startswith(WRAPS)]
     for groups, signal, head in (
-        ((STATELESS, STATEFUL), "force", "Forces of the actuators, N or N m"),
-        ((CANALS, BRANCHES), "friction", "Friction of tendons that they and springs pull, N"),
+        ([STATELESS, STATEFUL], "force", "Forces of the actuators, N or N m"),
+        (canals, "friction", "Friction of tendons that they and springs pull, N"),
     ):
         kinds = [each for each in groups if f"{each}_{signal}" in result]
         rows = [
