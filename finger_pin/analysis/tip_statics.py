@@ -18,7 +18,8 @@ limit, but never push. Friction enters in one of three ways.
 
 A drag d, which no load makes, adds to the level, mu^d (f^a_i + f_i) + d, so that it takes d / (1 + mu^d) of a tension
 beside the capstan law: of HELPING that much more on either side, of HINDERING f_i = max(0, f^a_i exp(-mu_e phi_i) -
-d / (1 + mu^d)), where a tendon whose command does not overcome its drag delivers nothing.
+d / (1 + mu^d)), where a tendon whose command does not overcome its drag delivers nothing. That of a joint adds to
+M^d_j S_j.
 
 S_j is the sum of the tensions that cross joint j. The reaction (17) is |-e_j S_j - E|, at most S_j + |E|: so HINDERING
 is on the safe side, and HELPING leaves out what the contact itself adds to the friction.
@@ -105,7 +106,8 @@ class TipStatics:
         command, strand, joint, one = np.split(np.eye(a + s + n + 1), [a, a + s, a + s + n])
         # What pulls at either end of a friction: of passive tendons the proximal and the distal half.
         near, far = np.vstack([command, strand[a::2]]), np.vstack([strand[:a], strand[a + 1 :: 2]])
-        reaction = finger.joint_friction.kinetic[:, None] * (routing.loads @ strand)
+        pins = finger.joint_friction
+        reaction = pins.kinetic[:, None] * (routing.loads @ strand) + pins.drag[:, None] * one
         below: list[Array] = []
         if friction is Friction.NONE:
             equal = [far - near, joint]

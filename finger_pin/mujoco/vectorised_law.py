@@ -57,8 +57,9 @@ def exerted(x: Pointer, dt: float) -> None:
         static = x[WIDTH * STATIC + i] * (1.0 if of_pin else kinetic)
         coefficient = _coefficient(speed, kinetic, static, x[WIDTH * STRIBECK + i], x[WIDTH * EXPONENT + i])
         floor, drag = x[WIDTH * FLOOR + i], x[WIDTH * DRAG + i]
-        within, beyond = (0.0, drag) if of_pin else (drag, 0.0)
-        level = _least(1.0, x[WIDTH * PRESSES + i] * coefficient + within, floor) + beyond
+        # That of a pin lets go at M^c / M^d of it.
+        drag *= coefficient / kinetic if of_pin and kinetic > 0.0 else 1.0
+        level = _least(x[WIDTH * PRESSES + i], coefficient, floor, drag)
         stiffness, viscous, micro = x[WIDTH * STIFFNESS + i], x[WIDTH * VISCOUS + i], x[WIDTH * MICRO + i]
         moved = stiffness * dt * speed
         later, decay = slid(force, moved, level)
