@@ -13,7 +13,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.canals import BRANCHES, CANALS
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import BLOCKS, State
-from finger_pin.mechanism.tree import STATEFUL
+from finger_pin.mechanism.tree import MUSCLES, STATEFUL
 from finger_pin.simulation.contact_variables import last_touching
 from finger_pin.typing import Array
 
@@ -82,7 +82,7 @@ def _last_states(finger: Finger, last: xr.Dataset, sizes: dict[str, Array]) -> d
         InputError: If a result lacks them.
     """
     tables = [table for table in finger.further if table.states and not table.pulls]
-    early = (STATEFUL,), (CANALS, BRANCHES)
+    early = (STATEFUL, MUSCLES), (CANALS, BRANCHES)
     others = tuple(table.group for table in tables if table.group not in (*early[0], *early[1]))
     found = {}
     for part, groups in (("actuator_state", early[0]), ("canal_stiction", early[1]), ("further", others)):
