@@ -11,10 +11,11 @@ import scipy
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.laws.muscle import active_work
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.tree import STATEFUL, STATELESS
+from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
 from finger_pin.typing import Array
 
 # Of an angle, rad, for differences.
@@ -84,12 +85,14 @@ def equilibrium(
         else np.array(finite_vector("position", position, joints))
     )
     rest = finger.rest_state(start)
+    held = layout.unpack(rest).actuator_state
     for table in finger.mechanism.rows:
-        if table.group == STATEFUL:
-            # What comes late has come.
-            held, numbers = layout.unpack(rest).actuator_state, table.parameters
-            assert held is not None
-            held[:] = np.clip(np.clip(command[table.channels], numbers[4], numbers[5]), numbers[-2], numbers[-1])
+        if table.group in (STATEFUL, MUSCLES):
+            # What comes late has come; the input's limits are those of an activation as well.
+            limits = [4, 5, -2, -1] if table.group == STATEFUL else [-2, -1, -2, -1]
+            least, most, lowest, highest = table.parameters[limits]
+            held[: table.count] = np.clip(np.clip(command[table.channels], least, most), lowest, highest)
+            held = held[table.count :]
 
     def placed(places: Array) -> Array:
         x = rest.copy()
@@ -155,6 +158,9 @@ def _given_by_actuators(found: FingerSignals) -> float:
         affine = np.where(wanted == cut, 0.5 * wanted**2, cut * wanted - 0.5 * cut**2)
         flat = by_length == 0.0
         total += float(np.sum(np.where(flat, cut * rows.row.length, affine / np.where(flat, 1.0, by_length))))
+    if MUSCLES in found.mechanism.rows:
+        rows = found.mechanism.rows[MUSCLES]
+        total += float(np.sum(active_work(rows.row.length, rows.row.state, rows.rows.parameters)))
     return total
 
 

@@ -21,8 +21,8 @@ it the loop has a solution whatever the offset (f0, weight, fingertip force): a 
 without a zero but the origin keeps its degree, and without friction this one is the identity in tau. At kappa_crit the
 solution runs off to infinity along the eigenvector. f0, weight and fingertip force do not shift the critical scale;
 they set how large tensions are on this side of it. So does a drag d of the tendons, which no load makes: it takes
-sigma_i d / (1 + sigma_i mu_i) of f_i, and sigma_5 d of the difference of a passive tendon's halves. The posture enters
-through the curvature of the tendons only.
+sigma_i d / (1 + sigma_i mu_i) of f_i, and sigma_5 d of the difference of a passive tendon's halves; that of a joint
+adds to the weight. The posture enters through the curvature of the tendons only.
 
 With the passive tension as planned the same has a plain meaning: the tensions f >= 0 that balance friction,
 (H_c2^T D - kappa diag(w s) loads D) f = 0, fill the kernel of a matrix, at kappa = 0 with a positive vector, force

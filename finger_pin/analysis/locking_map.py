@@ -106,7 +106,8 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
     routing, (count, size) = finger.routing, positions.shape
     signs, sliding = directions_of_motion(finger.tendons, np.ones(size, dtype=bool))
     weight = np.array([finger.static_torque(theta) for theta in positions])
-    loop, static = FrictionLoop.of(finger.tendons, None), finger.joint_friction.static
+    loop, pins = FrictionLoop.of(finger.tendons, None), finger.joint_friction
+    static = pins.static
     coefficient, tension = np.full(count, np.inf), np.zeros(count)
     alone = len(routing.tendons) == size + 1 and not loop.tendons.several
     counted = slice(None)
@@ -130,7 +131,8 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
     if alone:
         for case in locking:
             ways = sliding[np.all(np.hstack([signs, mattering]) == case, axis=1)]
-            command = loop.greatest_command(positions, case[:size] * static, ways, minimum, weight)
+            needed = weight + case[:size] * pins.static_drag
+            command = loop.greatest_command(positions, case[:size] * static, ways, minimum, needed)
             tension = np.maximum(tension, command)
     else:
         # Where it locks in one direction no other one needs more: first that which locks first.
@@ -140,6 +142,7 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
                 break
             cases = np.broadcast_to(case[size:], (len(left), len(routing.tendons)))
             weights = np.broadcast_to(case[:size] * static, (len(left), size))
-            command = loop.command_to_move(positions[left], weights, cases, minimum, weight[left])
+            needed = weight[left] + case[:size] * pins.static_drag
+            command = loop.command_to_move(positions[left], weights, cases, minimum, needed)
             tension[left] = np.maximum(tension[left], command[:, : routing.actuated].max(axis=1))
     return coefficient, tension

@@ -103,7 +103,7 @@ def self_locking_margin(
         chosen, signs, sliding, weights = (each[worst_first] for each in (chosen, signs, sliding, weights))
     kappa = loop.critical(motion.position[chosen], weights, sliding)[0]
     if servos:
-        kappa = _within_reach(scenario, loop, motion.position[chosen], weights, sliding, kappa)
+        kappa = _within_reach(scenario, loop, motion.position[chosen], weights, signs, sliding, kappa)
         # Gears that no load turns let no tendon out, whatever joints do.
         stuck = (sliding[:, : routing.actuated] < 0.0) & np.isinf(gears[1])
         kappa = np.where(stuck.any(axis=1), 0.0, kappa)
@@ -113,7 +113,13 @@ def self_locking_margin(
 
 
 def _within_reach(
-    scenario: Scenario, loop: FrictionLoop, position: Array, weights: Array, sliding: Array, critical: Array
+    scenario: Scenario,
+    loop: FrictionLoop,
+    position: Array,
+    weights: Array,
+    signs: Array,
+    sliding: Array,
+    critical: Array,
 ) -> Array:
     """Return the scale of joint friction, shape (m,), up to which motors can move the finger slowly.
 
@@ -122,11 +128,14 @@ def _within_reach(
     finger = Finger(scenario.finger)
     limits, actuated = np.array(tension_limits(finger)), finger.routing.actuated
     minimum = expand(scenario.controller.minimum_tension, len(finger.routing.tendons))
-    weight = np.array([finger.static_torque(each) for each in position])
+    weight, drag = (
+        np.array([finger.static_torque(each) for each in position]),
+        signs * finger.joint_friction.static_drag,
+    )
 
     def fits(scale: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:
-        case = scale[:, None] * weights[at]
-        needed = loop.command_to_move(position[at], case, sliding[at], minimum, weight[at])[:, :actuated]
+        case, held = scale[:, None] * weights[at], weight[at] + scale[:, None] * drag[at]
+        needed = loop.command_to_move(position[at], case, sliding[at], minimum, held)[:, :actuated]
         # What gears take is in the limit, and in the share of what is let out.
         return np.asarray(np.all(needed * loop.gears[0] <= limits, axis=1), dtype=bool)
 

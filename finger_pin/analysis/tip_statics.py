@@ -18,7 +18,8 @@ limit, but never push. Friction enters in one of three ways.
 
 A drag d, which no load makes, adds to the level, mu^d (f^a_i + f_i) + d, so that it takes d / (1 + mu^d) of a tension
 beside the capstan law: of HELPING that much more on either side, of HINDERING f_i = max(0, f^a_i exp(-mu_e phi_i) -
-d / (1 + mu^d)), where a tendon whose command does not overcome its drag delivers nothing.
+d / (1 + mu^d)), where a tendon whose command does not overcome its drag delivers nothing. That of a joint adds to
+M^d_j S_j.
 
 S_j is the sum of the tensions that cross joint j. The reaction (17) is |-e_j S_j - E|, at most S_j + |E|: so HINDERING
 is on the safe side, and HELPING leaves out what the contact itself adds to the friction.
@@ -175,9 +176,9 @@ class TipStatics:
         s, n = segments.coupling.shape
         loss, drag = segments.loss[:, None], segments.drag[:, None]
         command, strand, joint, one = np.split(np.eye(a + s + n + 1), [a, a + s, a + s + n])
-        ends = np.vstack([command, strand])
+        ends, pins = np.vstack([command, strand]), finger.joint_friction
         near, far = ends[segments.near], ends[segments.far]
-        reaction = finger.joint_friction.kinetic[:, None] * (segments.loads @ strand)
+        reaction = pins.kinetic[:, None] * (segments.loads @ strand) + pins.drag[:, None] * one
         below: list[Array] = []
         if friction is Friction.NONE:
             equal = [far - near, joint]

@@ -69,7 +69,7 @@ class CompensatedController(LoopController):
         plan = self.distribution.plan(wanted, minimum)
         if self.tendons is not None or self.joints is not None:
             if self.joints is not None:
-                wanted = wanted + self.joints.viscous_torque(reference.velocity)
+                wanted = wanted + self.joints.unloaded_torque(reference.velocity)
             matrix = self._friction_matrix(position, reference.velocity)
             wanted, plan = self._closed(wanted, matrix, minimum, plan)
         command = plan.tension

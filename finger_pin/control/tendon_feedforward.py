@@ -89,7 +89,7 @@ class TendonFeedforward:
 
 @dataclass(frozen=True, eq=False)
 class JointCompensation:
-    """tau = M(v) R direction(v) + b v, the steady sliding of (9) with the reaction (17) of the planned tensions.
+    """tau = (M(v) R + drag) direction(v) + b v: steady sliding by (9) with the reaction (17) of the planned tensions.
 
     No external force is known to it. The torque asks for tensions, which load the joints: the plan of the tensions
     closes that loop.
@@ -114,15 +114,21 @@ class JointCompensation:
             desired_velocity: theta^d', shape (..., n), rad/s.
         """
         law = self.friction
-        coefficient = signed_coefficient(
-            desired_velocity, law.kinetic, law.static, law.stribeck_velocity, law.stribeck_exponent, self.reversal_speed
-        )
+        coefficient = self._signed(desired_velocity, law.kinetic, law.static)
         matrix: Array = self.share * coefficient[..., None] * (law.loads @ strand_matrix)
         return matrix
 
-    def viscous_torque(self, desired_velocity: Array) -> Array:
-        """Return b v, shape (..., n), N m."""
-        return self.share * self.friction.viscous * desired_velocity
+    def unloaded_torque(self, desired_velocity: Array) -> Array:
+        """Return what no load makes, the drag and b v, shape (..., n), N m."""
+        drag = self._signed(desired_velocity, self.friction.drag, self.friction.static_drag)
+        return self.share * (drag + self.friction.viscous * desired_velocity)
+
+    def _signed(self, velocity: Array, kinetic: Array, static: Array) -> Array:
+        law = self.friction
+        signed: Array = signed_coefficient(
+            velocity, kinetic, static, law.stribeck_velocity, law.stribeck_exponent, self.reversal_speed
+        )
+        return signed
 
 
 def direction(velocity: Any, reversal_speed: Any) -> Any:

@@ -99,8 +99,10 @@ class SamplingSettings(Description):
 class ControllerSettings(Description):
     """The paper's controller (19)-(22), with the compensations and limits that a table or entry asks for.
 
-    With ``kind = "tensions"`` the tensions are given over time instead. In a file, ``file`` then names a CSV file: its
-    columns are ``time`` and actuated tendons, and become samples of ``tensions``.
+    With ``kind = "tensions"`` the tensions are given over time instead. That is also the default where nothing is said
+    of a closed loop (no gain or other entry of it, and no reference) and there is no other way: tensions are given, a
+    tree has actuators, or tensions cannot hold the finger at every posture, but its joints have springs. In a file,
+    ``file`` then names a CSV file: its columns are ``time`` and actuated tendons, and become samples of ``tensions``.
 
     In a hand it is the controller of every finger, with what the finger's table in ``fingers`` has on top; only
     ``sampling`` is the same for all.
@@ -109,7 +111,10 @@ class ControllerSettings(Description):
     file_keys = ("file",)
 
     kind: Annotated[Literal["proportional", "tensions"], choice("proportional", "tensions")] = quantity(
-        "proportional", unit="1", source="(19)", doc="Which controller; tensions: open loop."
+        "proportional",
+        unit="1",
+        source="(19)",
+        doc="Which controller; tensions: open loop, chosen by itself where springs alone return the joints.",
     )
     tensions: dict[FullName, ForceSignal] | None = Field(
         None, description="By actuated tendon; one without a signal is held at its minimum tension."

@@ -142,10 +142,11 @@ OF_FINGER = (
 #: Of a hand.
 OF_HAND = (Rule("", ("fingers_touch",), lambda hand, _: len(hand.fingers) > 1, "has no effect with a single finger"),)
 _CORRECTIONS = ("tendon_friction_feedforward", "joint_friction_compensation", "passive_tension_loop", "distribution")
-_CLOSED_LOOP = ("gain", "damping", "gravity_compensation", "spring_compensation", "fingertip_force", *_CORRECTIONS)
+#: Entries of a controller that act in closed loop alone.
+CLOSED_LOOP = ("gain", "damping", "gravity_compensation", "spring_compensation", "fingertip_force", *_CORRECTIONS)
 #: Of a scenario; of a hand, that of each of its fingers.
 OF_SCENARIO = (
-    Rule("controller", _CLOSED_LOOP, lambda _, controller: controller.kind == "proportional", _OPEN),
+    Rule("controller", CLOSED_LOOP, lambda _, controller: controller.kind == "proportional", _OPEN),
     Rule(
         "controller",
         _CORRECTIONS,

@@ -74,6 +74,12 @@ class JointFrictionSettings(Description):
     stiction: Annotated[Numbers, reals(0.0, 0.1, hint=" m (is it in millimetres?)")] = quantity(
         3.5e-4, unit="m", source="estimate", doc="M^c, stiction coefficient times pin radius."
     )
+    drag: Annotated[Numbers, reals(0.0, 1e3)] = quantity(
+        0.0,
+        unit="N m",
+        source="the paper has none",
+        doc="Dry friction without load, of seals and bushings; adds to R M^d, and lets go at M^c / M^d times as much.",
+    )
     stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
         5.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness."
     )

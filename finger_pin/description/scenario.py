@@ -23,7 +23,7 @@ from finger_pin.description.by_finger import dump_set_fields, error_of_finger, f
 from finger_pin.description.caching import memoised
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.effects import OF_SCENARIO, idle, shown
+from finger_pin.description.effects import CLOSED_LOOP, OF_SCENARIO, idle, shown
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Routing
@@ -36,6 +36,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
 _Item = TypeVar("_Item")
+_OPEN = 'controller.kind = "tensions"'
 
 
 class ReferenceSettings(Description):
@@ -123,9 +124,36 @@ class Scenario(Description):
             environment = self.environment.updated(objects={**tree.objects, **(objects or {})})
             object.__setattr__(self, "environment", environment)
         self._check_names()
+        self._choose_kind()
         self._check_effects()
         self._check_parts()
         return self
+
+    def _choose_kind(self) -> None:
+        """Choose the open loop for fingers of whose closed loop nothing is said, where there is no other way."""
+        alone, chosen = {} if self.hand is None else self.hand.parts(), {}
+        for name in alone or ("",):
+            settings, prefix = of_finger(self.controller, name), f"{name}." if name else ""
+            told = settings.model_fields_set & {"kind", *CLOSED_LOOP}
+            if told or any(key.startswith(prefix) for key in self.reference.joints):
+                continue
+            if (self._part(name, alone[name]) if alone else self)._is_open():
+                kept = {key: getattr(settings, key) for key in settings.model_fields_set - {"sampling", "fingers"}}
+                chosen[name] = ControllerSettings().updated(**kept, kind="tensions")
+        if len(chosen) == max(len(alone), 1):
+            object.__setattr__(self, "controller", self.controller.updated(kind="tensions"))
+        elif chosen:
+            fingers = {**(self.controller.fingers or {}), **chosen}
+            object.__setattr__(self, "controller", self.controller.updated(fingers=fingers))
+
+    def _is_open(self) -> bool:
+        """Return whether a finger is given tensions, or can be driven by them in open loop alone."""
+        finger, tree = self.finger, self.finger.tree
+        if self.controller.tensions or (tree is not None and (tree.actuators or not finger.tendons)):
+            return True
+        routing, springs = Routing.from_description(finger), any(joint.spring for joint in finger.joints.values())
+        routed = any(tendon.along for tendon in finger.tendons.values())
+        return springs and not routed and not routing.force_closure().holds and not self._tautness(routing).holds
 
     def _check_effects(self) -> None:
         """Refuse what has no effect: on no finger of a hand, or, in a finger's own table, on that one."""
@@ -266,11 +294,14 @@ class Scenario(Description):
     def _check_taut(self, routing: Routing, missing: str) -> None:
         """Raise unless springs keep the tendons taut that (22) cannot without force closure."""
         if not any(joint.spring for joint in self.finger.joints.values()):
-            raise problem("finger.tendons", f"{missing}; the controller needs force closure")
-        minimum = expand(self.controller.minimum_tension, len(routing.tendons))
-        tautness = Tautness.of(self.finger, routing, self.coupling(routing), minimum)
+            raise problem("finger.tendons", f"{missing}; the controller needs force closure, {_OPEN} does not")
+        tautness = self._tautness(routing)
         if not tautness.holds:
-            raise problem("finger.tendons", f"{missing}, and {tautness}")
+            raise problem("finger.tendons", f"{missing}, and {tautness}; {_OPEN} can do without")
+
+    def _tautness(self, routing: Routing) -> Tautness:
+        minimum = expand(self.controller.minimum_tension, len(routing.tendons))
+        return Tautness.of(self.finger, routing, self.coupling(routing), minimum)
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
         """Return the constraint of the passive tendons on the references (20)."""

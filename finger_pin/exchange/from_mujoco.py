@@ -57,7 +57,7 @@ def from_mujoco(
             then, or a `mujoco.MjSpec`.
 
     Raises:
-        InputError: If it is neither, MuJoCo refuses the file, or it has muscles, ball joints or nothing that drives it.
+        InputError: If it is neither, MuJoCo refuses the file, or it has ball joints or nothing that drives it.
     """
     plugins: list[str] = []
     try:

@@ -90,6 +90,7 @@ def _of_joints(description: FingerDescription, tendons: Tendons) -> list[PluginF
     found = []
     for index, name in enumerate(description.joints):
         numbers = [float(getattr(friction, each)[index]) for each in _JOINT]
-        law = (*numbers, float(friction.lag[index] * friction.stiffness[index]), 0.0, 0.0)
+        micro_damping = float(friction.lag[index] * friction.stiffness[index])
+        law = (*numbers, micro_damping, float(friction.drag[index]), 0.0)
         found.append(PluginFriction(PIN, name, name, True, 1.0, law))
     return found

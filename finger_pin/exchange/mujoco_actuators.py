@@ -1,11 +1,13 @@
-"""Actuators of a MuJoCo model whose force is affine in control, its lag, length and speed; others are listed."""
+"""Actuators of a MuJoCo model, muscles or affine in control, its lag, length and speed; others are listed."""
 
 from __future__ import annotations
 
 from functools import cached_property
 
 import numpy as np
+from pydantic import ValidationError
 
+from finger_pin.description.muscle import Muscle
 from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.exchange.mujoco_names import Table, distinct
 from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
@@ -58,9 +60,12 @@ class ActuatorReader(ElementReader):
                 **self.laws[i],
             }
             if model.actuator_ctrllimited[self._control(i)]:
-                found[i]["input_range"] = model.actuator_ctrlrange[self._control(i)].tolist()
+                ends = model.actuator_ctrlrange[self._control(i)]
+                found[i]["input_range"] = (np.clip(ends, 0.0, 1.0) if "muscle" in found[i] else ends).tolist()
             bounds = self._bounds(i)
-            if np.isfinite(bounds).any():
+            if np.isfinite(bounds).any() and "muscle" in found[i]:
+                self.rest.add(f"actuator {model.actuator(i).name or f'actuator_{i}'}: the limit on a muscle's force")
+            elif np.isfinite(bounds).any():
                 found[i]["force_range"] = np.clip(bounds, -_LARGE, _LARGE).tolist()
         names = distinct("actuator", [model.actuator(i).name for i in found])
         return dict(zip(names, found.values(), strict=True))
@@ -72,7 +77,7 @@ class ActuatorReader(ElementReader):
             names = distinct("actuator", [self.model.actuator(i).name for i in chosen])
             for name, i in zip(names, chosen, strict=True):
                 value = float(controls[self._control(i)])
-                pulls = -float(self.model.actuator_gear[i, 0]) * self.laws[i]["gain"]
+                pulls = -float(self.model.actuator_gear[i, 0]) * self.laws[i].get("gain", 0.0)
                 found[name] = value * pulls if i in self.pulling else value
         return found
 
@@ -144,6 +149,8 @@ class ActuatorReader(ElementReader):
             return self._plugin(i)
         kind = gains(int(model.actuator_gaintype[i])).name.removeprefix("mjGAIN_").lower()
         gain, bias = model.actuator_gainprm[i].tolist(), model.actuator_biasprm[i].tolist()
+        if kind == "muscle":
+            return self._muscle(i)
         state = self._state(i)
         if isinstance(state, str):
             return state + (f", of kind {kind}" if kind != "fixed" else "")
@@ -158,6 +165,31 @@ class ActuatorReader(ElementReader):
             return "its bias is not affine"
         affine = model.actuator_biastype[i] == biases.mjBIAS_AFFINE
         return _affine(gain[0], *(bias[:3] if affine else (0.0, 0.0, 0.0))) | state
+
+    def _muscle(self, i: int) -> Table | str:
+        """Return the numbers of a muscle, or the reason for their lack."""
+        model, gain = self.model, self.model.actuator_gainprm[i]
+        alike = np.array_equal(gain[:9], model.actuator_biasprm[i, :9])
+        whole = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_MUSCLE and model.actuator_actnum[i] == 1
+        if not (alike and whole and model.actuator_dyntype[i] == self.mujoco.mjtDyn.mjDYN_MUSCLE):
+            return "only a part of it is a muscle"
+        if model.actuator_actlimited[i] and (model.actuator_actrange[i] != [0.0, 1.0]).any():
+            return "the activation of a muscle is limited to other than 0 and 1"
+        lengths, (rising, falling, smoothing) = model.actuator_lengthrange[i], model.actuator_dynprm[i, :3]
+        found: Table = {
+            "force": float(gain[2] if gain[2] >= 0.0 else gain[3] / model.actuator_acc0[i]),
+            "length_range": lengths.tolist(),
+            "range": gain[:2].tolist(),
+            **dict(zip(("lmin", "lmax", "vmax", "fpmax", "fvmax"), gain[4:9].tolist(), strict=True)),
+            "time_constants": [float(rising), float(falling)],
+            "smoothing": float(smoothing),
+        }
+        try:
+            Muscle.model_validate(found)
+        except ValidationError as error:
+            first = error.errors()[0]
+            return f"a muscle of other numbers ({'.'.join(map(str, first['loc']))}: {first['msg']})"
+        return {"muscle": found}
 
     def _state(self, i: int) -> Table | str:
         """Return the lag of an actuator, or that its input is a rate; nothing without a state."""

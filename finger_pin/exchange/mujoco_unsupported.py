@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_names import Names
 
 # What each flag takes out: the arrays that it makes zero; older versions lack some.
@@ -36,15 +35,10 @@ class Rest:
     """
 
     def __init__(self, mujoco: Any, model: Any) -> None:
-        """Check all elements but equalities and actuators.
-
-        Raises:
-            InputError: If the model has muscles.
-        """
+        """Check all elements but equalities and actuators."""
         self.mujoco, self.model = mujoco, model
         self._listed: list[str] = []
         self._moving: list[str] = []
-        self._refuse_muscles()
         self._every("joint", "jnt_stiffnesspoly", "a stiffness that grows with the deflection")
         self._every("joint", "dof_dampingpoly", "damping that grows with the speed", by_dof=True)
         self._every("joint", "jnt_springyield", "a spring that yields")
@@ -81,17 +75,6 @@ class Rest:
         self._listed.append(line)
         if moves:
             self._moving.append(line)
-
-    def _refuse_muscles(self) -> None:
-        model, mujoco = self.model, self.mujoco
-        for i in range(getattr(model, "nactuator", model.nu)):
-            kinds = (
-                model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_MUSCLE,
-                model.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_MUSCLE,
-                model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_MUSCLE,
-            )
-            if any(kinds):
-                raise InputError(f"actuator {model.actuator(i).name or i}", "is a muscle; muscles are not supported")
 
     def _every(self, what: str, attribute: str, has: str, by_dof: bool = False) -> None:
         """List every element with a nonzero attribute that older versions lack."""

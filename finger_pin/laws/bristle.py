@@ -49,12 +49,12 @@ def friction_coefficient_slope(
     return -direction(velocity, side) * (static - kinetic) / stribeck * power_slope * np.exp(-power)
 
 
-def friction_level(normal: Number, coefficient: Number, floor: Number) -> Number:
-    """Return max(F^n M, g_min), the stiction that steady sliding settles at.
+def friction_level(normal: Number, coefficient: Number, floor: Number, drag: Number = 0.0) -> Number:
+    """Return max(F^n M + drag, g_min), the stiction that steady sliding settles at.
 
     The floor keeps (9a) finite for an unloaded contact.
     """
-    return np.maximum(normal * coefficient, floor)
+    return np.maximum(normal * coefficient + drag, floor)
 
 
 def stiction_rate(stiction: Number, velocity: Number, level: Number, stiffness: Number, side: Number = 0.0) -> Number:
@@ -123,21 +123,23 @@ def steady_force(velocity: Number, normal: Number, coefficient: Number, viscous:
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
-    kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag = p
-    coefficient = friction_coefficient(row.speed, kinetic, static, stribeck, exponent, row.side)
-    level = friction_level(row.load, coefficient, floor)
+    kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag, drag, static_drag = p
+    share = friction_coefficient(row.speed, 0.0, 1.0, stribeck, exponent, row.side)
+    coefficient = kinetic + (static - kinetic) * share
+    level = friction_level(row.load, coefficient, floor, drag + (static_drag - drag) * share)
     rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, lag)
     return -loss, rate, loss, row.load, coefficient, level
 
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag = p
+    kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag, drag, static_drag = p
     _, _, coefficient, level = signals
     own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
     by_level = by_level * (level > floor)
-    by_speed = by_speed + by_level * row.load * friction_coefficient_slope(
-        row.speed, kinetic, static, stribeck, exponent, row.side
+    by_share = row.load * (static - kinetic) + static_drag - drag
+    by_speed = by_speed + by_level * by_share * friction_coefficient_slope(
+        row.speed, 0.0, 1.0, stribeck, exponent, row.side
     )
     return (0.0, -viscous, -1.0, -lag, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_level * coefficient, 0.0, 0.0)
 
@@ -155,14 +157,24 @@ def bristle_account(
 
 
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    _, _, stiffness, viscous, _, _, _, lag = p
-    return bristle_account(row.speed, row.state, rate, signals[3], stiffness, viscous, lag)
+    return bristle_account(row.speed, row.state, rate, signals[3], p[2], p[3], p[7])
 
 
-#: Friction between two parts that a load presses together, such as the pin of a joint (17).
+#: Friction between two parts that a load presses together, such as the pin of a joint (17), or a seal without one.
 PIN_FRICTION = Law(
     name="pin friction (9)",
-    parameters=("kinetic", "static", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "lag"),
+    parameters=(
+        "kinetic",
+        "static",
+        "stiffness",
+        "viscous",
+        "stribeck_velocity",
+        "floor",
+        "stribeck_exponent",
+        "lag",
+        "drag",
+        "static_drag",
+    ),
     value=_value,
     slopes=_slopes,
     account=_account,

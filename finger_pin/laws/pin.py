@@ -2,7 +2,8 @@
 
 Dahl's is (9a) without Stribeck's curve, F^s' = sigma_0 (v - F^s |v| / (M^d R)): presliding with one coefficient
 (P. Dahl, A Solid Friction Model, Aerospace Corporation TOR-0158(3107-18)-1, 1968). Coulomb's is a function of the speed
-alone, M^d R tanh(v / v_r) + b v: it needs no state and cannot stick; below its level it creeps.
+alone, M^d R tanh(v / v_r) + b v: it needs no state and cannot stick; below its level it creeps. A drag that no load
+makes adds to M^d R in both.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ SIGNALS = ("friction", "normal_force", "coefficient", "level")
 
 
 def _dahl_value(row: Row, p: Parameters) -> Numbers:
-    kinetic, stiffness, viscous, floor = p
-    level = friction_level(row.load, kinetic, floor)
+    kinetic, stiffness, viscous, floor, drag = p
+    level = friction_level(row.load, kinetic, floor, drag)
     rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
     loss = friction_force(row.state, row.speed, viscous)
     return -loss, rate, loss, row.load, kinetic + 0.0 * row.load, level
 
 
 def _dahl_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    kinetic, stiffness, viscous, floor = p
+    kinetic, stiffness, viscous, floor, _ = p
     level = signals[3]
     own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
     by_load = by_level * (level > floor) * kinetic
@@ -45,14 +46,14 @@ def _dahl_account(row: Row, p: Parameters, force: Number, rate: Number, signals:
 
 
 def _coulomb_value(row: Row, p: Parameters) -> Numbers:
-    kinetic, viscous, reversal_speed = p
-    level = kinetic * row.load
+    kinetic, viscous, reversal_speed, drag = p
+    level = kinetic * row.load + drag
     loss = level * np.tanh(row.speed / reversal_speed) + viscous * row.speed
     return -loss, 0.0 * row.speed, loss, row.load, kinetic + 0.0 * row.load, level
 
 
 def _coulomb_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    kinetic, viscous, reversal_speed = p
+    kinetic, viscous, reversal_speed, _ = p
     share = np.tanh(row.speed / reversal_speed)
     by_speed = -signals[3] * (1.0 - share * share) / reversal_speed - viscous
     return (0.0, by_speed, 0.0, 0.0, -kinetic * share, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -65,7 +66,7 @@ def _coulomb_account(row: Row, p: Parameters, force: Number, rate: Number, signa
 
 DAHL = Law(
     name="Dahl friction of a pin",
-    parameters=("kinetic", "stiffness", "viscous", "floor"),
+    parameters=("kinetic", "stiffness", "viscous", "floor", "drag"),
     value=_dahl_value,
     slopes=_dahl_slopes,
     account=_dahl_account,
@@ -76,7 +77,7 @@ DAHL = Law(
 )
 COULOMB = Law(
     name="Coulomb and viscous friction of a pin",
-    parameters=("kinetic", "viscous", "reversal_speed"),
+    parameters=("kinetic", "viscous", "reversal_speed", "drag"),
     value=_coulomb_value,
     slopes=_coulomb_slopes,
     account=_coulomb_account,

@@ -57,6 +57,7 @@ class JointFriction:
         floor: g_min, shape (n,), N m.
         stribeck_exponent: 1 or 2, shape (n,).
         lag: sigma_1 / sigma_0, shape (n,), s.
+        drag: Level without load while sliding, shape (n,), N m.
         reversal_speed: v_r of Coulomb's law, shape (n,), rad/s.
         law: The law.
     """
@@ -71,6 +72,7 @@ class JointFriction:
     floor: Array
     stribeck_exponent: Array
     lag: Array
+    drag: Array
     reversal_speed: Array
     law: Law
 
@@ -80,15 +82,25 @@ class JointFriction:
         law, size = description.joint_friction, len(description.joints)
         tree = description.tree
         bearing = np.array([tree is None or tree.joints[name].bearing for name in description.joints])
+        chosen = _law(law.law)
+        if np.any(law.drag) and "drag" not in chosen.parameters:
+            raise InputError("finger.joint_friction.drag", f"has no effect with law = {law.law!r}, which lacks it")
         return cls(
             loads=bearing[:, None] * loads,
             bearing=bearing,
             kinetic=expand(law.coulomb, size),
             static=expand(law.break_away, size),
             **bristles(law, size),
+            drag=bearing * expand(law.drag, size),
             reversal_speed=expand(law.reversal_speed, size),
-            law=_law(law.law),
+            law=chosen,
         )
+
+    @property
+    def static_drag(self) -> Array:
+        """Level without load at which each joint lets go, shape (n,), N m: M^c / M^d of the drag, or all of it."""
+        loaded = self.kinetic > 0.0
+        return self.drag * np.where(loaded, self.static / np.where(loaded, self.kinetic, 1.0), 1.0)
 
     def rows(
         self,

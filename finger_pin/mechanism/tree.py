@@ -19,6 +19,7 @@ from finger_pin.laws.actuator import ACTUATOR, ACTUATOR_WITH_STATE
 from finger_pin.laws.bristle import PIN_FRICTION
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
+from finger_pin.laws.muscle import MUSCLE
 from finger_pin.laws.spring import CONSTANT_FORCE, DEAD_BAND_SPRING, JOINT_SPRING
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -29,7 +30,7 @@ from finger_pin.mechanism.tendons import SOURCES
 from finger_pin.typing import Array
 
 #: The tables of actuators without and with a state.
-STATELESS, STATEFUL = "actuator", "actuator_with_state"
+STATELESS, STATEFUL, MUSCLES = "actuator", "actuator_with_state", "muscle"
 _TIP = "fingertip"
 # Dry friction of a tendon holds until it has slid so far, m.
 _HOLDS = 1e-4
@@ -43,6 +44,7 @@ _STORED = {
     "gravity_compensation": Energy("gravity_compensation", "weights compensated"),
     "actuator_with_state": Energy("joint_springs", "joints' springs"),
     "actuator": Energy("joint_springs", "joints' springs"),
+    "muscle": Energy("muscle_passive", "muscles' passive elements"),
 }
 _EXCHANGED = {
     "tendon_spring": (Energy("tendon_spring_damping", "tendons' dampers"),),
@@ -51,6 +53,7 @@ _EXCHANGED = {
     "loop": (Energy("loop_damping", "loops"),),
     "actuator_with_state": (SOURCES,),
     "actuator": (SOURCES,),
+    "muscle": (Energy("muscles", "muscles"),),
 }
 
 
@@ -143,7 +146,7 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
         if along:
             tables.append(table(group, law, along, numbers))
     first = len(description.actuated_names)
-    for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE)):
+    for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE), (MUSCLES, MUSCLE)):
         own = {name: each for name, each in tree.actuators.items() if table_of(each) == group}
         along = {
             name: (joints[each.joint] if each.joint else routes.routes[str(each.tendon)]).times(each.gear)
@@ -171,7 +174,7 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
     limits = [(*each.range, each.limit_stiffness, each.limit_damping) for each in limited.values() if each.range]
     # Law (9) whose level is its floor.
-    dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0) for each in rubbing.values()]
+    dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0, 0, 0) for each in rubbing.values()]
     return [
         ("tendon_spring", DEAD_BAND_SPRING, along(sprung), springs),
         ("tendon_limit", STROKE_LIMITER, along(limited), limits),
@@ -254,11 +257,18 @@ def _upright(axis: Array) -> Array:
 
 def table_of(actuator: TreeActuator) -> str:
     """Return the name of the table that an actuator's row stands in."""
+    if actuator.muscle is not None:
+        return MUSCLES
     return STATEFUL if actuator.has_state else STATELESS
 
 
 def _actuator(each: TreeActuator) -> tuple[float, ...]:
     """Return the numbers of an actuator's law."""
+    if each.muscle is not None:
+        own = each.muscle
+        origin = own.length_range[0] - own.range[0] * own.optimal_length
+        shape = own.lmin, own.lmax, own.vmax, own.fpmax, own.fvmax
+        return own.force, own.optimal_length, origin, *shape, *own.time_constants, own.smoothing, *each.excitations
     bounds = (*(each.input_range or _UNLIMITED), *(each.force_range or _UNLIMITED))
     if not each.has_state:
         return each.gain, each.offset, each.by_length, each.by_speed, *bounds

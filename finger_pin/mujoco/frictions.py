@@ -61,7 +61,7 @@ def frictions(
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
             numbers = (law.coulomb, law.stiction, law.stiffness, law.viscous, law.stribeck_velocity)
-            numbers += (max(law.floor, loss), law.stribeck_exponent, law.micro_damping, 0.0, 0.0)
+            numbers += (max(law.floor, loss), law.stribeck_exponent, law.micro_damping, law.drag, 0.0)
             found.append(PluginFriction(PIN, name, name, True, 1.0, numbers))
         elif named:
             raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")

@@ -164,8 +164,9 @@ def _exerted(p: Pointer, of_pin: bool, seen: Seen, force: float, dt: float) -> t
     kinetic = p[COULOMB] if of_pin else _capstan(p[COULOMB], turn)
     static = p[STATIC] * (1.0 if of_pin else kinetic)
     coefficient = _coefficient(speed, kinetic, static, p[STRIBECK], p[EXPONENT])
-    within, beyond = (0.0, p[DRAG]) if of_pin else (p[DRAG], 0.0)
-    level = _level(1.0, pressing * coefficient + within, p[FLOOR]) + beyond
+    # The drag of a pin lets go at M^c / M^d of it.
+    drag = p[DRAG] * (coefficient / kinetic if of_pin and kinetic > 0.0 else 1.0)
+    level = _level(pressing, coefficient, p[FLOOR], drag)
     viscous, micro, ratio, moved = p[VISCOUS], p[MICRO], p[RATIO], p[STIFFNESS] * dt * speed
     if tension == 0.0 and force == 0.0:
         pull, damp, limit = 0.0, viscous + micro, level + viscous * abs(speed)

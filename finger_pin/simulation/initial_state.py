@@ -13,7 +13,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.canals import is_canal
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import BLOCKS, State
-from finger_pin.mechanism.tree import STATEFUL
+from finger_pin.mechanism.tree import MUSCLES, STATEFUL
 from finger_pin.simulation.contact_variables import last_touching
 from finger_pin.typing import Array
 
@@ -82,10 +82,10 @@ def _last_states(finger: Finger, last: xr.Dataset, sizes: dict[str, Array]) -> d
         InputError: If a result lacks them.
     """
     tables = [table for table in finger.further if table.states and not table.pulls]
-    canals = [table.group for table in tables if is_canal(table.group)]
-    others = [table.group for table in tables if table.group not in (STATEFUL, *canals)]
+    actuators, canals = (STATEFUL, MUSCLES), [table.group for table in tables if is_canal(table.group)]
+    others = [table.group for table in tables if table.group not in (*actuators, *canals)]
     found = {}
-    for part, groups in (("actuator_state", [STATEFUL]), ("canal_stiction", canals), ("further", others)):
+    for part, groups in (("actuator_state", actuators), ("canal_stiction", canals), ("further", others)):
         names = [f"{table.group}_state" for table in tables if table.group in groups]
         for name in names:
             if name not in last:

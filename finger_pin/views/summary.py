@@ -11,7 +11,7 @@ import xarray as xr
 from finger_pin.description.scene_metadata import read_scene
 from finger_pin.mechanism.canals import WRAPS, is_canal
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
-from finger_pin.mechanism.tree import STATEFUL, STATELESS
+from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
 from finger_pin.simulation.accuracy import NOT_JUDGED
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.recording import is_tracking
@@ -108,7 +108,7 @@ def _actuators(result: xr.Dataset) -> list[list[str]]:
     found = []
     canals = [name for name in map(str, result.dims) if is_canal(name) and not name.startswith(WRAPS)]
     for groups, signal, head in (
-        ([STATELESS, STATEFUL], "force", "Forces of the actuators, N or N m"),
+        ([STATELESS, STATEFUL, MUSCLES], "force", "Forces of the actuators, N or N m"),
         (canals, "friction", "Friction of tendons that they and springs pull, N"),
     ):
         kinds = [each for each in groups if f"{each}_{signal}" in result]

@@ -1,4 +1,4 @@
-"""What a drag of the tendons does to fingertip forces and slow motion, written out for the planar finger."""
+"""Effect of a drag of tendons and joints on fingertip forces and slow motion, written out for the planar finger."""
 
 from itertools import product
 
@@ -22,23 +22,24 @@ JACOBIAN = np.array(
 WOUND = 0.11 * np.array([0.3, 0.4 + 0.4, 0.4 + 0.4])
 
 
-def planar(drag, pins=0.0):
+def planar(drag, pins=0.0, dry=0.0):
     """Return the planar finger without weight."""
-    keys = {"gravity": [0.0, 0.0, 0.0], "tendon_friction.drag": drag}
+    keys = {"gravity": [0.0, 0.0, 0.0], "tendon_friction.drag": drag, "joint_friction.drag": dry}
     keys |= {"joint_friction.coulomb": pins, "joint_friction.stiction": pins}
     return fp.Finger(fp.load_finger("planar", {f"finger.{key}": value for key, value in keys.items()}))
 
 
-@pytest.mark.parametrize("drag", [0.0, 0.5, 20.0])
-def test_a_finger_that_pushes_has_to_pull_as_much_more_as_drag_takes_and_nothing_where_a_tendon_is_idle(drag):
-    """Strands pull f = J^T E + l (1, 1, 1), none below zero with the least l; f = f^a exp(-mu phi) - d / (1 + mu^d).
+@pytest.mark.parametrize(("drag", "dry"), [(0.0, 0.0), (0.5, 0.0), (20.0, 0.0), (0.5, [4e-3, 2e-3])])
+def test_a_finger_that_pushes_has_to_pull_as_much_more_as_drag_takes_and_nothing_where_a_tendon_is_idle(drag, dry):
+    """Strands pull f = J^T E + s dry + l (1, 1, 1), none below zero with the least l.
 
-    The rows of H_c add up to nothing. A tendon that carries nothing needs no command.
+    f = f^a exp(-mu phi) - d / (1 + mu^d) arrives. The rows of H_c add up to nothing; an idle strand needs no command.
     """
-    finger, taken = planar(drag), drag / (1.0 + np.tanh(0.5 * WOUND))
+    finger, taken = planar(drag, dry=dry), drag / (1.0 + np.tanh(0.5 * WOUND))
     for angle in np.linspace(0.1, 6.2, 12):
         force = 2.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
-        strands = np.linalg.lstsq(ROWS.T, JACOBIAN.T @ force[:2], rcond=None)[0]
+        torque = JACOBIAN.T @ force[:2]
+        strands = np.linalg.lstsq(ROWS.T, torque + np.sign(torque) * dry, rcond=None)[0]
         strands -= strands.min()
         command = np.where(strands > 1e-9, (strands + taken) * np.exp(WOUND), 0.0)
         needed = tension_for_force(finger, Q, force, friction=Friction.HINDERING)
@@ -93,6 +94,20 @@ def test_slow_motion_needs_what_drag_takes_besides(drag):
         assert found.max() == pytest.approx(command, rel=1e-6)
         worst = max(worst, command)
     assert self_locking_map(finger, samples=2, minimum_tension=least).tension[1, 1] == pytest.approx(worst, rel=1e-6)
+
+
+@pytest.mark.parametrize("pins", [0.0, 3e-4])
+def test_slow_motion_needs_what_the_joints_drag_takes_besides(pins):
+    """In every direction s: (H_c^T - M s |H_c|^T) f = s d with the least f >= f0, where no tendon rubs."""
+    least, dry, worst = 1.0, np.array([6e-3, 2e-3]), 0.0
+    finger = planar(0.0, pins, dry.tolist())
+    finger = fp.Finger(finger.description.updated(tendon_friction={"coulomb": 0.0}))
+    for signs in product((1.0, -1.0), repeat=2):
+        balance = ROWS.T - pins * np.array(signs)[:, None] * (ROWS.T != 0.0)
+        kernel = null_space(balance)[:, 0]
+        kernel, base = kernel * np.sign(kernel[0]), np.linalg.lstsq(balance, signs * dry, rcond=None)[0]
+        worst = max(worst, (base + kernel * np.max((least - base) / kernel)).max())
+    assert self_locking_map(finger, samples=2, minimum_tension=least).tension.max() == pytest.approx(worst, rel=1e-6)
 
 
 def test_drag_shifts_no_self_locking():

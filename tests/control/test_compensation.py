@@ -201,6 +201,19 @@ def test_believed_coefficients_are_compensated_instead_of_the_finger_s():
     np.testing.assert_array_equal(believed.joints.friction.static, [3.5e-4, 3.5e-4, 3.5e-4, 4e-4])
 
 
+def test_a_drag_of_the_joints_is_compensated_in_the_direction_of_the_desired_motion():
+    """Far above the Stribeck speed, tensions exert it besides: to one part in exp(-v / omega)."""
+    position, velocity = postures(8, 3)
+    velocity *= 10.0
+    drag = {"finger.joint_friction.drag": 4e-3}
+    wanted = ReferenceSignals(position, velocity)
+    torques = [
+        fp.control.build_controller(fig6(FRICTIONLESS, JOINTS, SHARP, more)).command(0.0, wanted, position, velocity)
+        for more in ({}, drag)
+    ]
+    np.testing.assert_allclose(torques[1].torque - torques[0].torque, 4e-3 * np.sign(velocity), rtol=1e-6)
+
+
 def test_the_loop_of_friction_and_tension_closes_up_to_the_critical_coefficient():
     """At 97 % of it, tensions of many times those without friction still satisfy their balance, by (17) by hand."""
     critical = fp.analysis.critical_friction(fp.load_finger("ub")).coefficient

@@ -176,3 +176,69 @@ def test_the_paper_s_controller_holds_the_springs_where_it_is_told_to(tmp_path):
         reference = type("At", (), {"position": position, "velocity": np.zeros(4)})
         torques.append(controller.command(0.0, reference, position, np.zeros(4)).torque)
     np.testing.assert_allclose(torques[1] - torques[0], [0.0, 0.0, 0.05 * 0.8, 0.0], atol=1e-14)
+
+
+FLEXOR = """
+[finger]
+name = "flexor"
+gravity = [0.0, 0.0, 0.0]
+joints.a.range = [0.0, 1.6]
+joints.a.link = { length = 0.05, width = 0.01, mass = 0.01 }
+joints.a.spring = { stiffness = 0.3, damping = 0.01 }
+joints.b.range = [0.0, 1.6]
+joints.b.link = { length = 0.03, width = 0.01, mass = 0.01 }
+joints.b.spring = { stiffness = 0.1, damping = 0.01 }
+tendons.F.crossings = { a = { radius = 0.01 }, b = { radius = 0.006 } }
+tendon_friction = { coulomb = 0.0, viscous = 0.0 }
+joint_friction = { coulomb = 0.0, stiction = 0.0 }
+[simulation]
+duration = 1.5
+"""
+
+
+@pytest.fixture
+def flexor(tmp_path):
+    path = tmp_path / "flexor.toml"
+    path.write_text(FLEXOR)
+    return path
+
+
+def test_one_flexor_over_two_joints_with_springs_runs_in_open_loop_by_itself(flexor):
+    """With the minimum tension of 1 N, or 5 N by a signal, each joint rests at r f / k."""
+    for more, tension in (({}, 1.0), ({"controller.tensions.F.offset": 5.0}, 5.0)):
+        scenario = fp.load_scenario(flexor, more)
+        assert scenario.controller.kind == "tensions"
+        end = fp.simulate(scenario).joint_position.values[-1]
+        np.testing.assert_allclose(end, tension * np.array([0.01 / 0.3, 0.006 / 0.1]), rtol=2e-2)
+
+
+@pytest.mark.parametrize("key", ["reference.joints.a.offset", "controller.gain", "controller.damping"])
+def test_a_closed_loop_that_is_asked_of_it_is_refused_with_the_way_out(flexor, key):
+    with pytest.raises(InputError, match=r'no tensions hold it.*kind = "tensions" can do without') as caught:
+        fp.load_scenario(flexor, {key: 0.3})
+    assert caught.value.entry == "finger.tendons"
+
+
+def test_in_a_hand_only_the_finger_that_needs_it_is_in_open_loop(flexor, tmp_path):
+    flexor.write_text(FLEXOR.partition("[simulation]")[0].replace("[finger]\n", ""))
+    hand = """
+[hand]
+name = "two"
+[hand.fingers]
+one.finger = "flexor.toml"
+two.finger = "ub"
+[controller]
+minimum_tension = 2.0
+[simulation]
+duration = 0.01
+"""
+    path = tmp_path / "hand.toml"
+    path.write_text(hand)
+    scenario = fp.load_scenario(path)
+    kinds = {name: part.controller.kind for name, part in scenario.parts().items()}
+    assert kinds == {"one": "tensions", "two": "proportional"}
+    assert scenario.parts()["one"].controller.minimum_tension == 2.0
+    again = tmp_path / "again.toml"
+    again.write_text(fp.to_toml(scenario))
+    assert fp.load_scenario(again).controller == scenario.controller
+    np.testing.assert_allclose(fp.simulate(scenario).tendon_command.sel(tendon="one.F"), 2.0)

@@ -20,6 +20,9 @@ RANGES = {
     "ratio": (1.0, 2.0),
     "lag": (0.0, 0.5),
     "floor": (1e-3, 1.0),
+    "shortest": (0.1, 0.9),
+    "longest": (1.1, 2.0),
+    "lengthening": (1.1, 2.0),
 }
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.description.loading import read_scenario
 
 SHORT = {"simulation.duration": 0.3}
 LAW = "finger.joint_friction.law"
@@ -85,8 +86,10 @@ def test_below_its_level_coulomb_friction_creeps_where_bristles_hold():
 
 
 def test_the_compiled_and_the_readable_path_agree_on_every_law(own):
-    for law in ("dahl", "coulomb", "laws_of_mine:SOFT"):
-        both = [fp.simulate(scenario(law).updated(simulation={"method": method})) for method in ("Rodas5P", "BDF")]
+    drag = {"drag": 2e-3}
+    for law, more in (("lugre", drag), ("dahl", drag), ("coulomb", drag), ("laws_of_mine:SOFT", {})):
+        given = scenario(law, **more)
+        both = [fp.simulate(given.updated(simulation={"method": method})) for method in ("Rodas5P", "BDF")]
         np.testing.assert_allclose(*(each.joint_position.values for each in both), atol=2e-5)
 
 
@@ -122,6 +125,7 @@ def test_the_coefficient_of_dahl_and_coulomb_is_what_analyses_call_stiction(tmp_
         ("no_such_module:X", {}, "cannot be imported"),
         ("laws_of_mine:MISSING", {}, "cannot be imported"),
         ("laws_of_mine:NOTHING", {}, "signals"),
+        ("laws_of_mine:SOFT", {"drag": 1e-3}, "drag.*lacks it"),
         ("finger_pin.laws.capstan:DRIVEN_TENDON", {}, "parameters"),
     ],
 )
@@ -129,6 +133,63 @@ def test_a_law_that_there_is_not_and_keys_that_it_does_not_have_are_refused_in_o
     with pytest.raises(fp.InputError, match=says) as caught:
         fp.simulate(scenario(law, **more))
     assert "\n" not in str(caught.value) and caught.value.entry.startswith("finger.joint_friction")
+
+
+SPRING, DRAG = 0.05, 0.01
+
+
+def dry(law, start=0.0, speed=0.0, duration=1.0, spring=SPRING, controller=None, **more):
+    """Return the result of a joint with dry friction and a spring that is relaxed at 0, and its inertia."""
+    numbers = {"law": law, "coulomb": 0.0, "viscous": 0.0, "drag": DRAG} | more
+    numbers |= {"stiction": numbers["coulomb"]} if law == "lugre" and "stiction" not in more else {}
+    joint = {"range": [-2.0, 2.0], "link": {"length": 0.1, "width": 0.01, "mass": 0.1}}
+    finger = {
+        "name": "dry",
+        "gravity": [0.0, 0.0, 0.0],
+        "joints": {"hinge": joint | ({"spring": {"stiffness": spring}} if spring else {})},
+        "tendons": {"cord": {"crossings": {"hinge": {"radius": 0.01}}}},
+        "joint_friction": numbers,
+        "tendon_friction": {"coulomb": 0.0, "viscous": 0.0},
+    }
+    controller = controller or {"kind": "tensions", "minimum_tension": 0.0}
+    initial = {"position": {"hinge": start}, "velocity": {"hinge": speed}}
+    table = {"name": "dry", "finger": finger, "controller": controller}
+    given = read_scenario(table | {"simulation": {"duration": duration, "initial": initial}})
+    return fp.simulate(given), fp.Finger(given).rigid_body.mass_matrix(np.zeros(1))[0, 0]
+
+
+@pytest.mark.parametrize("law", ["lugre", "dahl"])
+def test_a_joint_with_a_spring_rests_anywhere_within_its_drag_over_the_stiffness(law):
+    """Beyond, every half swing loses 2 d / k: from 3.5 d / k it goes to -1.5, and to -0.5, where it stays."""
+    band = DRAG / SPRING
+    for share in (-0.95, 0.3, 0.95):
+        angle = dry(law, share * band, stiffness=50.0)[0].joint_position.values[:, 0]
+        assert abs(angle - share * band).max() < 0.03 * band
+    angle = dry(law, 3.5 * band, stiffness=50.0)[0].joint_position.values[:, 0]
+    assert angle.min() == pytest.approx(-1.5 * band, abs=2e-3 * band)
+    assert angle[-1] == pytest.approx(-0.5 * band, abs=1e-2 * band)
+
+
+@pytest.mark.parametrize("law", ["lugre", "dahl", "coulomb"])
+def test_drag_alone_takes_speed_at_a_constant_rate_and_what_it_takes_is_in_the_account(law):
+    """I w' = -d; the kinetic energy goes to sliding, but for what bristles hold, d^2 / (2 sigma_0)."""
+    more = {"reversal_speed": 1e-3} if law == "coulomb" else {"stiffness": 50.0}
+    result, inertia = dry(law, speed=5.0, duration=0.1, spring=None, **more)
+    speed, time = result.joint_velocity.values[:, 0], result.time.values
+    np.testing.assert_allclose(speed, 5.0 - DRAG / inertia * time, atol=2e-3)
+    lost = 0.5 * inertia * (25.0 - speed[-1] ** 2)
+    held = 0.0 if law == "coulomb" else DRAG**2 / 100.0
+    assert float(result.energy_exchanged_joint_coulomb[-1]) == pytest.approx(lost - held, rel=1e-4)
+
+
+def test_drag_lets_go_at_the_ratio_of_stiction_to_coulomb_friction():
+    """A cord that pulls ever more presses the pin as well: r f = M^c f + d M^c / M^d."""
+    pull = {"kind": "ramp", "height": 2.0, "time": 0.0, "duration": 2.0}
+    controller = {"kind": "tensions", "tensions": {"cord": pull}}
+    law = {"coulomb": 2e-4, "stiction": 2.8e-4, "stiffness": 50.0}
+    result, _ = dry("lugre", duration=2.0, spring=None, controller=controller, **law)
+    moves = np.flatnonzero(abs(result.joint_position.values[:, 0]) > 2e-3)[0]
+    assert float(result.tendon_command[moves, 0]) == pytest.approx(1.4 * DRAG / (0.01 - 2.8e-4), rel=2e-2)
 
 
 def test_the_fingers_of_a_hand_have_one_law():

@@ -52,6 +52,21 @@ def test_a_slack_tendon_rubs_no_more_than_its_floor():
     assert data.qvel[0] == pytest.approx(0.0099 / 0.1, rel=1e-3)
 
 
+def test_drag_of_a_joint_holds_without_a_load_and_takes_as_much_of_a_force_that_moves_it():
+    """0.4 N of 0.5 N hold, and 2 N leave (2 - 0.5) / m of acceleration."""
+    text = """<mujoco><option gravity="0 0 0" timestep="0.001"/><worldbody><body><joint name="slide" type="slide"/>
+      <geom size="0.01" mass="1"/></body></worldbody><actuator><motor joint="slide"/></actuator></mujoco>"""
+    law = {"coulomb": 0.0, "stiction": 0.0, "viscous": 0.0, "drag": 0.5, "stiffness": 1e4}
+    for force, moved in ((0.4, 0.0), (2.0, 0.5 * 1.5 * 0.5**2)):
+        spec = mujoco.MjSpec.from_string(text)
+        fp.mujoco.add_friction(spec, joints={"slide": law})
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        data.ctrl[0] = force
+        mujoco.mj_step(model, data, 500)
+        assert data.qpos[0] == pytest.approx(moved, rel=1e-2, abs=5e-4)
+
+
 def test_drag_adds_to_the_level():
     model = slider(**ROPE, drag=0.5)
     data = mujoco.MjData(model)

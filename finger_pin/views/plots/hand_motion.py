@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.mechanism.tree import STATEFUL, STATELESS
+from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, trace
 from finger_pin.views.plots.panels import sheet, stack, title
@@ -26,7 +26,7 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
     """
     moved = _panels(names(result, "joint"), result["joint_position"].transpose("time", "joint").values)
     driven = _panels(names(result, "tendon"), result["tendon_tension"].transpose("time", "tendon").values)
-    for group in (STATELESS, STATEFUL):
+    for group in (STATELESS, STATEFUL, MUSCLES):
         if f"{group}_force" in result:
             driven += _panels(names(result, group), result[f"{group}_force"].transpose("time", group).values)
     columns = ((moved, "position", "(a) joints, rad or m"), (driven, "force", "(b) tendons and actuators, N or N m"))
