@@ -5,8 +5,8 @@
     gearbox    tau_g by (9), loaded by N = |x sum of r f^m + tau|
 
 An elastic tendon is a row that acts on rotor and finger alike; what its canal takes away is the row of the driven
-tendon. Of a spool that winds two tendons the second has a negative radius. A load that the motor holds presses the
-teeth from both sides, so that its torque and the motor's add up in N.
+tendon. A tendon that is paid out as the first one of its spool is wound in has a negative radius. A load that the motor
+holds presses the teeth from both sides, so that its torque and the motor's add up in N.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ class Actuators:
 
         stiffness = of_tendons("tendon_rigidity") / of_tendons("tendon_length")
         spools = np.zeros((len(strands), len(names)))
-        for row, ((name, tendon), radius) in enumerate(zip(strands, of_tendons("spool_radius"), strict=True)):
-            opposed = description.actuators[name].tendons.index(tendon)
-            spools[row, names.index(name)] = -radius if opposed else radius
+        for row, (name, tendon) in enumerate(strands):
+            actuator = description.actuators[name]
+            spools[row, names.index(name)] = actuator.radii[actuator.tendons.index(tendon)]
         motors, gearboxes = [], []
-        for actuator, radius in zip(actuators, np.max(spools, axis=0, initial=0.0), strict=True):
+        for actuator in actuators:
             motor, gears = actuator.motor, actuator.motor.friction
             constant, resistance, dry = motor.constants
             by_current = float(actuator.drive == "tension")
@@ -89,7 +89,7 @@ class Actuators:
             # Of N = |x T + tau| at tau = T + friction, T is known from the command.
             by_torque = share * gears.by_load * (1.0 + gears.external_weight)
             overcome = (share * dry, by_torque, gears.by_load, share * gears.viscous, actuator.reversal_speed)
-            motors.append((*electrical, by_current, radius, *overcome))
+            motors.append((*electrical, by_current, actuator.radii[0], *overcome))
             level = (dry, gears.by_load, gears.stribeck, gears.stribeck_by_load)
             shape = (gears.stribeck_velocity, gears.stribeck_exponent, gears.viscous, gears.stiffness)
             gearboxes.append((*level, *shape, gears.driving, gears.driven))
@@ -112,7 +112,17 @@ class Actuators:
     @property
     def channels(self) -> NDArray[np.int64]:
         """The input of every motor, that of its first tendon: a tension, or a voltage in position drive; shape (m,)."""
-        return self.tendons[np.argmax(self.spools != 0.0, axis=0)] if self.names else np.zeros(0, dtype=np.int64)
+        return self.tendons[self._first] if self.names else np.zeros(0, dtype=np.int64)
+
+    @property
+    def radius(self) -> Array:
+        """Radius of the spool that winds in the first tendon of every motor, shape (m,), m."""
+        return self.spools[self._first, np.arange(len(self.names))] if self.names else np.zeros(0)
+
+    @property
+    def _first(self) -> NDArray[np.intp]:
+        first: NDArray[np.intp] = np.argmax(self.spools != 0.0, axis=0)
+        return first
 
     @property
     def voltages(self) -> NDArray[np.int64]:
@@ -125,7 +135,7 @@ class Actuators:
         return self.tendons[np.any(self.spools[:, self.holds] != 0.0, axis=1)]
 
     def angle(self, position: Array, tension: Array | None = None, excursion: Array | None = None) -> Array:
-        """Return theta_m, shape (..., m), rad, for given tensions of the tendons, the nearest for two on one motor.
+        """Return theta_m, shape (..., m), rad, for given tensions of the tendons, the nearest for several on one motor.
 
         Args:
             position: theta, shape (..., n), rad.

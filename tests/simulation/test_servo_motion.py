@@ -14,7 +14,7 @@ from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.mechanism.mechanism import Mechanism
 
 sys.path.append(str(Path(__file__).parents[1] / "mechanism"))
-from servo_cases import INERTIA, LINK, RADIUS, SMOOTH, SPOOL, finger
+from servo_cases import INERTIA, LINK, RADIUS, SMOOTH, SPOOL, finger, together
 
 K, D, G = 6000.0 / 0.3, 10.0, 9.81
 
@@ -192,6 +192,21 @@ def test_a_spool_of_two_tendons_works_beside_sampled_tensions_and_closes_the_acc
     np.testing.assert_array_equal(result.spool_tension.sel(tendon="T2"), result.tendon_command.sel(tendon="T2"))
     exchanged = sum(float(abs(result[name]).max()) for name in result if str(name).startswith("energy_exchanged"))
     assert float(abs(result.energy_residual).max()) < 1e-6 * exchanged
+
+
+def test_cords_of_one_motor_are_wound_in_together_or_paid_out_each_by_its_radius():
+    """At a spool angle phi a cord of radius r on a pulley R turns a spring k by K R (e0 + r phi) / (k + K R^2)."""
+    pulley, spool = np.array([0.010, 0.008, 0.006]), np.array([0.005, 0.004, 0.003])
+    wound = {"spool_radius": spool.tolist(), "winds": ["in", "in", "out"], "pretension": [0.0, 0.0, 60.0]}
+    made = together(SMOOTH, pulley, drive="position", **wound)
+    turn = {"kind": "ramp", "time": 0.0, "duration": 0.2, "height": 0.4}
+    result = fp.simulate(scenario(made, 2.0, reference={"joints": {"a": turn, "b": turn}}))
+    phi, ways = float(result.motor_position[-1, 0]), np.array([1.0, 1.0, -1.0])
+    expected = K * pulley * ([0.0, 0.0, 60.0 / K] + ways * spool * phi) / (0.2 + K * pulley**2)
+    assert phi > 0.3 and expected.min() > 0.05
+    np.testing.assert_allclose(result.joint_position[-1], expected, atol=1e-5)
+    supplied = float(abs(result.energy_exchanged_electrical).max())
+    assert float(abs(result.energy_residual).max()) < 1e-6 * supplied
 
 
 def test_hands_of_servos_fall_into_islands_that_move_as_each_does_alone():
