@@ -62,6 +62,9 @@ class GearFriction(Description):
     stiffness: Annotated[float, real(0.0, 1e9, above=True)] = quantity(
         50.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness: how far gears give before they slip."
     )
+    backlash: Annotated[float, real(0.0, 1.0, hint=" rad (is it in degrees?)")] = quantity(
+        0.0, unit="rad", source="fit", doc="b, play at the output, all of the gap between the two flanks of its teeth."
+    )
     driving: Annotated[float, real(0.0, 100.0)] = quantity(
         0.0, unit="1", source="fit", doc="m_d, level over the tendons' torque while the motor winds in against it."
     )
@@ -78,7 +81,7 @@ class GearFriction(Description):
 
 
 class Encoder(Description):
-    """The encoder of a position drive, on its spool."""
+    """The encoder of a position drive, on its spool; where gears have play, before the play."""
 
     range: Annotated[tuple[float, float], vector(2, -1e6, 1e6)] = quantity(
         ..., unit="rad", source="maker's sheet", doc="Least and largest angle that it can be told to go to."

@@ -49,7 +49,7 @@ def stepped(finger, command, times, *, angle=0.0, spool=None, stiction=0.0, rtol
     start = finger.layout.unpack(x)
     start.gearbox_stiction[:] = stiction
     if spool is not None:
-        start.motor_position[:] = spool
+        start.motor_position[:] = start.spool_position[:] = spool
     sim.x = x
     found, reached = [], 0.0
     for time in times:
