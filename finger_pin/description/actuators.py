@@ -178,6 +178,9 @@ class PositionLoop(Description):
     )
     derivative: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="s/rad", source="as it ships", doc="k_d.")
     integral: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="1/(rad s)", source="as it ships", doc="k_i.")
+    torque_off: Annotated[float, real(0.0, 1e6)] | None = quantity(
+        None, unit="s", source="chosen", doc="Time at which the motor is let go: from then on no current flows."
+    )
 
 
 class Actuator(Description):
@@ -251,6 +254,9 @@ class Actuator(Description):
         if self.drive == "tension" and len(self.tendons) > 1:
             allowed = 'one torque cannot set several tensions: a spool of several tendons has drive = "position"'
             raise problem("drive", allowed, self.drive)
+        if self.drive == "tension" and self.position_loop.torque_off is not None:
+            allowed = 'lets go of a motor with drive = "position"; one in tension drive is let go by commands of 0 N'
+            raise problem("position_loop.torque_off", allowed, self.position_loop.torque_off)
         return self
 
     @property

@@ -49,6 +49,11 @@ WRONG = {
         "M.winds",
         '"in" for the first',
     ),
+    "let go in tension": (
+        {"M": {**SPOOL, "position_loop": {"torque_off": 1.0}}},
+        "M.position_loop.torque_off",
+        "commands of 0 N",
+    ),
     "one word less": (
         {"M": {**SPOOL, "tendons": ["T1", "T2"], "winds": ["in"], "drive": "position"}},
         "M.winds",

@@ -271,6 +271,32 @@ def test_gears_whose_cords_are_all_wound_in_show_no_play():
     assert ended[1] == pytest.approx(ended[0], abs=1e-5) and ended[0] > 0.3
 
 
+def test_a_servo_that_is_let_go_carries_no_current_and_is_turned_back_through_its_gears():
+    """From 0.3 s on J m'' = -b m' - r f alone, continued by scipy from there; U is what the motor induces."""
+    viscous, stiff, damped, pulley = 2e-3, 0.2, 0.02, 0.01
+    motor = {**SMOOTH, "friction": {"coulomb": 0.0, "viscous": viscous}}
+    loop = {"proportional": 9.2, "torque_off": 0.3}
+    made = together(motor, [pulley], spool_radius=SPOOL, drive="position", position_loop=loop)
+    turn = {"kind": "ramp", "time": 0.0, "duration": 0.2, "height": 0.4}
+    result = fp.simulate(scenario(made, 0.6, reference={"joints": {"a": turn}})).sel(time=slice(0.3 - 1e-9, None))
+
+    def rate(_, x):
+        q, m, dq, dm = x
+        pull = max(0.0, K * (SPOOL * m - pulley * q) + D * (SPOOL * dm - pulley * dq))
+        turned = (pulley * pull - stiff * q - damped * dq) / LINK_INERTIA
+        return [dq, dm, turned, (-viscous * dm - SPOOL * pull) / INERTIA]
+
+    names = ("joint_position", "motor_position", "joint_velocity", "motor_velocity")
+    found, times = np.array([result[name].values[:, 0] for name in names]), result.time.values
+    exact = solve_ivp(rate, times[[0, -1]], found[:, 0], "Radau", times, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(found[:2], exact.y[:2], atol=1e-6)
+    assert found[1, 0] > 0.5 and found[1, -1] < 0.4
+    np.testing.assert_array_equal(result.motor_current, 0.0)
+    np.testing.assert_allclose(result.motor_voltage, 0.4 * result.motor_velocity, rtol=1e-12)
+    supplied = float(abs(result.energy_exchanged_electrical).max())
+    assert float(abs(result.energy_residual).max()) < 1e-6 * supplied
+
+
 def test_hands_of_servos_fall_into_islands_that_move_as_each_does_alone():
     """The second tendon of a spool has an input that goes nowhere, the last one of all among them."""
     made = [finger(SMOOTH, opposed=True, drive="position", pretension=3.0, tendon_damping=each) for each in (5.0, 20.0)]
