@@ -14,6 +14,7 @@ from typing import Any
 
 import typer
 
+from finger_pin.cancellation import signals_interrupt
 from finger_pin.commands import export, force_capability, identify, optimise, self_locking, simulate, sweep
 from finger_pin.commands.console import Unsuccessful, complain
 from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, StudyError
@@ -68,7 +69,7 @@ def _with_exit_code(command: Callable[..., Any], program: str) -> Callable[..., 
     @wraps(command)
     def coded(*arguments: Any, **options: Any) -> int:
         try:
-            with warnings.catch_warnings():
+            with signals_interrupt(), warnings.catch_warnings():
                 warnings.showwarning = lambda message, *_: complain(program, f"warning: {message}")
                 return int(command(*arguments, **options) or DONE)
         except KeyboardInterrupt as error:

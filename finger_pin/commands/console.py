@@ -1,15 +1,12 @@
-"""A simulation at a terminal: signals that stop it, a progress bar, and output to a pipe that may be closed."""
+"""A simulation at a terminal: a progress bar, and output to a pipe that may be closed."""
 
 from __future__ import annotations
 
 import logging
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from types import FrameType
-from typing import Self
 
 import typer
 
@@ -18,45 +15,6 @@ from finger_pin.exceptions import FingerPinError, InputError
 
 class Unsuccessful(FingerPinError):
     """Runs were made, and none of them serves."""
-
-
-class Interrupts:
-    """SIGINT and SIGTERM, while entered.
-
-    In a patient phase the first of them sets `requested`. Every other one raises KeyboardInterrupt.
-
-    Attributes:
-        requested: Whether an end has been asked for; patient phases check it.
-    """
-
-    def __init__(self) -> None:
-        """Start without a request."""
-        self.requested = False
-        self._patient = False
-
-    @contextmanager
-    def patient(self) -> Iterator[None]:
-        """Enter a patient phase."""
-        self._patient = True
-        try:
-            yield
-        finally:
-            self._patient = False
-
-    def __enter__(self) -> Self:
-        """Catch the signals."""
-        self._former = {number: signal.signal(number, self._catch) for number in (signal.SIGINT, signal.SIGTERM)}
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Leave the signals as they were."""
-        for number, handler in self._former.items():
-            signal.signal(number, handler)
-
-    def _catch(self, number: int, frame: FrameType | None) -> None:
-        if self.requested or not self._patient:
-            raise KeyboardInterrupt
-        self.requested = True
 
 
 @contextmanager

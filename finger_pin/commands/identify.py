@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from finger_pin.commands.console import Interrupts, bar, noted, print_text, talks
+from finger_pin.cancellation import CancelToken
+from finger_pin.commands.console import bar, noted, print_text, talks
 from finger_pin.commands.options import Quiet, Restart, Settings, folder_name, overrides
 
 
@@ -38,8 +39,9 @@ def identify(
         return
     changed = overrides(settings)
     folder = output or Path("results", folder_name(f"identify-{Path(bench).stem}", *settings))
-    with Interrupts() as interrupts, noted("the same command goes on from what is finished"):
-        with _progress(talks(quiet)) as progress, interrupts.patient():
+    token = CancelToken()
+    with noted("the same command goes on from what is finished"):
+        with _progress(talks(quiet)) as progress, token:
             result = identify(
                 bench,
                 overrides=changed,
@@ -49,7 +51,7 @@ def identify(
                 loss="soft_l1" if robust else "linear",
                 restart=restart,
                 progress=progress,
-                stop=lambda: interrupts.requested,
+                stop=token,
             )
         from finger_pin.views.report import summarize_identification, write_report
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
+from finger_pin.cancellation import CancelToken
+from finger_pin.commands.console import complain, noted, print_text, progress_bar, talks
 from finger_pin.commands.options import Figures, Format, Quiet, ScenarioName, Settings, folder_name, overrides
 from finger_pin.exceptions import FingerPinError, IntegrationError, Interrupted, ScenarioWarning
 
@@ -48,39 +49,39 @@ def simulate(
     if listed:
         print_text(listing())
         return
-    with Interrupts() as interrupts:
-        from finger_pin.description.loading import load_scenario
-        from finger_pin.simulation.convergence import tightened
-        from finger_pin.simulation.results import ResultFolder
+    from finger_pin.description.loading import load_scenario
+    from finger_pin.simulation.convergence import tightened
+    from finger_pin.simulation.results import ResultFolder
 
-        loaded = load_scenario(scenario, changed) if mujoco is None else _hand(mujoco, changed, quiet)
-        output = output or Path("results", default_name(loaded, settings, duration, method))
-        if check:
-            tightened(loaded)
-        with ResultFolder(output) as folder:
-            result, problem = compute(loaded, interrupts, quiet, check)
-            if result is None:
-                assert problem is not None
-                problem.add_note("nothing was computed")
-                raise problem
-            with noted("earlier results are as they were"):
-                with interrupts.patient():
-                    folder.write(result)
-                trouble = draw(result, folder, interrupts, figures, format)
-                problem = (problem or trouble) if interrupts.requested else (trouble or problem)
-                with interrupts.patient():
-                    folder.publish()
-        if not quiet:
-            from finger_pin.views.summary import summarize
-
-            print_text(f"{summarize(result)}\n\nResults are in {output}")
-        if problem is not None:
-            problem.add_note(f"what was computed is in {output}")
+    loaded = load_scenario(scenario, changed) if mujoco is None else _hand(mujoco, changed, quiet)
+    output = output or Path("results", default_name(loaded, settings, duration, method))
+    if check:
+        tightened(loaded)
+    with ResultFolder(output) as folder:
+        token = CancelToken()
+        result, problem = compute(loaded, token, quiet, check)
+        if result is None:
+            assert problem is not None
+            problem.add_note("nothing was computed")
             raise problem
-        if view:
-            from finger_pin.views.viewer import view as show
+        with noted("earlier results are as they were"):
+            with token:
+                folder.write(result)
+            trouble = draw(result, folder, token, figures, format)
+            problem = (problem or trouble) if token.cancelled else (trouble or problem)
+            with token:
+                folder.publish()
+    if not quiet:
+        from finger_pin.views.summary import summarize
 
-            show(result)
+        print_text(f"{summarize(result)}\n\nResults are in {output}")
+    if problem is not None:
+        problem.add_note(f"what was computed is in {output}")
+        raise problem
+    if view:
+        from finger_pin.views.viewer import view as show
+
+        show(result)
 
 
 def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
@@ -108,24 +109,24 @@ def default_name(scenario: Scenario, settings: list[str], duration: str | None, 
 
 
 def compute(
-    scenario: Scenario, interrupts: Interrupts, quiet: bool, check: bool
+    scenario: Scenario, token: CancelToken, quiet: bool, check: bool
 ) -> tuple[xr.Dataset | None, BaseException | None]:
     """Return the result as far as it goes, its convergence if asked, and the exception that stopped it, or None."""
     from finger_pin.simulation.convergence import check_convergence
     from finger_pin.simulation.running import run
 
     bar = progress_bar(talks(quiet), scenario.simulation.duration)
-    with bar as progress, interrupts.patient(), warnings.catch_warnings():
+    with bar as progress, token, warnings.catch_warnings():
         # The summary says what it would say.
         warnings.simplefilter("ignore", ScenarioWarning)
         try:
-            whole = run(scenario, progress=progress, stop=lambda: interrupts.requested)
+            whole = run(scenario, progress=progress, stop=token)
         except (IntegrationError, Interrupted) as error:
             return error.result, error
         if not check:
             return whole, None
         try:
-            found = check_convergence(scenario, whole, progress=progress, stop=lambda: interrupts.requested)
+            found = check_convergence(scenario, whole, progress=progress, stop=token)
             return found.attach(whole), None
         except IntegrationError as error:
             complain("simulate", f"convergence could not be checked: {error}")
@@ -136,11 +137,11 @@ def compute(
 
 
 def draw(
-    result: xr.Dataset, folder: ResultFolder, interrupts: Interrupts, figures: bool, format: str | None
+    result: xr.Dataset, folder: ResultFolder, token: CancelToken, figures: bool, format: str | None
 ) -> BaseException | None:
     """Draw animation and figures, all or none; return the exception that prevented it, or None."""
     try:
-        if interrupts.requested:
+        if token.cancelled:
             # After an interruption the data are kept, and the views are not drawn: that takes too long.
             raise KeyboardInterrupt
         from finger_pin.views.viewer import write_animation

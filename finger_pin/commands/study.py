@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from finger_pin.commands.console import Interrupts, noted, print_text, runs_bar, talks
+from finger_pin.cancellation import CancelToken
+from finger_pin.commands.console import noted, print_text, runs_bar, talks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,15 +45,16 @@ def conduct(
         KeyboardInterrupt: After all that, if it was interrupted.
     """
     shown = talks(quiet)
-    with Interrupts() as interrupts, noted("the same command continues from what is recorded"):
-        with runs_bar(shown, what) as progress, interrupts.patient():
-            result = run(progress, lambda: interrupts.requested)
-        if figures and not interrupts.requested:
+    token = CancelToken()
+    with noted("the same command continues from what is recorded"):
+        with runs_bar(shown, what) as progress, token:
+            result = run(progress, token)
+        if figures and not token.cancelled:
             from finger_pin.views import plots
 
             plots.save_figure(getattr(plots, f"plot_{figure}")(result), output / "figures" / figure, format)
         if not quiet:
             print_text(f"{summary(result)}\n\nResults are in {output}")
-        if interrupts.requested and unfinished(result):
+        if token.cancelled and unfinished(result):
             raise KeyboardInterrupt
     return result

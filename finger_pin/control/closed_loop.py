@@ -11,7 +11,7 @@ from finger_pin.control.interface import Controller, ControlSignals, Dynamics, L
 from finger_pin.control.palm import PalmPath, PrescribedObjects
 from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
-from finger_pin.core.compiled_fingers import Bindings
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import InputTable, core_signal, held_control
 from finger_pin.description.caching import memoised
 from finger_pin.description.scenario import Scenario
@@ -154,9 +154,9 @@ class ClosedLoop:
             return self.palm.put(self.finger, x)
         return x if self.guides is None else self.guides.place(self.finger, x)
 
-    def compiled(self, bindings: Bindings | None = None) -> ClosedLoop:
-        """Return the same loop on the compiled core, on bindings of earlier loops if given."""
-        return replace(self, dynamics=(bindings or Bindings()).evaluating(self.finger))
+    def compiled(self) -> ClosedLoop:
+        """Return the same loop on the compiled core."""
+        return replace(self, dynamics=CompiledFinger(self.finger))
 
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.buffers import Work, build_linear, build_work, renew_linear, renew_work
+from finger_pin.core.buffers import Linear, Work, build_linear, build_work
 from finger_pin.core.evaluation.condensation import condense
 from finger_pin.core.evaluation.contacts import add_pushes, fill_contact_gains, measure
 from finger_pin.core.evaluation.dynamics import evaluate, exert
@@ -18,7 +18,7 @@ from finger_pin.core.evaluation.path_derivatives import linearise_paths
 from finger_pin.core.evaluation.paths import look
 from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
 from finger_pin.core.inputs import InputTable, held_control
-from finger_pin.core.jit import call, copied, pack, refill
+from finger_pin.core.jit import call, copied, nothing, pack
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.tables import Tables
 from finger_pin.core.threads import in_threads, threads
@@ -77,6 +77,8 @@ class Room(NamedTuple):
         )
 
 
+# Of models that only evaluate.
+_NO_LINEAR = nothing(Linear)
 # In the order of the addresses of a `Model`.
 _THROUGH_SPACE = (measure, linearise_paths, fill_contact_gains, add_pushes, look)
 _MOVED = (move_base, bias_rate, base_power)
@@ -90,8 +92,18 @@ class BoundModel:
         address: Of what `unpack` reads.
     """
 
-    def __init__(self, tables: Tables, control: InputTable, work: Work, moved: bool = False) -> None:
-        """Bind; arrays are taken as they are, not copied. The base may be ``moved`` by others than its control."""
+    def __init__(
+        self, tables: Tables, control: InputTable, work: Work, moved: bool = False, linearised: bool = True
+    ) -> None:
+        """Bind; arrays are taken as they are, not copied.
+
+        Args:
+            tables: Of a mechanism.
+            control: Its inputs.
+            work: Memory.
+            moved: Whether the base is moved by others than its control.
+            linearised: Whether it has memory for `linearise` and `condense`.
+        """
         size = 2 * len(work.torque) + len(tables.state_row)
         moved = moved or len(control.palm.harmonics) > 0
         through_space = len(tables.paths.columns) > 0
@@ -99,20 +111,10 @@ class BoundModel:
         # Compiled only for mechanisms that need them: paths through space or contacts, and a base that moves.
         units += [unit.address if through_space else 0 for unit in _THROUGH_SPACE]
         units += [unit.address if moved else 0 for unit in _MOVED]
-        self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
+        linear = build_linear(tables, control) if linearised else _NO_LINEAR
+        self.model = Model(tables, control, work, linear, np.zeros(size), np.zeros(size), *units)
         self._block = pack(self.model, MODEL)
-        # Of tables what changes in place is copied wherever it is handed over.
-        self._filled: Tables | None = None
         self.address = self._block.address
-
-    def renew(self, tables: Tables, control: InputTable) -> None:
-        """Copy the numbers of other tables and inputs of the same shapes into the packed arrays."""
-        own = self.model
-        refill(own.tables, tables, self._filled)
-        refill(own.control, control)
-        self._filled = tables
-        renew_work(own.work, tables)
-        renew_linear(own.linear, tables)
 
 
 class Models:
@@ -141,14 +143,8 @@ class Models:
             own = copied(tables)._replace(loaded=loaded)
             work = build_work(own, self._laws, self._channels)
             control = held_control(self._channels, len(work.torque))
-            self._known[loaded, thread] = BoundModel(own, control, work, self._moved)
+            self._known[loaded, thread] = BoundModel(own, control, work, self._moved, False)
         return self._known[loaded, thread]
-
-    def renew(self, tables: Tables) -> None:
-        """Copy the numbers of other tables of the same shapes into all packed arrays."""
-        self.tables = tables
-        for (loaded, _), model in self._known.items():
-            model.renew(tables._replace(loaded=loaded), model.model.control)
 
 
 def fill(

@@ -113,15 +113,11 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         guide_rate=np.zeros(int(tables.guided.max(initial=-1)) + 1),
         paths=build_path_work(tables.paths, count, width),
     )
-    renew_work(work, tables)
-    return work
-
-
-def renew_work(work: Work, tables: Tables) -> None:
-    """Copy the entries of an evaluation that no path and no moving body changes from tables into its memory."""
+    # No path and no moving body changes these.
     work.base_acceleration[3:] = -tables.gravity
     work.arm[:], work.gradient[:] = tables.arm, tables.measure
     work.paths.frame[:], work.paths.origin[:] = tables.paths.rotation, tables.paths.origin
+    return work
 
 
 class Blocks(NamedTuple):
@@ -170,7 +166,7 @@ def build_blocks(tables: Tables, control: InputTable) -> Blocks:
     count, width, states = len(tables.state), len(tables.guided), len(tables.state_row)
     atom, row_atom, atoms = np.zeros(width, dtype=np.int64), np.zeros(count, dtype=np.int64), 1
     if tables.touching:
-        islands = find_islands(tables, control, touching=False)
+        islands = find_islands(tables, control, False)
         atoms = len(islands)
         for index, island in enumerate(islands):
             atom[island.coordinates], row_atom[island.rows] = index, index
@@ -287,12 +283,8 @@ def build_linear(tables: Tables, control: InputTable) -> Linear:
         right=np.zeros(wide),
         blocks=build_blocks(tables, control),
     )
-    renew_linear(linear, tables)
-    return linear
-
-
-def renew_linear(linear: Linear, tables: Tables) -> None:
-    """Copy the entries of a linearisation that no posture changes from tables into its memory."""
-    lumped = np.arange(len(tables.parents), len(linear.mass))
+    # No posture changes these.
+    lumped = np.arange(len(tables.parents), width)
     linear.mass[lumped, lumped] = tables.lumps
     linear.arm[:], linear.measure[:], linear.bend[:] = tables.arm, tables.measure, tables.bend
+    return linear

@@ -11,7 +11,7 @@ from finger_pin.core.bound_models import FEW, Models, Room, fill, path_motions, 
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
-from finger_pin.core.jit import Block, alike, fits, pack
+from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation
@@ -43,19 +43,6 @@ class CompiledMechanism:
         laws = [table.law for table in mechanism.rows]
         self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved)
         self._motions: dict[int, _Asked] = {}
-
-    def renew(self, mechanism: Mechanism) -> bool:
-        """Take the numbers of another mechanism in place; return False if more than numbers differ."""
-        if mechanism is self.mechanism:
-            return True
-        own, tables = self.mechanism, build_tables(mechanism)
-        if (own.moved, own.channels) != (mechanism.moved, mechanism.channels) or not fits(self.tables, tables):
-            return False
-        if not alike(self.tables, tables):
-            return False
-        self.mechanism, self.tables, self.charts = mechanism, tables, Charts.of(mechanism)
-        self.models.renew(tables)
-        return True
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles."""
@@ -209,15 +196,6 @@ class CompiledFinger:
         """Read a finger."""
         self.finger = finger
         self.mechanism = CompiledMechanism(finger.mechanism)
-
-    def renew(self, finger: Finger) -> bool:
-        """Take the numbers of another finger in place; return False if more than numbers differ."""
-        if not self.mechanism.renew(finger.mechanism):
-            return False
-        if finger.rigid_body is not self.finger.rigid_body:
-            vars(self).pop("_alone", None)
-        self.finger = finger
-        return True
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,10 +11,7 @@ import numpy as np
 
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.evaluation.signals import STATES, evaluate_many
-from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import Block, pack
-from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.mechanism import GUIDES
 from finger_pin.mechanism.rigid_body import Motion
@@ -135,53 +132,3 @@ class CompiledFingers:
         found = [each.motion(*given) for each, *given in zip(self._fingers, position, velocity, bases, strict=True)]
         tips, kinetic, potential = (np.array([getattr(each, name) for each in found]) for name in _MOTION)
         return Motion(tips, kinetic, potential)
-
-
-@dataclass(eq=False)
-class Bindings:
-    """Compiled code bound to one finger after the other, kept if they differ in numbers alone.
-
-    Of each finger the work is done when the next one comes.
-
-    Attributes:
-        dynamics: Evaluator of the finger.
-        stepper: Its stepper.
-    """
-
-    dynamics: CompiledFinger | None = None
-    stepper: Stepper | None = None
-
-    def evaluating(self, finger: Finger) -> CompiledFinger:
-        """Return the compiled evaluator of a finger."""
-        if self.dynamics is None or not self.dynamics.renew(finger):
-            self.dynamics = CompiledFinger(finger)
-        return self.dynamics
-
-    def stepping(
-        self,
-        finger: Finger,
-        control: InputTable,
-        x: Array,
-        force: Array | None = None,
-        *,
-        method: str,
-        rtol: float,
-        atol_scale: float,
-        estimate_error: bool = False,
-    ) -> Stepper:
-        """Return the stepper of a finger under inputs, from a packed state on.
-
-        Args:
-            finger: The finger.
-            control: Its inputs.
-            x: Packed state, shape (size,).
-            force: At the tips, shape (3,) or (t, 3), N, base frame.
-            method: One of `TABLEAUS`.
-            rtol: Relative tolerance.
-            atol_scale: Absolute tolerance over the scale of each kind of state.
-            estimate_error: Whether the error will be asked for; of one finger after the other it is always, or never.
-        """
-        given = finger.mechanism, control, x, TABLEAUS[method](), rtol, atol_scale * finger.layout.scales(), force
-        if self.stepper is None or not self.stepper.renew(*given):
-            self.stepper = Stepper(*given, estimate_error=estimate_error)
-        return self.stepper

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from finger_pin.cancellation import CancelToken
 from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
@@ -96,7 +96,7 @@ def identify(
     taken = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
     problem = build_problem(scenario, settings, taken, own)
     other_laws(problem, settings)  # Before any work: an entry that is wrong in them is refused now.
-    problem.stop = _latched(stop or (lambda: False))
+    problem.stop = CancelToken(stop)
     asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
     with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
         work = FitPipeline(problem, ledger, loss, progress)
@@ -164,18 +164,6 @@ def _work(
             reached = problem.best[1] if len(problem.best[1]) else problem.start
             work.fits.append(fit(problem, reached, held=dict(enumerate(reached))))
     return results(problem, work.fits, work.best, work.sides, work.spread, work.comparison, unfinished)
-
-
-def _latched(stop: Callable[[], bool]) -> Callable[[], bool]:
-    """Return a stop that stays true once it has been: threads end together."""
-    told = threading.Event()
-
-    def asked() -> bool:
-        if not told.is_set() and stop():
-            told.set()
-        return told.is_set()
-
-    return asked
 
 
 def _plain(value: Any) -> Any:

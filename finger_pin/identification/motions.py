@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
@@ -84,14 +83,10 @@ class RecordedMotion:
         self.scenario = read_scenario(table)
         self._finger = finger
         self._factor = 1.0
-        # As many as there were runs at once.
-        self._bindings: list[Bindings] = []
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
-        computed, motion = self._made(scenario, own, self._factor)
-        self._free(motion)
-        return computed
+        return self._made(scenario, own, self._factor)[0]
 
     def tune(self, factor: float) -> None:
         """Multiply the scenario's tolerances by a factor from now on."""
@@ -108,7 +103,6 @@ class RecordedMotion:
         here = at(values)
         factor = max(self._factor, _SLOPES)
         computed, motion = self._made(*here, factor)
-        self._free(motion)
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
         there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
@@ -138,13 +132,11 @@ class RecordedMotion:
                 moved[k] += np.sign(changes[k]) * _COARSE * float(sizes[k])
                 # At the edge of what goes together there is no such change.
                 with suppress(InputError):
-                    found, other = self._made(*at(moved), factor)
-                    self._free(other)
+                    found, _ = self._made(*at(moved), factor)
                     slopes = [(f - c) / (moved[k] - values[k]) for f, c in zip(found, computed, strict=True)]
             return [np.nan_to_num(each, nan=0.0) for each in slopes]
 
         columns = in_threads(column, range(len(values)))
-        self._free(*((each, None) for each in (same, *others.values())))
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
     def _with_start(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
@@ -158,16 +150,8 @@ class RecordedMotion:
 
     def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
         moved = self._with_start(scenario, own)
-        try:
-            bindings = self._bindings.pop()
-        except IndexError:
-            bindings = Bindings()
         finger = None if self._finger is None else fitted(self._finger, self.scenario, moved)
-        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger), bindings=bindings)
-
-    def _free(self, *motions: tuple[Setup, Trajectory | None] | None) -> None:
-        """Let later runs have what motions were bound to; nothing more can be asked of these."""
-        self._bindings += [each[0].bindings for each in motions if each and each[0].bindings]
+        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger), judged=False)
 
     def _made(
         self, scenario: Scenario, own: Mapping[str, float], factor: float

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, sampled_control
-from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.batch import IDLE
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -70,9 +69,8 @@ class World:
         self.sensors: dict[str, Sensor] = {}
         self._nominal: tuple[Finger, PassiveCoupling] | None = None
         self.reason, self._step, self.now = "", 0, 0.0
-        self._bindings = Bindings()
         self._build(family.scenario, origin)
-        self.stepper = self._stepper_at(self.origin.initial_state(), self._bindings)
+        self.stepper = self._stepper_at(self.origin.initial_state())
 
     @classmethod
     def of(cls, scenario: ScenarioLike, task: Task, finger: FingerLike | None = None) -> World:
@@ -120,7 +118,7 @@ class World:
                 finger = fitted(self._nominal[0], self._family.scenario, scenario)
                 if finger.layout.names != self._nominal[0].layout.names:
                     raise InputError("randomise", "must keep what the state consists of", self.sampled)
-            origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled(self._bindings)
+            origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled()
         self._scenario, self.origin = scenario, origin
         finger, family = self.origin.finger, self._family.scenario
         # Drives know what the scenario says, not what was drawn.
@@ -133,10 +131,10 @@ class World:
         driven = self.action if self.action.compiled is not None else None
         return replace(self.origin, controller=self.action, drives=driven)
 
-    def _stepper_at(self, x: Array, bindings: Bindings | None = None) -> Stepper:
+    def _stepper_at(self, x: Array) -> Stepper:
         """Return a stepper that starts from a state, with the loops of the action if there are any."""
         loop, settings = self.origin, self._scenario.simulation
-        stepper = (bindings or Bindings()).stepping(
+        stepper = Stepper.of(
             loop.finger,
             sampled_control(loop),
             x,
@@ -171,7 +169,7 @@ class World:
             self._build(self._family.with_values([self.sampled[key] for key in self._randomisation.keys]))
         self._begun = self._start()
         if self.rebuilt:
-            self.stepper = self._stepper_at(self._begun, self._bindings)
+            self.stepper = self._stepper_at(self._begun)
         else:
             self.stepper.restart(self._begun, time=0.0)
         task = self.task

@@ -25,8 +25,8 @@ from finger_pin.mujoco.layout import Data, Kinds, Model
 from finger_pin.mujoco.loads import between, spring, turn_of_path
 from finger_pin.mujoco.memory import integer_in, integers, number_in, numbers
 
-#: Speed, load, normal force, largest friction, turn, and the complex number of a path's turn.
-Seen: TypeAlias = tuple[float, float, float, float, float, float, float]
+#: Speed, load, normal force, largest friction and turn.
+Seen: TypeAlias = tuple[float, float, float, float, float]
 
 
 @njit_inline
@@ -43,7 +43,7 @@ def tendon(
     about: Pointer,
     reactions: Pointer,
 ) -> Seen:
-    """Return speed, tension, normal force, largest friction and turn of a tendon: (14). See `vectorised_law`."""
+    """Return speed, tension, normal force, largest friction and turn of a tendon: (14)."""
     p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
     first = HEAD
@@ -64,18 +64,18 @@ def tendon(
     speed = number_in(d, of.ten_velocity, tendon)
     loss = way * (force + p[VISCOUS] * speed)
     delivered = max(tension - loss, 0.0)
-    bend, real, imaginary, pressing = 0.0, 1.0, 0.0, tension + delivered
+    bend, pressing = 0.0, tension + delivered
     if pressing > 0.0:
-        bend, real, imaginary = _turn(m, d, at, of, kinds, e, tendon)
+        bend = _turn(m, d, at, of, kinds, e, tendon)
     for k in range(first, int(p[LENGTH])):
         reactions[integers(m, at.jnt_dofadr)[objects[k]]] += delivered
     # What holds the tendon back takes no more than there is.
     most = tension + p[DRAG] + p[FLOOR] if loss > 0.0 else np.inf
-    return speed, tension, pressing, most, p[OFFSET] + bend, real, imaginary
+    return speed, tension, pressing, most, p[OFFSET] + bend
 
 
 @njit_inline
-def _turn(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, tendon: int) -> tuple[float, float, float]:
+def _turn(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, tendon: int) -> float:
     """Return the angle by which a path turns besides its offset, (15) or along its points: see `turn_of_path`."""
     if tendon >= 0 and integer_in(d, of.ten_wrapnum, tendon) > 0:
         return turn_of_path(d, of, tendon)
@@ -84,7 +84,7 @@ def _turn(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, tendon: int
     for k in range(HEAD, int(p[LENGTH])):
         if types[k] == kinds.of_joint:
             found += p[k] * abs(numbers(d, of.qpos)[places[objects[k]]])
-    return found, 1.0, 0.0
+    return found
 
 
 @njit_inline
@@ -104,8 +104,8 @@ def mass(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, reactions: P
         else:
             # The joints that the half just named crosses.
             reactions[dofs[objects[k]]] += tension
-    bend = p[OFFSET] + _turn(m, d, at, of, kinds, e, -1)[0]
-    return speed, load, load, np.inf, bend, 1.0, 0.0
+    bend = p[OFFSET] + _turn(m, d, at, of, kinds, e, -1)
+    return speed, load, load, np.inf, bend
 
 
 @njit_inline
@@ -119,7 +119,7 @@ def pin(m: int, d: int, at: Model, of: Data, e: int, held: int, reactions: Point
     if x * x + y * y + z * z > 0.0:
         ex, ey, ez = _proximal(m, d, at, of, joint)
         load = math.sqrt((x - load * ex) ** 2 + (y - load * ey) ** 2 + (z - load * ez) ** 2)
-    return speed, load, load, np.inf, 0.0, 1.0, 0.0
+    return speed, load, load, np.inf, 0.0
 
 
 @njit_inline

@@ -11,10 +11,16 @@ this speed and level.
 
 from __future__ import annotations
 
-from finger_pin.core.jit import njit_inline, scratch
+import math
+
+from finger_pin.core.evaluation.law_code import inlined
+from finger_pin.core.jit import Pointer, njit_inline, scratch
 from finger_pin.exchange.mujoco_friction import (
     BRANCH,
+    COULOMB,
     DRAG,
+    EXPONENT,
+    FLOOR,
     FORCE,
     KIND,
     LENGTH,
@@ -22,15 +28,21 @@ from finger_pin.exchange.mujoco_friction import (
     LOAD,
     LOADS,
     MASS,
+    MICRO,
     PIN,
     RATIO,
     SHARE,
     SIGNALS,
+    STATIC,
     STIFFNESS,
+    STRIBECK,
     TURN,
+    VISCOUS,
 )
+from finger_pin.laws.bristle import friction_coefficient, friction_level
+from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mujoco.constraint_rows import row_forces, write_rows
-from finger_pin.mujoco.elements import mass, pin, tendon
+from finger_pin.mujoco.elements import Seen, mass, pin, tendon
 from finger_pin.mujoco.layout import Contact, Data, Kinds, Model
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
 from finger_pin.mujoco.memory import (
@@ -45,28 +57,12 @@ from finger_pin.mujoco.memory import (
     words,
     zeros,
 )
-from finger_pin.mujoco.vectorised_law import (
-    BEARS,
-    BENDS,
-    BRISTLE,
-    IMAGINARY,
-    LEVELS,
-    MOST,
-    PRESSES,
-    PULLS,
-    REAL,
-    ROW,
-    SIZE,
-    SPEED,
-    WIDTH,
-    bent,
-    exerted,
-    moved_on,
-)
 
 # The floor that keeps (9a) finite where nothing is pressed, N: higher ones are friction that users have asked for.
 _NUMERICAL = 1e-4
 _LOW = 0xFFFFFFFF
+
+_coefficient, _capstan, _level = map(inlined, (friction_coefficient, capstan_coefficient, friction_level))
 
 
 @njit_inline
@@ -131,48 +127,63 @@ def compute(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) ->
     act, rate, dt = numbers(d, of.act), numbers(d, of.act_dot), number(m, at.timestep)
     count = width + size(m, at.ntendon)
     # Of every degree of freedom, then of every tendon: what drives it, what presses pins, and three of its row.
-    room, block = zeros(scratch(width + count), width + count), numbers_at(scratch(SIZE))
+    room = zeros(scratch(width + count), width + count)
     about, along, reactions = numbers_at(room), numbers_at(room + 8 * width), numbers_at(room + 8 * count)
     rows = numbers_at(zeros(scratch(3 * count), 3 * count))
     driven(m, d, at, of, kinds, along, about)
     # Tendons load pins: the table has pins last.
     while e < end:
-        lanes, winds = 0, 0
-        while e < end and lanes < WIDTH:
-            kind, loads, row = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1]
-            if kind == PIN:
-                found = pin(m, d, at, of, e, x, reactions)
-            elif kind == MASS:
-                found = mass(m, d, at, of, kinds, e, reactions)
-            else:
-                held = act[x] if loads > 0 else 0.0
-                if kind == BRANCH:
-                    held = act[z - int(values[e + SHARE])]
-                found = tendon(m, d, at, of, kinds, e, act[z], held, along, about, reactions)
-            for field in range(RATIO, DRAG + 1):
-                block[WIDTH * field + lanes] = values[e + field]
-            block[WIDTH * SPEED + lanes], block[WIDTH * BEARS + lanes], block[WIDTH * PRESSES + lanes] = found[:3]
-            block[WIDTH * MOST + lanes], block[WIDTH * BENDS + lanes] = found[3:5]
-            block[WIDTH * REAL + lanes], block[WIDTH * IMAGINARY + lanes] = found[5:]
-            # Half a turn is a negative number without an imaginary part.
-            winds = WIDTH if found[6] != 0.0 or found[5] < 0.0 else winds
-            block[WIDTH * BRISTLE + lanes] = act[z]
-            block[WIDTH * ROW + lanes] = 3 * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
-            # `advance` moves the bristles, with the speed that the step ends with.
-            rate[z] = 0.0
-            for k in range(x, x + loads):
-                rate[k] = 0.0
-            e, z, x, lanes = e + int(values[e + LENGTH]), z + 1, x + loads, lanes + 1
-        bent(block, winds)
-        exerted(block, dt)
-        for i in range(lanes):
-            row = int(block[WIDTH * ROW + i])
-            for k in range(3):
-                rows[row + k] += block[WIDTH * (PULLS + k) + i]
-            states[place + LEVEL], states[place + LOAD] = block[WIDTH * LEVELS + i], block[WIDTH * BEARS + i]
-            states[place + TURN] = block[WIDTH * BENDS + i]
-            place += SIGNALS
+        kind, loads, row = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1]
+        if kind == PIN:
+            seen = pin(m, d, at, of, e, x, reactions)
+        elif kind == MASS:
+            seen = mass(m, d, at, of, kinds, e, reactions)
+        else:
+            held = act[x] if loads > 0 else 0.0
+            if kind == BRANCH:
+                held = act[z - int(values[e + SHARE])]
+            seen = tendon(m, d, at, of, kinds, e, act[z], held, along, about, reactions)
+        row = 3 * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
+        level, pull, damp, limit = _exerted(numbers(m, at.tuple_objprm, e), kind == PIN, seen, act[z], dt)
+        rows[row] += pull
+        rows[row + 1] += damp
+        rows[row + 2] += limit
+        states[place + LEVEL], states[place + LOAD], states[place + TURN] = level, seen[1], seen[4]
+        # `advance` moves the bristles, with the speed that the step ends with.
+        rate[z] = 0.0
+        for k in range(x, x + loads):
+            rate[k] = 0.0
+        e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + loads, place + SIGNALS
     write_rows(m, d, at, of, kinds, rows, dt)
+
+
+@njit_inline
+def _exerted(p: Pointer, of_pin: bool, seen: Seen, force: float, dt: float) -> tuple[float, float, float, float]:
+    """Return the level by (9b), (16), and a friction's part of its row: F - x, c + b, and the most that it exerts."""
+    speed, tension, pressing, most, turn = seen
+    kinetic = p[COULOMB] if of_pin else _capstan(p[COULOMB], turn)
+    static = p[STATIC] * (1.0 if of_pin else kinetic)
+    coefficient = _coefficient(speed, kinetic, static, p[STRIBECK], p[EXPONENT])
+    within, beyond = (0.0, p[DRAG]) if of_pin else (p[DRAG], 0.0)
+    level = _level(1.0, pressing * coefficient + within, p[FLOOR]) + beyond
+    viscous, micro, ratio, moved = p[VISCOUS], p[MICRO], p[RATIO], p[STIFFNESS] * dt * speed
+    if tension == 0.0 and force == 0.0:
+        pull, damp, limit = 0.0, viscous + micro, level + viscous * abs(speed)
+    else:
+        later, decay = _slid(force, moved, level)
+        # The micro-damping's sigma_1 z', as z goes at this speed; it may help the motion.
+        micro *= (later - force) / moved if moved != 0.0 else 1.0
+        limit = max(level, abs(later)) + (viscous + micro) * abs(speed)
+        pull = force - (force + moved - later) * decay + min(micro, 0.0) * speed
+        damp = viscous + max(micro, 0.0)
+    return level, ratio * pull, ratio * ratio * (p[STIFFNESS] * dt + damp), abs(ratio) * min(limit, most)
+
+
+@njit_inline
+def _slid(force: float, moved: float, level: float) -> tuple[float, float]:
+    """Return F^s by (9a) after a way s0 v dt at this speed and level, exactly, and the share of it that is left."""
+    steady, decay = math.copysign(level, moved), math.exp(-abs(moved) / level)
+    return steady + (force - steady) * decay, decay
 
 
 @njit_inline
@@ -203,10 +214,8 @@ def advance(m: int, d: int, instance: int, at: Model, of: Data, contact: Contact
     forces, places, held = numbers_at(room), numbers_at(room + 8 * count), numbers_at(room + 8 * (count + width))
     held_tensions(m, d, at, of, kinds, held)
     row_forces(m, d, at, of, kinds, width, forces)
-    blocks, k = (x - z + WIDTH - 1) // WIDTH, 0
-    moved = numbers_at(scratch(3 * WIDTH * blocks))
     while e < end:
-        kind, loads, row, bristle = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1], act[z + k]
+        kind, loads, row, bristle = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1], act[z]
         of_joint, level = types[e + 1] == kinds.of_joint, states[place + LEVEL]
         speed = _speed(m, d, at, of, row, of_joint) * values[e + RATIO]
         row = integer_in(m, at.jnt_dofadr, row) if of_joint else width + row
@@ -214,17 +223,13 @@ def advance(m: int, d: int, instance: int, at: Model, of: Data, contact: Contact
         if kind != PIN and states[place + LOAD] == 0.0 and max(level, abs(bristle)) <= _NUMERICAL:
             # A tendon that is slack: its bristles stand up, so that the next step need not ask for them.
             bristle = speed = 0.0
-        moved[k], moved[WIDTH * blocks + k] = bristle, level
-        moved[2 * WIDTH * blocks + k] = speed * values[e + STIFFNESS] * dt
+        act[z] = _slid(bristle, values[e + STIFFNESS] * dt * speed, level)[0]
         if kind == PIN:
             places[objects[e]], pins = x, True
             act[x], act[x + 1], act[x + 2] = 0.0, 0.0, 0.0
         elif loads > 0:
             act[x] = held[objects[e]]
-        e, x, place, k = e + int(values[e + LENGTH]), x + loads, place + SIGNALS, k + 1
-    moved_on(moved, WIDTH * blocks)
-    for i in range(k):
-        act[z + i] = moved[i]
+        e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + loads, place + SIGNALS
     if pins:
         contact_loads(m, d, at, of, contact, kinds, places, act)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from finger_pin.core.jit import Pointer, njit_inline, power_over
+from finger_pin.core.jit import Pointer, njit_inline
 from finger_pin.mujoco.layout import Contact, Data, Kinds, Model
 from finger_pin.mujoco.memory import (
     flags,
@@ -64,33 +64,26 @@ def between(points: Pointer, first: int, second: int) -> tuple[float, float, flo
 
 
 @njit_inline
-def turn_of_path(d: int, of: Data, tendon: int) -> tuple[float, float, float]:
-    """Return half turns, rad, and the complex number whose angle is the rest by which a spatial tendon's path turns.
+def turn_of_path(d: int, of: Data, tendon: int) -> float:
+    """Return the angle by which a spatial tendon's path turns up to its first pulley, rad.
 
-    That is up to its first pulley: each branch behind it is a tendon of its own. Of a wrap both tangent points are in
-    the path. The chord between them makes half the arc's angle with either tangent. Angles add up as the complex
-    numbers dot + i |cross| multiply, half turns being counted. With about the square of the later length out, products
-    stay about as large as the first length over the last.
+    Each branch behind that is a tendon of its own. Of a wrap both tangent points are in the path. The chord between
+    them makes half the arc's angle with either tangent.
     """
     first, count = integer_in(d, of.ten_wrapadr, tendon), integer_in(d, of.ten_wrapnum, tendon)
-    point, of_wrap, halves = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
-    x0, y0, z0, known, real, imaginary = 0.0, 0.0, 0.0, False, 1.0, 0.0
+    point, of_wrap, turn = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
+    x0, y0, z0 = 0.0, 0.0, 0.0
     for k in range(first + 1, first + count):
         if of_wrap[k] == -2 or of_wrap[k - 1] == -2:
             break
         x, y, z = between(point, k - 1, k)
-        square = x * x + y * y + z * z
-        if square < 1e-24:
+        if x * x + y * y + z * z < 1e-24:
             continue
-        if known:
-            cx, cy, cz = y * z0 - z * y0, z * x0 - x * z0, x * y0 - y * x0
-            scale = power_over(square)
-            across, along = math.sqrt(cx * cx + cy * cy + cz * cz) * scale, (x * x0 + y * y0 + z * z0) * scale
-            real, imaginary = real * along - imaginary * across, real * across + imaginary * along
-            if imaginary < 0.0:
-                real, imaginary, halves = -real, -imaginary, halves + math.pi
-        x0, y0, z0, known = x, y, z, True
-    return halves, real, imaginary
+        cx, cy, cz = y * z0 - z * y0, z * x0 - x * z0, x * y0 - y * x0
+        # Zero for the first length, which nothing comes before.
+        turn += math.atan2(math.sqrt(cx * cx + cy * cy + cz * cz), x * x0 + y * y0 + z * z0)
+        x0, y0, z0 = x, y, z
+    return turn
 
 
 @njit_inline

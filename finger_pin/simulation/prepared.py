@@ -11,7 +11,6 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.core.stepping.trajectory import Stop, Trajectory
 from finger_pin.core.threads import in_threads
@@ -23,9 +22,8 @@ from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import with_tighter
 from finger_pin.simulation.initial_state import own_parts, packed_state
-from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.recording import RunArrays, attributes_of, record, recorded, refuse_unknown
-from finger_pin.simulation.running import run
+from finger_pin.simulation.running import interruptible, run
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
 from finger_pin.simulation.setup import Setup
@@ -75,22 +73,14 @@ class Prepared:
         start: The packed state at the start, shape (size,), with the scenario's own values.
     """
 
-    def __init__(
-        self,
-        family: ParametrisedScenario,
-        record: tuple[str, ...],
-        finger: Finger | None = None,
-        bindings: list[Bindings] | None = None,
-    ) -> None:
-        """Build the parts that the runs share; use `prepare`. Bindings may be shared with another, also in threads."""
+    def __init__(self, family: ParametrisedScenario, record: tuple[str, ...], finger: Finger | None = None) -> None:
+        """Build the parts that the runs share; use `prepare`."""
         self.family, self.record, self._given = family, record, finger
         loop = ClosedLoop.from_scenario(family.scenario, finger=finger)
         refuse_unknown("record", record, variables(loop))
         self._finger = loop.finger
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
-        # As many as there were runs at once.
-        self._bindings = [] if bindings is None else bindings
 
     def __repr__(self) -> str:
         """Return the scenario, the keys that may be changed, and the variables recorded."""
@@ -149,8 +139,6 @@ class Prepared:
         scenario = self.scenario(values)
         setup, _, found = self._made(scenario, initial, stop)
         if not sensitivities:
-            if setup.bindings:
-                self._bindings.append(setup.bindings)
             return found
         given = self.values if values is None else values
         for key, value in zip(self.parameters, given, strict=True):
@@ -160,28 +148,16 @@ class Prepared:
             raise InputError("simulation.method", f"sensitivities are for {', '.join(TABLEAUS)}", setup.method)
         numbers = [float(value) for value in given]
         sizes = [abs(value) or 1.0 for value in numbers]
-        others, changes = changed(
-            numbers, sizes, lambda moved: self._setup(self.scenario(moved), initial, self._free_bindings())
-        )
-        finer, chosen, _ = self._made(with_tighter(scenario, _FINER), initial, stop)
+        others, changes = changed(numbers, sizes, lambda moved: self._setup(self.scenario(moved), initial))
+        _, chosen, _ = self._made(with_tighter(scenario, _FINER), initial, stop)
         # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
-        setups = [self._setup(scenario, initial, self._free_bindings()), *others]
+        setups = [self._setup(scenario, initial), *others]
         repeated = list(zip(setups, nearby(chosen, setups), strict=True))
         base, *runs = in_threads(lambda pair: self._recorded(*pair), repeated)
-        self._bindings += [each.bindings for each in (setup, finer, *setups) if each.bindings]
         return add_slopes(found, base, numbers, runs, changes)
 
-    def _free_bindings(self) -> Bindings:
-        """Return unused bindings of an earlier run, or new ones."""
-        try:
-            return self._bindings.pop()
-        except IndexError:
-            return Bindings()
-
-    def _setup(
-        self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, bindings: Bindings | None = None
-    ) -> Setup:
-        return Setup.of(scenario, self._loop(scenario, initial), bindings=bindings)
+    def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
+        return Setup.of(scenario, self._loop(scenario, initial), judged=False)
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
         motions = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
@@ -192,8 +168,8 @@ class Prepared:
     def _made(
         self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, stop: Stop | None
     ) -> tuple[Setup, Trajectory, RunArrays]:
-        """Make a run, with bindings of an earlier one if any are free."""
-        setup = self._setup(scenario, initial, self._free_bindings())
+        """Make a run."""
+        setup = self._setup(scenario, initial)
         trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:
             motions = SampledTrajectory(setup.loop, trajectory, scenario.sample_times(), self.record)

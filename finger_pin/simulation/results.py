@@ -12,7 +12,7 @@ from typing import Self
 import xarray as xr
 
 from finger_pin.exceptions import InputError
-from finger_pin.publishing import NEW, publish
+from finger_pin.files import NEW, publish
 from finger_pin.simulation.netcdf import save
 
 _MARK = "# The input that led to the results in this folder, complete: running it again gives the same trajectory.\n"

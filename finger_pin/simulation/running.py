@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
+from finger_pin.cancellation import CancelToken
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.stepping.trajectory import Stop, Trajectory
 from finger_pin.description.caching import memoised
@@ -25,10 +27,12 @@ from finger_pin.exceptions import (
 )
 from finger_pin.references.reference import LoopReference
 from finger_pin.simulation.accuracy import CHUNK, judge_error, left_open, open_account, ringing, too_stiff
-from finger_pin.simulation.recording import check_memory, finite_part, record
+from finger_pin.simulation.recording import RunArrays, check_memory, finite_part, record
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
 from finger_pin.typing import Array
+
+Found = TypeVar("Found", xr.Dataset, RunArrays)
 
 
 def run(
@@ -124,3 +128,18 @@ def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
 @memoised(lambda scenario, reference: (scenario,))
 def _quick_margin(scenario: Scenario, reference: LoopReference) -> float:
     return quick_margin(scenario, reference)
+
+
+def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
+    """Return the result of a run that Ctrl-C or a `Stop` can end.
+
+    Raises:
+        Interrupted: After Ctrl-C or such a stop, with what the run has computed.
+    """
+    with CancelToken(stop) as token:
+        found = run(token)
+    if token.cancelled:
+        # It came after the last step.
+        whole = found.dataset() if isinstance(found, RunArrays) else found
+        raise Interrupted(float(found.attrs["end_time"]), whole)
+    return found

@@ -11,7 +11,6 @@ from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled
 from finger_pin.control.interface import LoopController
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
-from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.interpolant_collision import meetings
@@ -46,8 +45,8 @@ class Setup:
         method: The integrator; not the scenario's where its controller is Python and acts continuously.
         answers: The controller itself, where the loop samples it.
         sampled: Its sampled controller, if it has one.
-        bindings: Compiled code bound for several runs; None to bind it for each integration.
         control: Inputs that are compiled; None where they are sampled or Python.
+        judged: Whether the error of its motion will be asked for.
     """
 
     scenario: Scenario
@@ -55,8 +54,8 @@ class Setup:
     method: str
     answers: LoopController
     sampled: SampledController | None
-    bindings: Bindings | None = None
     control: InputTable | None = None
+    judged: bool = True
 
     @classmethod
     def of(
@@ -65,7 +64,7 @@ class Setup:
         loop: ClosedLoop | None = None,
         own: str = "",
         control_period: float | None = None,
-        bindings: Bindings | None = None,
+        judged: bool = True,
     ) -> Setup:
         """Make a scenario ready.
 
@@ -74,7 +73,7 @@ class Setup:
             loop: Its loop, where something in it is a user's own.
             own: Names of the parts given in place of the scenario's, from `own_parts`.
             control_period: As for `simulate`.
-            bindings: Those of other runs, which serve this one where it differs in numbers alone.
+            judged: Whether the error of its motion will be asked for, which takes a tenth of its time.
 
         Raises:
             InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
@@ -102,7 +101,7 @@ class Setup:
                 )
             method = _CONTINUOUS
         if scenario.simulation.method not in METHODS_IN_NUMPY:
-            loop = loop.compiled(bindings)
+            loop = loop.compiled()
         answers = loop.controller
         sampled = None if sampling is None else SampledController(loop, sampling)
         if positioned:
@@ -114,7 +113,7 @@ class Setup:
         elif own:
             # A wrong answer of a user's own controller is refused before anything is computed.
             loop.evaluate(0.0, loop.initial_state())
-        return cls(scenario, loop, method, answers, sampled, bindings, control)
+        return cls(scenario, loop, method, answers, sampled, control, judged)
 
     def integrate(
         self,
@@ -183,7 +182,7 @@ class Setup:
     def stepper(self, settings: SimulationSettings | None = None) -> Stepper:
         """Return the compiled stepper, at the start, by default at the scenario's tolerances."""
         given, loop = settings or self.scenario.simulation, self.loop
-        return (self.bindings or Bindings()).stepping(
+        return Stepper.of(
             loop.finger,
             self.control or sampled_control(loop),
             loop.initial_state(),
@@ -191,8 +190,8 @@ class Setup:
             method=self.method,
             rtol=given.rtol,
             atol_scale=given.atol_scale,
-            # Runs that were prepared are not judged; of controllers that are sampled the linearised flow knows nothing.
-            estimate_error=self.bindings is None and self.sampled is None and loop.drives is None,
+            # Of controllers that are sampled the linearised flow knows nothing.
+            estimate_error=self.judged and self.sampled is None and loop.drives is None,
         )
 
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:

@@ -16,9 +16,8 @@ from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import own_parts, packed_state
-from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.progress import notebook_bar
-from finger_pin.simulation.running import run
+from finger_pin.simulation.running import interruptible, run
 
 
 def simulate(

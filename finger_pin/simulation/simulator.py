@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike
 from finger_pin.control.palm import PrescribedObjects
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.inputs import core_signal, held_control
 from finger_pin.core.stepping.batch import BatchStepper
-from finger_pin.core.stepping.stepper import TABLEAUS
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError
@@ -75,7 +74,6 @@ class Simulator:
                 raise InputError(name, "must be above 0 and at most 0.1", value)
         self._settings: dict[str, Any] = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
         self._family: ParametrisedScenario | None = None
-        self._bindings = Bindings()
         self._build(as_finger(finger))
         self._posture = 0.5 * (self.finger.stroke_limiter.lower + self.finger.stroke_limiter.upper)
         if position is not None:
@@ -95,9 +93,9 @@ class Simulator:
         if self._guides is not None:
             control = control._replace(guide=core_signal(self._guides.signal))
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
-        self._stepper = self._bindings.stepping(finger, control, rest, **self._settings)
+        self._stepper = Stepper.of(finger, control, rest, **self._settings)
         self._fresh = self._stepper.state_snapshot
-        self._compiled = self._bindings.evaluating(finger)
+        self._compiled = CompiledFinger(finger)
         # Which of the inputs are tensions.
         self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
 
@@ -256,7 +254,6 @@ class Simulator:
         twin = object.__new__(type(self))
         twin.__dict__ |= self.__dict__
         twin._compiled, twin._stepper = CompiledFinger(self.finger), self._stepper.copy()
-        twin._bindings = Bindings(twin._compiled, twin._stepper)
         twin._log = self._log.copy(twin._stepper)
         return twin
 

@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
+from finger_pin.cancellation import CancelToken
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
@@ -21,7 +21,6 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.prepared import Prepared
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.simulation.recording import refuse_unknown
@@ -76,14 +75,13 @@ def simulate_many(
     finger = resolve_finger(finger, runs[0])
     _check_alike(runs)
     _check_kept(runs, variables or (), finger)
-    bindings: list[Bindings] = []
-    run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables), bindings=bindings)
+    run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
     found: dict[int, xr.Dataset | FailedTask] = {}
     texts = [""] * len(runs)
-    with CtrlC() as interrupted, open_executor(executor, workers) as pool:
+    with CancelToken() as token, open_executor(executor, workers) as pool:
         compile_for(pool, lambda: runs[0])
-        for index, result in run_tasks(pool, run, runs, interrupted):
+        for index, result in run_tasks(pool, run, runs, token):
             if isinstance(result, FailedTask) and isinstance(result.error, InputError):
                 raise result.error
             found[index] = result
@@ -93,7 +91,7 @@ def simulate_many(
                 progress(len(found), len(runs))
     # To fill gigabytes for runs that there are not would take longer than a user waits.
     stacked = _stack(runs, dict(sorted(found.items())), texts)
-    if interrupted.pressed:
+    if token.cancelled:
         raise Interrupted(math.nan, stacked, f"after {len(found)} of {len(runs)} runs")
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
@@ -107,16 +105,14 @@ def simulate_many(
     return stacked
 
 
-def _run(
-    scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None, bindings: list[Bindings]
-) -> xr.Dataset:
+def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None) -> xr.Dataset:
     failure = ""
     try:
         # The study has a bar of its own.
         result = (
             simulate(scenario, finger=finger, progress=lambda time: None, stop=stop)
             if keep is None
-            else _prepared(scenario, finger, keep, bindings).run(stop=stop).dataset()
+            else _prepared(scenario, finger, keep).run(stop=stop).dataset()
         )
     except IntegrationError as error:
         assert error.result is not None
@@ -124,14 +120,14 @@ def _run(
     return result.assign_attrs(failure=failure)
 
 
-def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...], bindings: list[Bindings]) -> Prepared:
+def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...]) -> Prepared:
     family = ParametrisedScenario(with_finger(scenario, finger), ())
     try:
-        return Prepared(family, keep, finger, bindings)
+        return Prepared(family, keep, finger)
     except InputError:
         # It may lack what others have.
         known = known_variables(ClosedLoop.from_scenario(scenario, finger=finger))
-        return Prepared(family, tuple(name for name in keep if name in known), finger, bindings)
+        return Prepared(family, tuple(name for name in keep if name in known), finger)
 
 
 def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:

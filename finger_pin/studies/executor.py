@@ -25,6 +25,7 @@ from typing import Any, TypeVar
 
 import cloudpickle
 
+from finger_pin.cancellation import CancelToken
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.core.threads import usable_cores
 from finger_pin.description.scenario import Scenario
@@ -110,7 +111,7 @@ def run_tasks(
         InputError: If what the executor returns is no future.
     """
     answers: queue.SimpleQueue[tuple[int, Future[Any]]] = queue.SimpleQueue()
-    ended, futures = threading.Event(), list[Future[Any]]()
+    ended, futures = CancelToken(), list[Future[Any]]()
     threads = isinstance(executor, ThreadPoolExecutor)
     # A file that tells processes of this machine to stop; others go on to the end of their runs.
     mark = Path(tempfile.gettempdir()) / f"finger_pin-{uuid.uuid4().hex}"
@@ -119,7 +120,7 @@ def run_tasks(
             if stop():
                 return
             if threads:
-                future = _submit(executor, function, item, ended.is_set)
+                future = _submit(executor, function, item, ended)
             else:
                 future = _submit(executor, _call, cloudpickle.dumps((function, item)), str(mark))
             futures.append(future)
@@ -137,7 +138,7 @@ def run_tasks(
                 return
             yield found[0], result
     finally:
-        ended.set()
+        ended.cancel()
         left = [future for future in futures if not future.cancel() and not future.done()]
         if left and not threads:
             with suppress(OSError):

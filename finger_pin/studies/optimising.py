@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from finger_pin.cancellation import CancelToken
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_table, write_text
 from finger_pin.mechanism.coerce import FingerLike
-from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import PointList
@@ -129,7 +129,7 @@ def optimise(
     own = start_of(variables, base)
     search = Search(len(variables), len(goals.objectives), effort.population, effort.seed, _shares(variables, own))
     with ExitStack() as stack:
-        asked_to_stop = stack.enter_context(CtrlC(stop))
+        token = stack.enter_context(CancelToken(stop))
         pool = stack.enter_context(open_executor(executor))
         store = Store()
         if output is not None:
@@ -138,12 +138,12 @@ def optimise(
             described_study = describe_study(base, goals.metrics, asked)
             store = stack.enter_context(open_store(output, described_study, PRODUCTS, restart=restart))
         bar = progress or notebook_bar("runs")
-        course = _Course(base, goals, variables, store, pool, effort, bar, asked_to_stop)
+        course = _Course(base, goals, variables, store, pool, effort, bar, token)
         result = _assembled(base, goals, *course.follow(own, search))
         if output is not None:
             write(result, Path(output) / "optimise.nc")
             _write_front(result, base, Path(output))
-    return checked(result, asked_to_stop.pressed)
+    return checked(result, token.cancelled)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ from typing import Any
 
 import xarray as xr
 
+from finger_pin.cancellation import CancelToken
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.mechanism.coerce import FingerLike
-from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
@@ -81,7 +81,7 @@ def sweep(
     for key, values in design.values.items():
         base.check(key, values, alone=len(design.values) == 1)
     with ExitStack() as stack:
-        asked_to_stop = stack.enter_context(CtrlC(stop))
+        token = stack.enter_context(CancelToken(stop))
         pool = stack.enter_context(open_executor(executor))
         store = Store()
         if output is not None:
@@ -94,10 +94,10 @@ def sweep(
             store,
             pool,
             progress=progress or notebook_bar("runs"),
-            stop=asked_to_stop,
+            stop=token,
             retry_failed=retry_failed,
         )
         result = assemble(base.scenario, design, chosen, records)
         if output is not None:
             write(result, Path(output) / "sweep.nc")
-    return checked(result, asked_to_stop.pressed)
+    return checked(result, token.cancelled)

@@ -13,7 +13,6 @@ import numpy as np
 
 import finger_pin as fp
 from benchmarks.store import Store, say
-from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.simulation.setup import Setup
 from finger_pin.typing import Array
 
@@ -56,7 +55,7 @@ def _runs(name: str, rounds: int, quick: bool) -> dict[str, float]:
         {
             "short run": lambda: prepared.run([_SHORT, own]),
             "short changed": lambda: prepared.run([_SHORT, next(numbers)]),
-            "short steps": _Steps(Setup.of(brief, bindings=Bindings())),
+            "short steps": _Steps(Setup.of(brief, judged=False)),
         },
         4 * rounds,
     )

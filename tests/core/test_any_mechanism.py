@@ -11,8 +11,10 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.inputs import held_control
+from finger_pin.core.stepping.islands import Selection, selections
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables import build_tables
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.mechanism.mechanism import Mechanism
 
@@ -72,57 +74,45 @@ def test_a_mechanism_with_a_free_body_evaluates_alike(seed):
     assert_same(compiled.evaluate(x, command, force), mechanism.evaluate(x, command, force), mechanism)
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_numbers_changed_in_place_are_evaluated_as_the_readable_model_built_anew(seed):
-    rng = np.random.default_rng(200 + seed)
-    mechanism = random_mechanism(rng, free=seed > 5)
-    x, command = random_states(mechanism, rng, 10), rng.uniform(-0.5, 3.0, mechanism.channels)
-    compiled, force = CompiledMechanism(mechanism), rng.normal(size=(len(mechanism.body.tips), 3))
-    before = [compiled.evaluate(x, command, each).rate for each in (force, None)]
-    changed = with_other_numbers(mechanism, rng)
-    assert compiled.renew(changed)
-    for each, old in zip((force, None), before, strict=True):
-        found = compiled.evaluate(x, command, each)
-        assert_same(found, changed.evaluate(x, command, each), changed)
-        assert relative(found.rate, old) > 1e-3
+def test_islands_found_for_other_numbers_of_the_same_wiring_select_the_same_tables():
+    """What is remembered of one hand serves all that are wired alike."""
+    keys = ("tendon_friction.coulomb", "joint_friction.stiction", "joints.medial.link.length")
+    more = {f"hand.fingers.index.finger.{key}": value for key, value in zip(keys, (0.07, 0.03, 0.041), strict=True)}
+    one, other = (build_tables(fp.Finger(fp.load_scenario("hand", each)).mechanism) for each in ({}, more))
+    control = held_control(int(one.channel.max()) + 1, len(one.guided))
+    found = selections(one, control)
+    assert len(found) > 1 and selections(other, control) is found
+    for each in found:
+        anew = Selection.of(other, each.island).tables(other)
+        assert all(np.array_equal(*pair) for pair in zip(leaves(each.tables(other)), leaves(anew), strict=True))
+    assert any(
+        not np.array_equal(*pair)
+        for each in found
+        for pair in zip(leaves(each.tables(other)), leaves(each.tables(one)), strict=True)
+    )
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_numbers_changed_in_place_are_stepped_bit_for_bit_as_a_mechanism_built_anew(seed):
-    """Whatever was stepped before, at which tolerance, under which forces and inputs."""
-    rng = np.random.default_rng(200 + seed)
-    mechanism = random_mechanism(rng, free=seed > 5)
+def leaves(table):
+    return [leaf for each in table for leaf in (leaves(each) if isinstance(each, tuple) else [each])]
+
+
+def test_what_was_stepped_before_does_not_change_what_is_stepped_now():
+    """Nothing of a motion is left in what islands of the same wiring share, and no step depends on its judgement."""
+    rng = np.random.default_rng(206)
+    mechanism = random_mechanism(rng, free=True)
     x, force = random_states(mechanism, rng, 2), rng.normal(size=(len(mechanism.body.tips), 3))
     control = held_control(mechanism.channels, mechanism.coordinates)
-    method, atol = TABLEAUS["Rodas5P"](), np.full(mechanism.size, 1e-4)
-    stepper = Stepper(mechanism, control, x[0], method, 1e-4, 0.1 * atol, force if seed % 2 else None)
-    stepper.hold(rng.uniform(0.0, 3.0, mechanism.channels))
-    stepper.advance(0.02)
-    changed = with_other_numbers(mechanism, rng)
-    for again in (changed, changed, mechanism):
-        given = again, control, x[1], method, 1e-4, atol, None if seed % 2 else force
-        assert stepper.renew(*given)
-        fresh, unjudged = Stepper(*given), Stepper(*given, estimate_error=False)
-        for each in (stepper, fresh, unjudged):
-            each.hold(np.ones(mechanism.channels))
-            assert each.advance(0.02) == 0
-        assert np.array_equal(unjudged.x, fresh.x) and np.isnan(unjudged.estimated_error)
-        assert np.array_equal(stepper.x, fresh.x) and stepper.estimated_error == fresh.estimated_error
-        assert all(
-            np.array_equal(*each) for each in zip(stepper.state_snapshot[0][3], fresh.state_snapshot[0][3], strict=True)
-        )
-
-
-def test_another_wiring_is_not_taken_in_place():
-    rng = np.random.default_rng(30)
-    mechanism = random_mechanism(rng)
-    compiled, control = CompiledMechanism(mechanism), held_control(mechanism.channels, mechanism.coordinates)
-    x, rows = random_states(mechanism, rng, 1)[0], list(mechanism.rows)
-    stepper = Stepper(mechanism, control, x, TABLEAUS["Rodas4"](), 1e-4, np.full(len(x), 1e-4))
-    rows[0] = replace(rows[0], arm=np.where(rows[0].arm == 0.0, 0.1, rows[0].arm))
-    other = Mechanism(mechanism.body, rows, mechanism.lumps, mechanism.inertia)
-    assert not compiled.renew(other)
-    assert not stepper.renew(other, control, x, TABLEAUS["Rodas4"](), 1e-4, np.full(len(x), 1e-4))
+    given = mechanism, control, x[1], TABLEAUS["Rodas5P"](), 1e-4, np.full(mechanism.size, 1e-4), force
+    ends = []
+    for judged in (True, False, True):
+        stepper = Stepper(*given, estimate_error=judged)
+        stepper.hold(np.ones(mechanism.channels))
+        assert stepper.advance(0.02) == 0
+        ends.append(stepper.x)
+        assert np.isfinite(stepper.estimated_error) == judged
+        other = Stepper(with_other_numbers(mechanism, rng), control, x[0], *given[3:])
+        other.advance(0.02)
+    assert np.array_equal(ends[0], ends[1]) and np.array_equal(ends[0], ends[2])
 
 
 def jacobian(mechanism, x, command, force):

@@ -131,7 +131,7 @@ def test_a_run_killed_at_any_instant_of_publishing_leaves_one_whole_set_to_any_r
 
 
 def test_the_next_run_tidies_up_after_any_kill(killed, tmp_path, monkeypatch, result):
-    monkeypatch.setattr("finger_pin.publishing._PATIENCE", 0.0)
+    monkeypatch.setattr("finger_pin.files._PATIENCE", 0.0)
     for folder in killed[0]:
         copy = tmp_path / folder.name
         shutil.copytree(folder, copy, symlinks=True)

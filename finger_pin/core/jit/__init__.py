@@ -8,7 +8,6 @@ below.
 from numba import types
 
 from finger_pin.core.jit.calls import (
-    add_at,
     call_at,
     call_filling,
     call_shape,
@@ -16,13 +15,9 @@ from finger_pin.core.jit.calls import (
     copy,
     copy_matrix,
     load,
-    look_at,
     numbers,
-    power_over,
     put,
-    put_at,
     scratch,
-    two_to_the,
     view,
 )
 from finger_pin.core.jit.functions import (
@@ -34,19 +29,7 @@ from finger_pin.core.jit.functions import (
     njit_reassociate,
 )
 from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, Pointer, StructType, Vector, unpack
-from finger_pin.core.jit.tables import (
-    Block,
-    alike,
-    call,
-    copied,
-    fits,
-    indices,
-    numbered,
-    pack,
-    refill,
-    refuse_copy,
-    taken,
-)
+from finger_pin.core.jit.tables import Block, call, copied, indices, nothing, pack, refuse_copy
 
 __all__ = [
     "Block",
@@ -58,9 +41,7 @@ __all__ = [
     "Pointer",
     "StructType",
     "Vector",
-    "add_at",
     "address_of",
-    "alike",
     "cache_place",
     "call",
     "call_at",
@@ -70,24 +51,17 @@ __all__ = [
     "copied",
     "copy",
     "copy_matrix",
-    "fits",
     "indices",
     "load",
-    "look_at",
     "njit_always_inline",
     "njit_inline",
     "njit_reassociate",
-    "numbered",
+    "nothing",
     "numbers",
     "pack",
-    "power_over",
     "put",
-    "put_at",
-    "refill",
     "refuse_copy",
     "scratch",
-    "taken",
-    "two_to_the",
     "types",
     "unpack",
     "view",

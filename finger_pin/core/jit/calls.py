@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, MutableSequence, Sequence
-from functools import partial
 from typing import Any, TypeAlias
 
 from llvmlite import ir
@@ -29,34 +28,6 @@ def call_at(_typing: Any, function: types.Type, address: types.Type, number: typ
         return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
 
     return types.int64(types.int64, types.int64, types.float64), generate
-
-
-@_generated
-def add_at(_typing: Any, address: types.Type, number: types.Type) -> _Generated:
-    """Add to the integer at an address that other threads add to as well; return what stood there before."""
-    return types.int64(types.int64, types.int64), partial(_shared, "add")
-
-
-@_generated
-def put_at(_typing: Any, address: types.Type, number: types.Type) -> _Generated:
-    """Exchange the integer at an address, and return the former one."""
-    return types.int64(types.int64, types.int64), partial(_shared, "xchg")
-
-
-@_generated
-def look_at(_typing: Any, address: types.Type) -> _Generated:
-    """Return the integer at such an address."""
-    return types.int64(types.int64), partial(_shared, "")
-
-
-def _shared(
-    operation: str, _context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Sequence[ir.Value]
-) -> ir.Value:
-    # Who sees a new integer sees all that was written before it.
-    place = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
-    if not operation:
-        return builder.load_atomic(place, "acquire", 8)
-    return builder.atomic_rmw(operation, place, arguments[1], "acq_rel")
 
 
 @_generated
@@ -158,30 +129,6 @@ def scratch(_typing: Any, count: types.Type) -> _Generated:
         return builder.ptrtoint(builder.alloca(ir.DoubleType(), size=arguments[0]), ir.IntType(64))
 
     return types.int64(types.int64), generate
-
-
-@_generated
-def two_to_the(_typing: Any, rounded: types.Type) -> _Generated:
-    """Return 2^n from a number that holds the integer n in its last bits."""
-
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
-        word = ir.IntType(64)
-        exponent = builder.shl(builder.bitcast(arguments[0], word), word(52))
-        return builder.bitcast(builder.add(exponent, word(1023 << 52)), ir.DoubleType())
-
-    return types.float64(types.float64), generate
-
-
-@_generated
-def power_over(_typing: Any, value: types.Type) -> _Generated:
-    """Return the power of two from 1 / x to 2 / x, by the bits of a positive number's exponent."""
-
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
-        word = ir.IntType(64)
-        exponent = builder.and_(builder.bitcast(arguments[0], word), word(2047 << 52))
-        return builder.bitcast(builder.sub(word(2046 << 52), exponent), ir.DoubleType())
-
-    return types.float64(types.float64), generate
 
 
 @njit_inline

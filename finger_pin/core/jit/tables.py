@@ -7,7 +7,7 @@ later call.
 from __future__ import annotations
 
 import ctypes
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -69,6 +69,16 @@ def copied(table: _Table) -> _Table:
     return type(table)(*map(_copied, table))
 
 
+def nothing(table: type[_Table]) -> _Table:
+    """Return a table whose arrays are empty, and whose numbers are zero."""
+    fields = []
+    for hint in get_type_hints(table, include_extras=True).values():
+        own = getattr(hint, "__metadata__", (hint,))[0]
+        shape = (0,) * getattr(own, "dimensions", 0)
+        fields.append(nothing(hint) if hasattr(hint, "_fields") else np.zeros(shape, own.dtype) if shape else own())
+    return table(*fields)
+
+
 def indices(table: tuple[Any, ...]) -> bytes:
     """Return all arrays of integers of a table, one after the other."""
     found = []
@@ -78,84 +88,6 @@ def indices(table: tuple[Any, ...]) -> bytes:
         elif isinstance(value, np.ndarray) and value.dtype == np.int64:
             found.append(value.tobytes())
     return b"".join(found)
-
-
-def alike(table: tuple[Any, ...], other: tuple[Any, ...], *, numbers: bool = False) -> bool:
-    """Return whether two tables that fit have the same integers, and numbers too if those are asked for."""
-    for own, new in zip(table, other, strict=True):
-        if own is new:
-            continue
-        if isinstance(own, tuple):
-            if not alike(own, new, numbers=numbers):
-                return False
-        elif isinstance(own, np.ndarray):
-            if (numbers or own.dtype == np.int64) and not np.array_equal(own, new):
-                return False
-        elif numbers and own != new:
-            return False
-    return True
-
-
-def fits(table: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
-    """Return whether the numbers of another table have room in the arrays of one, and all else is the same."""
-    for own, new in zip(table, other, strict=True):
-        if own is new:
-            continue
-        if isinstance(own, np.ndarray):
-            if own.shape != new.shape:
-                return False
-        elif not (fits(own, new) if isinstance(own, tuple) else own == new):
-            return False
-    return True
-
-
-def refill(table: tuple[Any, ...], other: tuple[Any, ...], before: tuple[Any, ...] | None = None) -> None:
-    """Copy the numbers of another table of the same shapes into the arrays of one.
-
-    Args:
-        table: It is filled.
-        other: Whose numbers it is given.
-        before: What it was filled from before, if nothing has changed them since: what both share stays.
-    """
-    for own, new, old in zip(table, other, before or (None,) * len(table), strict=True):
-        if own is new or new is old:
-            continue
-        if isinstance(own, np.ndarray):
-            own[...] = new
-        elif isinstance(own, tuple):
-            refill(own, new, old)
-
-
-def numbered(table: _Table) -> _Table:
-    """Return a table that has in the place of every number its index in the array."""
-    numbers = [
-        np.arange(each.size, dtype=float).reshape(each.shape) if _is_of_numbers(each) else each for each in table
-    ]
-    return type(table)(*(numbered(each) if isinstance(each, tuple) else each for each in numbers))
-
-
-def taken(like: _Table, places: _Table, table: tuple[Any, ...], before: tuple[Any, ...]) -> _Table:
-    """Return a table gathered from flat indices into another.
-
-    Args:
-        like: Such a table, of the same places in ``before``: what both have in common stays.
-        places: The places.
-        table: The other one.
-        before: The one before.
-    """
-    found = []
-    for own, at, new, old in zip(like, places, table, before, strict=True):
-        if new is old:
-            found.append(own)
-        elif isinstance(own, tuple):
-            found.append(taken(own, at, new, old))
-        else:
-            found.append(new.ravel()[at.astype(np.int64)] if _is_of_numbers(own) else own)
-    return type(like)(*found)
-
-
-def _is_of_numbers(value: object) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype == float
 
 
 def _copied(value: Any) -> Any:

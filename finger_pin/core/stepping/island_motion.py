@@ -99,7 +99,7 @@ class IslandMotion:
         """Return a further model of the island with its inputs."""
         part = self.part
         work = build_work(part.tables, part.laws, len(part.control.tension))
-        return BoundModel(copied(part.tables), copied(part.control), work)
+        return BoundModel(copied(part.tables), copied(part.control), work, linearised=False)
 
     @cached_property
     def _models(self) -> list[BoundModel]:

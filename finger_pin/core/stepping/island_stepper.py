@@ -215,13 +215,6 @@ class IslandIntegrator:
             if self.drives is not None:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
 
-    def renew(self, tables: Tables, control: InputTable, x: Array, attitude: Array, atol: Array) -> None:
-        """Reset to time zero with other parameters of the same shapes."""
-        self.model.renew(tables, control)
-        self.atol[:], self._memory[:], self._bound.global_error[:] = atol, 0.0, 0.0
-        self.drives, self.knots, self.steps = None, IslandIntegrator.knots, None
-        self.restart(x, attitude, 0.0)
-
     def with_loads(self, loaded: bool) -> IslandIntegrator:
         """Return the same integrator with or without forces at the tips."""
         pack = self._bound

@@ -16,6 +16,7 @@ from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.inputs import PLANNED, InputTable
 from finger_pin.core.jit import indices
 from finger_pin.core.tables import Tables
+from finger_pin.description.caching import memoised
 
 Indices = NDArray[np.int64]
 
@@ -32,6 +33,19 @@ class Island:
     tips: Indices
 
 
+def _reads(control: InputTable) -> NDArray[np.bool_]:
+    """Return a mask of the coordinates that every planned tension depends on, shape (T, N)."""
+    return np.asarray((control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0)))
+
+
+def _wires(tables: Tables, control: InputTable, *more: bool) -> tuple[object, ...]:
+    """Return all that islands depend on."""
+    wires = indices(tables), control.loop.tobytes(), control.channel.tobytes(), _reads(control).tobytes()
+    arrays = tables.parents, tables.lumps, tables.state, control.tension, control.minimum
+    return (*wires, control.kind, *map(len, arrays), *more)
+
+
+@memoised(_wires)
 def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> list[Island]:
     """Return the islands of a mechanism under its inputs, coupled by possible contacts or apart from them."""
     count, bodies = len(tables.state), len(tables.parents)
@@ -83,68 +97,82 @@ def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> 
     return found
 
 
-def wiring(tables: Tables, control: InputTable) -> bytes:
-    """Return the structure key of islands and memory."""
-    wires = (control.loop, control.channel, _reads(control))
-    return b"".join([indices(tables), *(each.tobytes() for each in wires)])
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The part of tables of one wiring that an island has.
+
+    Attributes:
+        island: Its indices in the whole.
+        subset: Its places by axis; None where it is the whole.
+        groups: Its groups of rows, as in the tables.
+        of_groups: Numbers of these groups among all.
+        touching: Number of rows of contacts.
+    """
+
+    island: Island
+    subset: Subset | None
+    groups: Indices
+    of_groups: Indices
+    touching: int
+
+    @classmethod
+    def of(cls, tables: Tables, island: Island) -> Selection:
+        """Return the part that an island has of tables."""
+        rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.guided)
+        bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
+        counts = np.array([np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups], dtype=np.int64)
+        present = np.flatnonzero(counts)
+        ends = np.cumsum([0, *counts[present]])
+        part = Subset()
+        part.keep("coordinate", island.coordinates, width)
+        part.keep("body", bodies, size)
+        part.keep("lump", lumps - size, width - size)
+        part.keep("chart", np.flatnonzero(np.isin(tables.charts, bodies)), len(tables.charts))
+        part.keep("tip", island.tips, len(tables.tip_body))
+        part.keep("row", rows, len(tables.state))
+        part.keep("group", present, len(tables.groups))
+        part.keep("state", island.states, len(tables.state_row))
+        part.keep("fed", np.flatnonzero(np.isin(tables.fed_row, rows)), len(tables.fed_row))
+        part.keep("channel", island.channels, 1 + max(tables.channel.max(initial=-1), island.channels.max(initial=-1)))
+        for entries in ("arm", "bend", "term"):
+            part.keep_entries(tables, entries)
+        part.keep("path", np.flatnonzero(np.isin(paths.rows, rows)), len(paths.rows))
+        part.keep_entries(paths, "leg")
+        part.keep("piece", np.unique(paths.piece[part.kept["leg"]]), len(paths.columns))
+        part.keep_entries(paths, "mover")
+        groups = np.column_stack([ends[:-1], ends[1:], tables.groups[present, 2:]])
+        return cls(island, part, groups, present, int(np.count_nonzero(tables.touch[rows])))
+
+    def tables(self, tables: Tables) -> Tables:
+        """Return the tables of the island."""
+        part = self.subset
+        if part is None:
+            return tables
+        own = part.of(tables)
+        return own._replace(groups=self.groups, touching=self.touching, paths=part.of(tables.paths))
+
+    def control(self, control: InputTable) -> InputTable:
+        """Return the inputs of the island."""
+        island = self.island
+        if self.subset is None:
+            return control
+        part = Subset()
+        part.keep("coordinate", island.coordinates, len(control.gain))
+        part.keep("channel", island.channels, len(control.tension))
+        part.keep("planned", island.planned, len(control.minimum))
+        part.keep("loop", np.unique(control.loop[island.planned]), len(control.level))
+        schedule = _chosen(control.schedule, island.channels)
+        force = _chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel())
+        return part.of(control)._replace(schedule=schedule, force=force)
 
 
-def _reads(control: InputTable) -> NDArray[np.bool_]:
-    """Return a mask of the coordinates that every planned tension depends on, shape (T, N)."""
-    return np.asarray((control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0)))
-
-
-def select(tables: Tables, island: Island) -> Tables:
-    """Return the tables of an island."""
-    rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.guided)
-    bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
-    present, groups = _groups(tables, rows)
-    part = Subset()
-    part.keep("coordinate", island.coordinates, width)
-    part.keep("body", bodies, size)
-    part.keep("lump", lumps - size, width - size)
-    part.keep("chart", np.flatnonzero(np.isin(tables.charts, bodies)), len(tables.charts))
-    part.keep("tip", island.tips, len(tables.tip_body))
-    part.keep("row", rows, len(tables.state))
-    part.keep("group", present, len(tables.groups))
-    part.keep("state", island.states, len(tables.state_row))
-    part.keep("fed", np.flatnonzero(np.isin(tables.fed_row, rows)), len(tables.fed_row))
-    part.keep("channel", island.channels, 1 + max(tables.channel.max(initial=-1), island.channels.max(initial=-1)))
-    for entries in ("arm", "bend", "term"):
-        part.keep_entries(tables, entries)
-    part.keep("path", np.flatnonzero(np.isin(paths.rows, rows)), len(paths.rows))
-    part.keep_entries(paths, "leg")
-    part.keep("piece", np.unique(paths.piece[part.kept["leg"]]), len(paths.columns))
-    part.keep_entries(paths, "mover")
-    touching = int(np.count_nonzero(tables.touch[rows]))
-    return part.of(tables)._replace(groups=groups, touching=touching, paths=part.of(paths))
-
-
-def groups_of(tables: Tables, island: Island) -> list[int]:
-    """Return the groups of rows that an island has some of."""
-    return [
-        g for g, (begin, end) in enumerate(tables.groups[:, :2]) if np.any((island.rows >= begin) & (island.rows < end))
-    ]
-
-
-def _groups(tables: Tables, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the groups of some rows, and their entries with these rows one after the other."""
-    counts = np.array([np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups], dtype=np.int64)
-    present = np.flatnonzero(counts)
-    ends = np.cumsum([0, *counts[present]])
-    return present, np.column_stack([ends[:-1], ends[1:], tables.groups[present, 2:]])
-
-
-def select_control(control: InputTable, island: Island) -> InputTable:
-    """Return the inputs of an island."""
-    part = Subset()
-    part.keep("coordinate", island.coordinates, len(control.gain))
-    part.keep("channel", island.channels, len(control.tension))
-    part.keep("planned", island.planned, len(control.minimum))
-    part.keep("loop", np.unique(control.loop[island.planned]), len(control.level))
-    schedule = _chosen(control.schedule, island.channels)
-    force = _chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel())
-    return part.of(control)._replace(schedule=schedule, force=force)
+@memoised(_wires)
+def selections(tables: Tables, control: InputTable) -> list[Selection]:
+    """Return the part of every island, found once for each wiring."""
+    islands = find_islands(tables, control)
+    if len(islands) == 1:
+        return [Selection(islands[0], None, tables.groups, np.arange(len(tables.groups)), tables.touching)]
+    return [Selection.of(tables, island) for island in islands]
 
 
 def _chosen(signal: SignalTable, functions: Indices) -> SignalTable:

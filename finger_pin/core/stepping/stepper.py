@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property, partial
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from finger_pin.core.collision.broad_phase import activate_all
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.inputs import HELD, InputTable
-from finger_pin.core.jit import alike, copied, fits, numbered, taken
+from finger_pin.core.jit import copied
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, failure
-from finger_pin.core.stepping.islands import Island, find_islands, groups_of, select, select_control, wiring
+from finger_pin.core.stepping.islands import Island, selections
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
-from finger_pin.core.tables import Tables, build_tables
+from finger_pin.core.tables import build_tables
 from finger_pin.core.threads import in_threads
-from finger_pin.description.caching import memoised
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 
@@ -29,8 +29,6 @@ from finger_pin.typing import Array
 Snapshot = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
-
-# Of mechanisms that are wired alike.
 
 # As often the error that is carried along counts.
 _TWICE = 2.0
@@ -73,79 +71,55 @@ class Stepper:
         """
         self.estimate_error = estimate_error
         tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
-        self._charts, self._width, self._wiring = Charts.of(mechanism), mechanism.coordinates, wiring(tables, control)
-        self._islands = _islands(self._wiring, tables, control)
-        self._free = [np.isin(tables.charts, island.coordinates) for island in self._islands]
-        self._made_of, self._tables = (mechanism, control, x, tableau, rtol, atol, force, time), self._selected(tables)
-        self._whole, self._inputs = tables, self._selected_inputs(control)
+        self._charts, self._width = Charts.of(mechanism), mechanism.coordinates
+        selected = selections(tables, control)
+        self._free = [np.isin(tables.charts, each.island.coordinates) for each in selected]
+        self._made_of = mechanism, control, x, tableau, rtol, atol, force, time
         self.mechanism, self.parts = mechanism, list[IslandIntegrator]()
-        for island, (own, inputs, start, attitude, tolerances) in zip(self._islands, self._begun(), strict=True):
-            memory = np.zeros(len(core.StepMemory._fields))
-            named = core.StepMemory.from_vector(memory)
-            named.time[0], named.step_size[0] = time, FIRST_STEP
-            followed = laws if len(self._islands) == 1 else [laws[g] for g in groups_of(tables, island)]
-            given = copied(own), copied(inputs), start, attitude, tableau, float(rtol), tolerances, memory
-            self.parts.append(IslandIntegrator(island, followed, *given, estimate_error))
-
-    def renew(
-        self,
-        mechanism: Mechanism,
-        control: InputTable,
-        x: Array,
-        tableau: Tableau,
-        rtol: float,
-        atol: Array,
-        force: Array | None = None,
-    ) -> bool:
-        """Reset to new parameters and a new initial state; return False, unchanged, if the structure differs."""
-        whole, (_, inputs, _, method, tolerance, *_) = self._whole, self._made_of
-        tables = build_tables(mechanism)
-        if method is not tableau or tolerance != rtol or not (fits(whole, tables) and fits(inputs, control)):
-            return False
-        driven_alike = alike(inputs, control, numbers=True)
-        if not (driven_alike and alike(whole, tables)) and wiring(tables, control) != self._wiring:
-            return False
-        self._made_of = (mechanism, control, x, tableau, rtol, atol, force, 0.0)
-        if mechanism is not self.mechanism:
-            pairs = zip(self._tables, self._numbered, strict=True)
-            self._tables = [tables] if len(self._islands) == 1 else [taken(*each, tables, whole) for each in pairs]
-            self.mechanism, self._whole = mechanism, tables
-        if not driven_alike:
-            self._inputs = self._selected_inputs(control)
-        for index, each in enumerate(self._begun()):
-            if each[0].loaded != self.parts[index].tables.loaded:
-                self.parts[index] = self.parts[index].with_loads(each[0].loaded)
-            self.parts[index].renew(*each)
-        return True
-
-    def _selected(self, tables: Tables) -> list[Tables]:
-        """Return the tables of every island."""
-        return [tables] if len(self._islands) == 1 else [select(tables, island) for island in self._islands]
-
-    def _selected_inputs(self, control: InputTable) -> list[InputTable]:
-        """Return the inputs of every island."""
-        alone = len(self._islands) == 1
-        return [control] if alone else [select_control(control, island) for island in self._islands]
-
-    @cached_property
-    def _numbered(self) -> list[Tables]:
-        """The places of the numbers of every island's tables in those of the whole."""
-        return self._selected(numbered(build_tables(self.mechanism)))
-
-    def _begun(self) -> Iterator[tuple[Tables, InputTable, Array, Array, Array]]:
-        """Yield the tables, inputs, state, quaternions and absolute tolerances of each island at the start."""
-        mechanism, _, x, _, _, atol, force, _ = self._made_of
         forces = np.zeros((len(mechanism.body.tips), 3))
         forces[:] = 0.0 if force is None else force
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
-        whole = len(self._islands) == 1
-        for tables, inputs, island, free in zip(self._tables, self._inputs, self._islands, self._free, strict=True):
-            pushed = forces if whole else forces[island.tips]
+        for each, free in zip(selected, self._free, strict=True):
+            memory = np.zeros(len(core.StepMemory._fields))
+            named = core.StepMemory.from_vector(memory)
+            named.time[0], named.step_size[0] = time, FIRST_STEP
+            inputs, pushed, at = copied(each.control(control)), forces[each.island.tips], self._places(each.island)
             # An island that nothing pushes computes as it does alone.
             loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
-            own, at = tables._replace(tip_force=pushed, loaded=loaded), self._places(island)
-            yield own, inputs, start[at], attitude[free], tolerances[at]
+            own = copied(each.tables(tables)._replace(tip_force=pushed, loaded=loaded))
+            begun = inputs, start[at], attitude[free], tableau, float(rtol), tolerances[at], memory
+            followed = [laws[group] for group in each.of_groups]
+            self.parts.append(IslandIntegrator(each.island, followed, own, *begun, estimate_error))
+
+    @classmethod
+    def of(
+        cls,
+        finger: Finger,
+        control: InputTable,
+        x: Array,
+        force: Array | None = None,
+        *,
+        method: str,
+        rtol: float,
+        atol_scale: float,
+        estimate_error: bool = False,
+    ) -> Stepper:
+        """Return the stepper of a finger under inputs, from a packed state on.
+
+        Args:
+            finger: The finger.
+            control: Its inputs.
+            x: Packed state, shape (size,).
+            force: At the tips, shape (3,) or (t, 3), N, base frame.
+            method: One of `TABLEAUS`.
+            rtol: Relative tolerance.
+            atol_scale: Absolute tolerance over the scale of each kind of state.
+            estimate_error: Whether the error will be asked for.
+        """
+        tolerances = atol_scale * finger.layout.scales()
+        given = finger.mechanism, control, x, TABLEAUS[method](), rtol, tolerances, force
+        return cls(*given, estimate_error=estimate_error)
 
     def _places(self, island: Island) -> NDArray[np.int64]:
         """Return the places of an island's numbers in the state of the whole."""
@@ -302,14 +276,3 @@ class Stepper:
         """Return a status in words, with a name for every number of the state; empty if nothing failed."""
         part = min(self.parts, key=lambda each: each.time)
         return failure(part, status, [names[at] for at in self.places(part.island)])
-
-
-def _wires(wires: bytes, tables: Tables, control: InputTable) -> tuple[object, ...]:
-    arrays = tables.parents, tables.lumps, tables.state, control.tension, control.minimum
-    return (wires, control.kind, *map(len, arrays))
-
-
-@memoised(_wires)
-def _islands(wires: bytes, tables: Tables, control: InputTable) -> list[Island]:
-    """Return the islands of a mechanism under its inputs, searched once for each wiring."""
-    return find_islands(tables, control)
