@@ -17,7 +17,7 @@ from finger_pin.typing import Array
 def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float, ...]:
     """Return the greatest tension at every actuated tendon's spool, N, in slow motion or at rest.
 
-    The current is at most I_max, and V / R. Of two tendons on one spool each has it while the other one is slack.
+    The current is at most I_max, and V / R. Of several tendons on one spool each has it while the others are slack.
 
     Args:
         finger: With actuators; a tendon without one has no limit: infinity.

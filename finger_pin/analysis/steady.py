@@ -83,8 +83,7 @@ def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> A
     """
     base, by_load, more, more_by_load, velocity, exponent, viscous, _, driving, driven = actuators.gearbox
     torque = command[:, actuators.tendons] @ actuators.spools
-    radius = np.max(actuators.spools, axis=0, initial=0.0)
-    speed = v / np.where(radius > 0.0, radius, 1.0)
+    speed = v / actuators.radius
     way, share = np.sign(speed), stribeck_share(speed, velocity, exponent)
     lost = loss_share(torque, speed, driving, driven) * np.abs(torque)
     dry, slope = base + more * share + lost, by_load + more_by_load * share

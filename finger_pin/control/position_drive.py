@@ -75,7 +75,9 @@ class PositionDrives:
         compiled: The loops as arrays, and what they have done.
     """
 
-    def __init__(self, finger: Finger, controller: Controller, reference: Reference, duration: float) -> None:
+    def __init__(
+        self, finger: Finger, controller: Controller, reference: Reference, duration: float, start_time: float = 0.0
+    ) -> None:
         """Work out the goals of a motion.
 
         Args:
@@ -83,6 +85,7 @@ class PositionDrives:
             controller: Plans tensions, for the goals.
             reference: The desired motion.
             duration: Of the motion, s.
+            start_time: Of the motion, s.
 
         Raises:
             InputError: If a goal is beyond what its encoder can be told, or drives differ in their period.
@@ -102,7 +105,7 @@ class PositionDrives:
             if encoder is not None and not encoder.range[0] <= least <= most <= encoder.range[1]:
                 allowed = f"the motion takes the spool from {least:.4g} to {most:.4g} rad"
                 raise InputError(f"finger.actuators.{name}.motor.encoder.range", allowed, list(encoder.range))
-        self.compiled = build_drives(finger, goals)
+        self.compiled = build_drives(finger, goals, start_time)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return the commands with the tensions of the goals in place of those of the errors."""
@@ -113,7 +116,10 @@ class PositionDrives:
         return replace(control, tension=np.where(chosen, plan.tension, control.tension))
 
     def voltages(self, time: Array | float) -> Array:
-        """Return the voltages held at one time, or at times (m,), by motor, V; an instant belongs to its sample."""
+        """Return the voltages held at one time, or at times (m,), by motor, V; an instant belongs to its sample.
+
+        From when it is let go a motor has `OPEN_CIRCUIT`.
+        """
         index = np.floor(np.asarray(time) / self.compiled.period * (1.0 + 1e-12)).astype(int)
         held: Array = self.compiled.voltages[np.clip(index, 0, len(self.compiled.voltages) - 1)]
         return held
@@ -138,12 +144,13 @@ def loop_period(finger: Finger) -> float:
     return period
 
 
-def build_drives(finger: Finger, goals: Array) -> Drives:
+def build_drives(finger: Finger, goals: Array, start_time: float = 0.0) -> Drives:
     """Return the loops of all motors of a finger in position drive, m of them.
 
     Args:
         finger: The finger.
         goals: theta_m^d at multiples of their period, shape (k, m), rad.
+        start_time: Time at the first of these, s.
     """
     chosen = [actuator for _, actuator in _positioned(finger)]
     loops, encoders = [each.position_loop for each in chosen], [each.motor.encoder for each in chosen]
@@ -156,6 +163,7 @@ def build_drives(finger: Finger, goals: Array) -> Drives:
         goals=np.ascontiguousarray(goals),
         resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
         gains=np.ascontiguousarray(np.array([[e.proportional, e.derivative, e.integral] for e in loops]).T),
+        torque_off=np.array([np.inf if each.torque_off is None else each.torque_off for each in loops]) - start_time,
         supply=np.array([each.motor.voltage for each in chosen]),
         taken=np.zeros(1, dtype=np.int64),
         integral=np.zeros(len(chosen)),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable
 from typing import Annotated, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from finger_pin.description.validation import (
@@ -60,6 +62,9 @@ class GearFriction(Description):
     stiffness: Annotated[float, real(0.0, 1e9, above=True)] = quantity(
         50.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness: how far gears give before they slip."
     )
+    backlash: Annotated[float, real(0.0, 1.0, hint=" rad (is it in degrees?)")] = quantity(
+        0.0, unit="rad", source="fit", doc="b, play at the output, all of the gap between the two flanks of its teeth."
+    )
     driving: Annotated[float, real(0.0, 100.0)] = quantity(
         0.0, unit="1", source="fit", doc="m_d, level over the tendons' torque while the motor winds in against it."
     )
@@ -76,7 +81,7 @@ class GearFriction(Description):
 
 
 class Encoder(Description):
-    """The encoder of a position drive, on its spool."""
+    """The encoder of a position drive, on its spool; where gears have play, before the play."""
 
     range: Annotated[tuple[float, float], vector(2, -1e6, 1e6)] = quantity(
         ..., unit="rad", source="maker's sheet", doc="Least and largest angle that it can be told to go to."
@@ -173,17 +178,23 @@ class PositionLoop(Description):
     )
     derivative: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="s/rad", source="as it ships", doc="k_d.")
     integral: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="1/(rad s)", source="as it ships", doc="k_i.")
+    torque_off: Annotated[float, real(0.0, 1e6)] | None = quantity(
+        None, unit="s", source="chosen", doc="Time at which the motor is let go: from then on no current flows."
+    )
 
 
 class Actuator(Description):
-    """A motor that pulls one tendon, or two in opposition, through a spool; tendons stretch on their way."""
+    """A motor that pulls one tendon or several through a spool; tendons stretch on their way."""
 
     motor: Motor = Field(description="The name of one that ships, the path of a .toml file, or a table.")
-    tendons: tuple[Name, ...] = Field(
-        min_length=1, max_length=2, description="One tendon, or two of which one is wound in as the other goes out."
+    tendons: tuple[Name, ...] = Field(min_length=1, description="What its spool pulls, one tendon or several.")
+    spool_radius: Annotated[Numbers, reals(-1.0, 1.0, hint=" m (is it in millimetres?)")] = quantity(
+        ..., unit="m", source="design", doc="r, one number or one per tendon, above 0."
     )
-    spool_radius: Annotated[Numbers, reals(0.0, 1.0, above=True, hint=" m (is it in millimetres?)")] = quantity(
-        ..., unit="m", source="design", doc="r, one number or one per tendon."
+    winds: tuple[Annotated[Literal["in", "out"], choice("in", "out")], ...] | None = Field(
+        None,
+        description="Of every tendon, whether the spool winds it in or pays it out as the first one is wound in; two "
+        "go opposite ways where nothing is said.",
     )
     drive: Annotated[Literal["tension", "position"], choice("tension", "position")] = quantity(
         "tension", unit="1", source="design", doc="Commanded tensions as torque, or planned tendon lengths as angle."
@@ -207,7 +218,7 @@ class Actuator(Description):
         doc="h, part of its tension that a tendon holds against its stretch.",
     )
     pretension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
-        0.0, unit="N", source="design", doc="K e0, with the spool and all joints at zero; of two tendons all there is."
+        0.0, unit="N", source="design", doc="K e0, with the spool and all joints at zero; of several all there is."
     )
     friction_compensation: Annotated[float, real(0.0, 2.0)] = quantity(
         0.0,
@@ -228,13 +239,32 @@ class Actuator(Description):
             if isinstance(value, tuple) and len(value) != len(self.tendons):
                 raise problem(name, f"must be one number or one per tendon: {', '.join(self.tendons)}", list(value))
         if len(set(self.tendons)) != len(self.tendons):
-            raise problem("tendons", "must be two different tendons", list(self.tendons))
+            raise problem("tendons", "must be different tendons", list(self.tendons))
+        together = f"winds = {json.dumps(['in'] * len(self.tendons))} winds all in together"
+        if np.min(self.spool_radius) <= 0.0:
+            raise problem("spool_radius", f'must be above 0; {together}, "out" pays one out', self.spool_radius)
+        if self.winds is None:
+            if len(self.tendons) > 2:
+                raise problem("winds", f"is missing: three tendons or more need one word each; {together}")
+        elif len(self.winds) != len(self.tendons) or self.winds[0] != "in":
+            allowed = f'must be "in" or "out" for each of {", ".join(self.tendons)}, "in" for the first; {together}'
+            raise problem("winds", allowed, list(self.winds))
         if self.drive == "position" and self.motor.encoder is None:
             raise problem("motor.encoder.range", "is missing: a position drive needs the range of angles it can go to")
-        if self.drive == "tension" and len(self.tendons) == 2:
-            allowed = 'one torque cannot set two tensions: a spool that winds two tendons has drive = "position"'
+        if self.drive == "tension" and len(self.tendons) > 1:
+            allowed = 'one torque cannot set several tensions: a spool of several tendons has drive = "position"'
             raise problem("drive", allowed, self.drive)
+        if self.drive == "tension" and self.position_loop.torque_off is not None:
+            allowed = 'lets go of a motor with drive = "position"; one in tension drive is let go by commands of 0 N'
+            raise problem("position_loop.torque_off", allowed, self.position_loop.torque_off)
         return self
+
+    @property
+    def radii(self) -> NDArray[np.float64]:
+        """Spool radius of every tendon, shape (k,), m: negative where it is paid out as the first one is wound in."""
+        count = len(self.tendons)
+        winds = self.winds or ("in", "out")[:count]
+        return expand(self.spool_radius, count) * np.where(np.array(winds) == "in", 1.0, -1.0)
 
 
 def check_actuators(actuators: dict[str, Actuator], actuated: tuple[str, ...], passive: tuple[str, ...]) -> None:
@@ -265,11 +295,10 @@ def check_currents(actuators: dict[str, Actuator], tension: dict[str, float]) ->
     """Refuse a motor that cannot exert the tensions, N by tendon, that keep its tendons taut at rest."""
     for name, actuator in actuators.items():
         motor, count = actuator.motor, len(actuator.tendons)
-        radii = expand(actuator.spool_radius, count) * np.array([1.0, -1.0])[:count]
-        # Two tendons on a spool have the tension that they are built with.
+        # Several tendons on a spool have the tension that they are built with.
         taut = [tension[actuator.tendons[0]]] if count == 1 else expand(actuator.pretension, count)
         constant, resistance, _ = motor.constants
-        needed = abs(float(radii @ taut)) / constant
+        needed = abs(float(actuator.radii @ taut)) / constant
         if needed > min(motor.maximum_current, motor.voltage / resistance):
             what = ", ".join(f"{each:.3g} N of {tendon}" for each, tendon in zip(taut, actuator.tendons, strict=True))
             if needed > motor.maximum_current:

@@ -5,7 +5,8 @@
 It is driven by a voltage, its command; or by a current, K_t i being T, command times gain, plus what is to overcome
 friction: sign(w) level + b w with the level c + m |u T + sign(w) level| of gears that slide slowly, in which u T is the
 part of their load that grows with T. Then the electronics apply U = R i + K_t w as far as they can. Where the current
-is limited they apply less than was asked for, so that U i = R i^2 + tau w always.
+is limited they apply less than was asked for, so that U i = R i^2 + tau w always. A command of `OPEN_CIRCUIT` lets the
+motor go: i = 0, and U = K_t w is what it induces.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import numpy as np
 from finger_pin.laws.law import Law, Row
 from finger_pin.typing import Number, Numbers, Parameters
 
+#: The voltage that means none: no current flows.
+OPEN_CIRCUIT = 1e30
 # Least share of a torque that gears are expected to leave.
 _LEAST = 1e-3
 
@@ -58,7 +61,7 @@ def free_current(speed: Number, asked: Number, p: Parameters) -> Number:
 def _value(row: Row, p: Parameters) -> Numbers:
     constant, resistance, limit = p[0], p[1], p[3]
     free = free_current(row.speed, asked_voltage(row.speed, row.command, p), p)
-    current = np.minimum(np.maximum(free, -limit), limit)
+    current = np.minimum(np.maximum(free, -limit), limit) * (row.command < OPEN_CIRCUIT)
     voltage = resistance * current + constant * row.speed
     return constant * current, 0.0 * row.length, current, voltage
 
@@ -66,7 +69,7 @@ def _value(row: Row, p: Parameters) -> Numbers:
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     constant, resistance, supply, limit, by_current, gain = p[0], p[1], p[2], p[3], p[4], p[5]
     asked = asked_voltage(row.speed, row.command, p)
-    within = constant / resistance * (np.abs(free_current(row.speed, asked, p)) < limit)
+    within = constant / resistance * (np.abs(free_current(row.speed, asked, p)) < limit) * (row.command < OPEN_CIRCUIT)
     followed = within * (np.abs(asked) < supply)
     _, steeper, by_torque = friction_torque(row.speed, gain * row.command, p)
     by_speed = followed * by_current * (resistance * steeper / constant + constant) - within * constant

@@ -64,7 +64,7 @@ class Action(LoopController):
         else:
             if len(finger.actuators.positioned) != finger.mechanism.channels:
                 raise InputError("action", f'"{kind}" needs motors in position drive at all tendons')
-            radius = finger.actuators.spools.max(axis=0)
+            radius = finger.actuators.radius
             if kind == "joint_position":
                 free = np.delete(np.arange(len(finger.routing.joints)), coupling.followers)
                 limiter, self._goals = nominal.stroke_limiter, partial(_spools, nominal, coupling, free)
@@ -221,7 +221,14 @@ def _reach(finger: Finger) -> tuple[Array, Array]:
     drawn = finger.excursion(corners)
     taut = actuators.angle(corners, None, drawn)
     stretched = actuators.angle(corners, np.full(drawn.shape, _STRONGEST), drawn)
-    return taut.min(axis=0), stretched.max(axis=0)
+    least, most = taut.min(axis=0), stretched.max(axis=0)
+    # Of tendons that are wound in together the one that needs most decides, not all on average.
+    for motor in np.flatnonzero(np.sum(actuators.spools > 0.0, axis=0) > 1):
+        wound = np.flatnonzero(actuators.spools[:, motor] > 0.0)
+        own = (drawn[:, actuators.tendons[wound]] - actuators.slack[wound]) / actuators.spools[wound, motor]
+        stretch = _STRONGEST / actuators.stiffness[wound] / actuators.spools[wound, motor]
+        least[motor], most[motor] = own.min(), (own + stretch).max()
+    return least, most
 
 
 class Replayed:

@@ -3,10 +3,12 @@
     tendon     e = r theta_m - l(q) + e0,   f^m = max(0, K e + D e')
     rotor      J theta_m'' = tau - tau_g - sum of r f^m
     gearbox    tau_g by (9), loaded by N = |x sum of r f^m + tau|
+    play       J_s theta_s'' = T - sum of r f^m, T by (2) outside the gap; then e and theta_m'' have theta_s and T
 
 An elastic tendon is a row that acts on rotor and finger alike; what its canal takes away is the row of the driven
-tendon. Of a spool that winds two tendons the second has a negative radius. A load that the motor holds presses the
-teeth from both sides, so that its torque and the motor's add up in N.
+tendon. A tendon that is paid out as the first one of its spool is wound in has a negative radius. A load that the motor
+holds presses the teeth from both sides, so that its torque and the motor's add up in N. Gears with play make the spool
+a mass of its own, between cords and flanks of teeth; what flanks carry takes the place of the tendons' torque.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.gearbox import GEARBOX
+from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.motor import MOTOR
 from finger_pin.laws.spring import ELASTIC_TENDON
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
@@ -28,6 +31,9 @@ from finger_pin.typing import Array
 
 _STRETCH = Energy("elastic_tendons", "tendons on spools")
 _DAMPING = Energy("elastic_damping", "tendons stretching")
+_FLANKS = Energy("backlash", "flanks of gears with play")
+# Of a motor with play: the spool's part of its inertia, stiffness of flanks over that of bristles, and their c, s/rad.
+_OF_SPOOL, _FLANK, _REBOUND = 1e-4, 10.0, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +54,7 @@ class Actuators:
         motor: Numbers of the law of motors, shape (parameters, m).
         gearbox: Numbers of the law of gearboxes, shape (parameters, m).
         external_weight: x, shape (m,).
+        backlash: b, shape (m,), rad.
     """
 
     routing: Routing
@@ -63,6 +70,7 @@ class Actuators:
     motor: Array
     gearbox: Array
     external_weight: Array
+    backlash: Array
 
     @classmethod
     def from_description(cls, description: FingerDescription, routing: Routing) -> Actuators:
@@ -76,11 +84,11 @@ class Actuators:
 
         stiffness = of_tendons("tendon_rigidity") / of_tendons("tendon_length")
         spools = np.zeros((len(strands), len(names)))
-        for row, ((name, tendon), radius) in enumerate(zip(strands, of_tendons("spool_radius"), strict=True)):
-            opposed = description.actuators[name].tendons.index(tendon)
-            spools[row, names.index(name)] = -radius if opposed else radius
+        for row, (name, tendon) in enumerate(strands):
+            actuator = description.actuators[name]
+            spools[row, names.index(name)] = actuator.radii[actuator.tendons.index(tendon)]
         motors, gearboxes = [], []
-        for actuator, radius in zip(actuators, np.max(spools, axis=0, initial=0.0), strict=True):
+        for actuator in actuators:
             motor, gears = actuator.motor, actuator.motor.friction
             constant, resistance, dry = motor.constants
             by_current = float(actuator.drive == "tension")
@@ -89,7 +97,7 @@ class Actuators:
             # Of N = |x T + tau| at tau = T + friction, T is known from the command.
             by_torque = share * gears.by_load * (1.0 + gears.external_weight)
             overcome = (share * dry, by_torque, gears.by_load, share * gears.viscous, actuator.reversal_speed)
-            motors.append((*electrical, by_current, radius, *overcome))
+            motors.append((*electrical, by_current, actuator.radii[0], *overcome))
             level = (dry, gears.by_load, gears.stribeck, gears.stribeck_by_load)
             shape = (gears.stribeck_velocity, gears.stribeck_exponent, gears.viscous, gears.stiffness)
             gearboxes.append((*level, *shape, gears.driving, gears.driven))
@@ -107,12 +115,23 @@ class Actuators:
             motor=np.array(motors).reshape(-1, len(MOTOR.parameters)).T,
             gearbox=np.array(gearboxes).reshape(-1, len(GEARBOX.parameters)).T,
             external_weight=np.array([each.motor.friction.external_weight for each in actuators]),
+            backlash=np.array([each.motor.friction.backlash for each in actuators]),
         )
 
     @property
     def channels(self) -> NDArray[np.int64]:
         """The input of every motor, that of its first tendon: a tension, or a voltage in position drive; shape (m,)."""
-        return self.tendons[np.argmax(self.spools != 0.0, axis=0)] if self.names else np.zeros(0, dtype=np.int64)
+        return self.tendons[self._first] if self.names else np.zeros(0, dtype=np.int64)
+
+    @property
+    def radius(self) -> Array:
+        """Radius of the spool that winds in the first tendon of every motor, shape (m,), m."""
+        return self.spools[self._first, np.arange(len(self.names))] if self.names else np.zeros(0)
+
+    @property
+    def _first(self) -> NDArray[np.intp]:
+        first: NDArray[np.intp] = np.argmax(self.spools != 0.0, axis=0)
+        return first
 
     @property
     def voltages(self) -> NDArray[np.int64]:
@@ -124,8 +143,26 @@ class Actuators:
         """Tendons that motors in position drive pull."""
         return self.tendons[np.any(self.spools[:, self.holds] != 0.0, axis=1)]
 
+    @property
+    def loose(self) -> NDArray[np.intp]:
+        """Motors whose spool is a mass of its own, as their gears have play, shape (p,)."""
+        return np.flatnonzero(self.backlash)
+
+    @property
+    def loose_names(self) -> tuple[str, ...]:
+        """Names of motors with play, shape (p,)."""
+        return tuple(self.names[motor] for motor in self.loose)
+
+    @property
+    def inertias(self) -> Array:
+        """Inertias of spools with play and of motors, shape (p + m,), kg m2."""
+        spools = _OF_SPOOL * self.inertia[self.loose]
+        rotors = self.inertia.copy()
+        rotors[self.loose] -= spools
+        return np.concatenate([spools, rotors])
+
     def angle(self, position: Array, tension: Array | None = None, excursion: Array | None = None) -> Array:
-        """Return theta_m, shape (..., m), rad, for given tensions of the tendons, the nearest for two on one motor.
+        """Return theta_m, shape (..., m), rad, for given tensions of the tendons, the nearest for several on one motor.
 
         Args:
             position: theta, shape (..., n), rad.
@@ -145,18 +182,27 @@ class Actuators:
         """The tendons that hold a part of their tension, shape (h,)."""
         return np.flatnonzero(self.hysteresis)
 
+    def _torques(self, weight: Array) -> dict[str, Array]:
+        """Return the torques of the tendons on motors, times a weight (m,), as weights of earlier rows, by table."""
+        # Of gears with play it is what their flanks carry.
+        tight = np.where(self.backlash > 0.0, 0.0, weight)[:, None] * self.spools.T
+        flanks = {"backlash": np.diag(weight)[:, self.loose]} if self.loose.size else {}
+        return {**flanks, **self._wired(tight)}
+
     def _wired(self, weights: Array) -> dict[str, Array]:
         """Return weights of the elastic tendons' tensions in later rows, by table, from weights of shape (..., k)."""
         held = {"tendon_hysteresis": weights[..., self.held]} if self.held.size else {}
         return {"elastic_tendons": weights, **held}
 
     def tendon_rows(self, width: int) -> list[Rows]:
-        """Return the tables of elastic tendons and of their hysteresis, for coordinates (theta, p, theta_m)."""
+        """Return the tables of elastic tendons and their hysteresis, for coordinates (theta, p, theta_s, theta_m)."""
         if not self.names:
             return []
         arm = np.zeros((len(self.tendons), width))
         arm[:, : len(self.routing.joints)] = self.routing.coupling[self.tendons]
-        arm[:, width - len(self.names) :] = -self.spools
+        spools = np.arange(width - len(self.names), width)
+        spools[self.loose] = width - len(self.inertias) + np.arange(len(self.loose))
+        arm[:, spools] = -self.spools
         elastic = Rows(
             group="elastic_tendons",
             law=ELASTIC_TENDON,
@@ -171,7 +217,7 @@ class Actuators:
         return [elastic, *hysteresis_rows("tendon_hysteresis", elastic, self.hysteresis, OF_TENDONS, _DAMPING)]
 
     def rotor_rows(self, width: int) -> list[Rows]:
-        """Return the tables of motors and gearboxes."""
+        """Return the tables of motors, of the play of gears, and of gearboxes."""
         if not self.names:
             return []
         count = len(self.names)
@@ -187,15 +233,39 @@ class Actuators:
                 channels=self.channels,
                 powers=(Energy("electrical", "motors' electronics"), Energy("motor_heat", "heat in windings")),
             ),
+            *self._play(width),
             Rows(
                 "gearboxes",
                 GEARBOX,
                 self.names,
                 self.gearbox,
                 turns,
-                inputs=self._wired(self.spools.T) if one_way else {},
-                loads={"motors": np.eye(count), **self._wired(self.external_weight[:, None] * self.spools.T)},
+                inputs=self._torques(np.ones(count)) if one_way else {},
+                loads={"motors": np.eye(count), **self._torques(self.external_weight)},
                 stored=Energy("gearboxes", "gear bristles"),
                 powers=(Energy("gearbox_coulomb", "gears sliding"), Energy("gearbox_viscous", "gears viscous")),
             ),
+        ]
+
+    def _play(self, width: int) -> list[Rows]:
+        """Return the table of the flanks between motors and spools, if any has play."""
+        loose, count = self.loose, len(self.loose)
+        if not count:
+            return []
+        arm = np.eye(count, width, width - len(self.inertias))
+        arm[np.arange(count), width - len(self.names) + loose] = -1.0
+        # Tendons that are all wound in keep to one flank, where the motor's angle is the spool's; else it is amid.
+        gap = self.backlash[loose]
+        lower = np.where(np.any(self.spools[:, loose] < 0.0, axis=0), -0.5 * gap, 0.0)
+        flank = _FLANK * self.gearbox[GEARBOX.parameters.index("stiffness"), loose]
+        return [
+            Rows(
+                "backlash",
+                STROKE_LIMITER,
+                self.loose_names,
+                np.array([lower, lower + gap, flank, np.full(count, _REBOUND)]),
+                arm,
+                stored=_FLANKS,
+                powers=(_FLANKS,),
+            )
         ]

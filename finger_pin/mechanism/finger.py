@@ -102,8 +102,12 @@ class Finger:
         mechanism = Mechanism(
             self.rigid_body,
             [*tables, *(table for table in last if not table.pulls)],
-            (*self.routing.passive_names, *self.actuators.names),
-            np.concatenate([self.tendons.mass, self.actuators.inertia]),
+            (
+                *self.routing.passive_names,
+                *(f"{name}.spool" for name in self.actuators.loose_names),
+                *self.actuators.names,
+            ),
+            np.concatenate([self.tendons.mass, self.actuators.inertias]),
             # Also where a tendon's input goes nowhere: the second one of a spool has none.
             self.routing.actuated,
             moved=description.hand is not None and description.hand.palm.path is not None,
@@ -201,6 +205,8 @@ class Finger:
             state.motor_position[:] = angle(state.position, tension, taken)
             moved = (state.velocity @ self.coupling_at(state.position).T)[: self.routing.actuated]
             state.motor_velocity[:] = angle(state.velocity, None, moved) - angle(state.velocity, None, 0.0 * moved)
+            loose = self.actuators.loose
+            state.spool_position[:], state.spool_velocity[:] = state.motor_position[loose], state.motor_velocity[loose]
         if self.scene is not None:
             state.object_pose[:], state.object_velocity[:] = self.scene.start()
         return x

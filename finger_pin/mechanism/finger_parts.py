@@ -47,8 +47,8 @@ class Parts(NamedTuple):
 
     @property
     def width(self) -> int:
-        """Number of coordinates: joints, masses of passive tendons, motors."""
-        return len(self.routing.joints) + self.routing.passive + len(self.actuators.names)
+        """Number of coordinates: joints, masses of passive tendons, spools with play, motors."""
+        return len(self.routing.joints) + self.routing.passive + len(self.actuators.inertias)
 
     def hysteresis_rows(self) -> tuple[Rows, ...]:
         """Return the tables of the springs' hysteresis."""
@@ -70,7 +70,7 @@ class Parts(NamedTuple):
     ) -> tuple[list[Rows], Canals]:
         """Return the tables of rows in the order of evaluation, and the canals."""
         joints, width = self.routing.joints, self.width
-        pulling: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.names))
+        pulling: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.inertias))
         if paths:
             pulling = [along_paths(description, paths, table) for table in pulling]
         canals = Canals(description, paths, self.tendons, [*of_tree, *pulling], pulled, width)
@@ -155,11 +155,13 @@ def state_layout(
         "object_pose": each(free, "x y z qx qy qz qw"),
         "world_position": world,
         "passive_position": routing.passive_names,
+        "spool_position": motors.loose_names,
         "motor_position": motors.names,
         "velocity": routing.joints,
         "object_velocity": each(free, "vx vy vz wx wy wz"),
         "world_velocity": world,
         "passive_velocity": routing.passive_names,
+        "spool_velocity": motors.loose_names,
         "motor_velocity": motors.names,
         "contact_bend": each(touching, "1 2"),
         "actuator_state": [name for table in of_tree if table.states for name in table.names],

@@ -8,7 +8,8 @@ m motors, h tendons on spools and halves of passive ones with hysteresis, these 
 z: 19 numbers for the paper's finger, which has neither motors nor contacts. States of drives of one's own follow what
 tendons hold, those of other rows of one's own follow all. Where objects stand in the world around a palm that moves,
 the six joints of the world that it sees follow o and o'. Of a tree, states of its actuators follow z, and F^s of the
-tendons that these pull, and of branches behind pulleys, that of the other tendons.
+tendons that these pull, and of branches behind pulleys, that of the other tendons. Spools of motors whose gears have
+play stand before theta_m and theta_m'.
 """
 
 from __future__ import annotations
@@ -64,11 +65,13 @@ class State:
         world_position: Of the world that a palm sees: less its roll, pitch, yaw, rad, x, y and z, m, shape (..., 6);
             (..., 0) where nothing stands there.
         passive_position: p_5, shape (..., p), m.
+        spool_position: theta_s of motors whose gears have play, shape (..., l), rad.
         motor_position: theta_m, shape (..., m), rad.
         velocity: theta', shape (..., n), rad/s.
         object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
         world_velocity: Rate of `world_position`, rad/s and m/s.
         passive_velocity: p_5', shape (..., p), m/s.
+        spool_velocity: theta_s', shape (..., l), rad/s.
         motor_velocity: theta_m', shape (..., m), rad/s.
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
         actuator_state: States of a tree's actuators that have some, shape (..., k).
@@ -89,6 +92,9 @@ class State:
         default=_ZEROS,
         metadata=_of("m", (1e-3,), "passive_position", "position of the lumped mass", "passive_tendon", "13"),
     )
+    spool_position: Array = field(
+        default=_ZEROS, metadata=_of("rad", (1.0,), "spool_position", "angle of a spool behind play", "spool")
+    )
     motor_position: Array = field(
         default=_ZEROS, metadata=_of("rad", (1.0,), "motor_position", "angle of the spool", "motor")
     )
@@ -98,6 +104,9 @@ class State:
     passive_velocity: Array = field(
         default=_ZEROS,
         metadata=_of("m/s", (0.1,), "passive_velocity", "velocity of the lumped mass", "passive_tendon", "13"),
+    )
+    spool_velocity: Array = field(
+        default=_ZEROS, metadata=_of("rad/s", (10.0,), "spool_velocity", "velocity of a spool behind play", "spool")
     )
     motor_velocity: Array = field(
         default=_ZEROS, metadata=_of("rad/s", (10.0,), "motor_velocity", "velocity of the spool", "motor")

@@ -189,13 +189,13 @@ class Tendons:
         return [halves, *hysteresis_rows("passive_hysteresis", halves, shares, OF_TENDONS, _STRETCHING)]
 
     def rows(self, drives: Sequence[Rows] = (), motors: int = 0) -> list[Rows]:
-        """Return the tables of the tendons, for coordinates (theta, p, theta_m).
+        """Return the tables of the tendons, for coordinates (theta, p, theta_s, theta_m).
 
         Halves of passive tendons (12), drives, and driven and passive tendons (14), (16).
 
         Args:
             drives: Motors that pull tendons in place of ideal sources.
-            motors: Number of motors.
+            motors: Number of motors and of spools with play.
         """
         if self.held:
             return self._rows(drives, motors)

@@ -62,7 +62,8 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
     lumps = 0.5 * np.sum(finger.tendons.mass * state.passive_velocity**2, axis=-1)
     found = {_KINETIC.name: motion.kinetic_energy + lumps, _GRAVITY.name: motion.potential_energy, **stored}
     if finger.actuators.names and state.motor_velocity is not None:
-        found[_ROTORS.name] = 0.5 * np.sum(finger.actuators.inertia * state.motor_velocity**2, axis=-1)
+        turning = np.concatenate([state.spool_velocity, state.motor_velocity], axis=-1)
+        found[_ROTORS.name] = 0.5 * np.sum(finger.actuators.inertias * turning**2, axis=-1)
     if isinstance(motion, Motion) and motion.objects is not None:
         found |= dict(zip((each.name for each in _OBJECTS), motion.objects, strict=True))
     return found

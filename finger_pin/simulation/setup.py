@@ -105,8 +105,8 @@ class Setup:
         answers = loop.controller
         sampled = None if sampling is None else SampledController(loop, sampling)
         if positioned:
-            duration = scenario.simulation.duration
-            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
+            duration, start = scenario.simulation.duration, scenario.simulation.start_time
+            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, start)
             loop = replace(loop, drives=drives)
         if sampled is not None:
             loop = replace(loop, controller=sampled)

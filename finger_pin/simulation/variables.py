@@ -174,7 +174,8 @@ def _of_motors(loop: ClosedLoop) -> dict[str, Quantity]:
         return np.asarray(getattr(of.finger.motors, name))
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
-    table = {name: _of_state(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction")}
+    loose = ("spool_position", "spool_velocity") if loop.finger.actuators.loose_names else ()
+    table = {name: _of_state(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction", *loose)}
     table |= {
         name: Quantity(_MOTOR, partial(driven, name=inner), units, long_name, equation)
         for name, inner, units, long_name, equation in (
@@ -301,4 +302,6 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
         found["passive_tendon"] = list(routing.passive_names)
     if finger.actuators.names:
         found["motor"] = ("motor", list(finger.actuators.names), {"long_name": "motor"})
+    if finger.actuators.loose_names:
+        found["spool"] = ("spool", list(finger.actuators.loose_names), {"long_name": "motor of the spool"})
     return found

@@ -33,7 +33,32 @@ WRONG = {
     "two actuators": ({"M": SPOOL, "N": SPOOL}, "N.tendons", "T1 has two sources: M pulls it already"),
     "passive tendon": ({"M": {**SPOOL, "tendons": ["T5"]}}, "M.tendons", "T5 is passive"),
     "unknown tendon": ({"M": {**SPOOL, "tendons": ["T7"]}}, "M.tendons", "actuated are T1, T2, T3, T4"),
-    "twice": ({"M": {**SPOOL, "tendons": ["T1", "T1"], "drive": "position"}}, "M.tendons", "two different tendons"),
+    "twice": ({"M": {**SPOOL, "tendons": ["T1", "T1"], "drive": "position"}}, "M.tendons", "must be different tendons"),
+    "negative radius": (
+        {"M": {**SPOOL, "tendons": ["T1", "T2"], "spool_radius": [0.005, -0.005], "drive": "position"}},
+        "M.spool_radius = [0.005, -0.005]",
+        'winds = ["in", "in"] winds all in together',
+    ),
+    "three tendons": (
+        {"M": {**SPOOL, "tendons": ["T1", "T2", "T3"], "drive": "position"}},
+        "M.winds",
+        'winds = ["in", "in", "in"] winds all in together',
+    ),
+    "first paid out": (
+        {"M": {**SPOOL, "tendons": ["T1", "T2"], "winds": ["out", "in"], "drive": "position"}},
+        "M.winds",
+        '"in" for the first',
+    ),
+    "let go in tension": (
+        {"M": {**SPOOL, "position_loop": {"torque_off": 1.0}}},
+        "M.position_loop.torque_off",
+        "commands of 0 N",
+    ),
+    "one word less": (
+        {"M": {**SPOOL, "tendons": ["T1", "T2"], "winds": ["in"], "drive": "position"}},
+        "M.winds",
+        "for each of T1, T2",
+    ),
     "two in tension": ({"M": {**SPOOL, "tendons": ["T1", "T2"]}}, "M.drive", 'has drive = "position"'),
     "one radius more": ({"M": {**SPOOL, "spool_radius": [0.005, 0.004]}}, "M.spool_radius", "one per tendon: T1"),
     "unknown drive": ({"M": {**SPOOL, "drive": "speed"}}, "M.drive", "tension, position"),

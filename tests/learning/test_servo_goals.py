@@ -1,9 +1,17 @@
 """Actions of a policy that are goals of motors in position drive."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 
 import finger_pin as fp
+from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.learning import Environment, Uniform
+from finger_pin.learning.action import Action
+
+sys.path.append(str(Path(__file__).parents[1] / "mechanism"))
+from servo_cases import SMOOTH, together
 
 COARSE = {"simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
 
@@ -48,3 +56,11 @@ def test_an_episode_of_servos_goes_as_if_it_were_the_first():
         environment.reset(seed=0)
         seen.append([environment.step([0.1, 0.8, 0.9])[0] for _ in range(3)])
     np.testing.assert_array_equal(*seen)
+
+
+def test_a_motor_of_two_cords_can_be_told_to_wind_in_the_one_that_needs_more():
+    """Pulleys of 10 and 4 mm turn by 6 rad on spools of 5 mm: 12 and 4.8 rad, and 20 N stretch a cord by 0.2 rad."""
+    made = together(SMOOTH, [0.010, 0.004], spool_radius=0.005, winds=["in", "in"], drive="position")
+    coupling = PassiveCoupling(np.eye(2), np.zeros(2), ())
+    told = Action("motor_position", made, 1.0, made, coupling)
+    np.testing.assert_allclose([told.low, told.high], [[-12.0], [12.2]], rtol=1e-12)

@@ -49,7 +49,7 @@ def stepped(finger, command, times, *, angle=0.0, spool=None, stiction=0.0, rtol
     start = finger.layout.unpack(x)
     start.gearbox_stiction[:] = stiction
     if spool is not None:
-        start.motor_position[:] = spool
+        start.motor_position[:] = start.spool_position[:] = spool
     sim.x = x
     found, reached = [], 0.0
     for time in times:
@@ -58,3 +58,25 @@ def stepped(finger, command, times, *, angle=0.0, spool=None, stiction=0.0, rtol
         reached, state = time, sim.state
         found.append([state.position[0], state.velocity[0], state.motor_position[0], state.motor_velocity[0]])
     return np.array(found)
+
+
+def together(motor, radii, **actuator):
+    """A chain of joints under springs, a cord each with a pulley of its radius, all on the spool of one motor."""
+    names = ["abcdefgh"[index] for index in range(len(radii))]
+    spring = {"stiffness": 0.2, "damping": 0.02}
+    return fp.Finger(
+        fp.FingerDescription.model_validate(
+            {
+                "name": "together",
+                "gravity": [0.0, 0.0, 0.0],
+                "joints": {name: {"range": [-6.0, 6.0], "spring": spring, "link": LINK} for name in names},
+                "tendons": {
+                    f"cord_{name}": {"crossings": {name: {"radius": radius}}}
+                    for name, radius in zip(names, radii, strict=True)
+                },
+                "tendon_friction": {**NOTHING, "floor": 1e-9},
+                "joint_friction": {**NOTHING, "stiction": 0.0, "floor": 1e-12},
+                "actuators": {"servo": {"motor": motor, "tendons": [f"cord_{name}" for name in names], **actuator}},
+            }
+        )
+    )

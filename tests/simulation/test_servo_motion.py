@@ -14,7 +14,7 @@ from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.mechanism.mechanism import Mechanism
 
 sys.path.append(str(Path(__file__).parents[1] / "mechanism"))
-from servo_cases import INERTIA, LINK, RADIUS, SMOOTH, SPOOL, finger
+from servo_cases import INERTIA, LINK, LINK_INERTIA, RADIUS, SMOOTH, SPOOL, finger, stepped, together
 
 K, D, G = 6000.0 / 0.3, 10.0, 9.81
 
@@ -192,6 +192,109 @@ def test_a_spool_of_two_tendons_works_beside_sampled_tensions_and_closes_the_acc
     np.testing.assert_array_equal(result.spool_tension.sel(tendon="T2"), result.tendon_command.sel(tendon="T2"))
     exchanged = sum(float(abs(result[name]).max()) for name in result if str(name).startswith("energy_exchanged"))
     assert float(abs(result.energy_residual).max()) < 1e-6 * exchanged
+
+
+def test_cords_of_one_motor_are_wound_in_together_or_paid_out_each_by_its_radius():
+    """At a spool angle phi a cord of radius r on a pulley R turns a spring k by K R (e0 + r phi) / (k + K R^2)."""
+    pulley, spool = np.array([0.010, 0.008, 0.006]), np.array([0.005, 0.004, 0.003])
+    wound = {"spool_radius": spool.tolist(), "winds": ["in", "in", "out"], "pretension": [0.0, 0.0, 60.0]}
+    made = together(SMOOTH, pulley, drive="position", **wound)
+    turn = {"kind": "ramp", "time": 0.0, "duration": 0.2, "height": 0.4}
+    result = fp.simulate(scenario(made, 2.0, reference={"joints": {"a": turn, "b": turn}}))
+    phi, ways = float(result.motor_position[-1, 0]), np.array([1.0, 1.0, -1.0])
+    expected = K * pulley * ([0.0, 0.0, 60.0 / K] + ways * spool * phi) / (0.2 + K * pulley**2)
+    assert phi > 0.3 and expected.min() > 0.05
+    np.testing.assert_allclose(result.joint_position[-1], expected, atol=1e-5)
+    supplied = float(abs(result.energy_exchanged_electrical).max())
+    assert float(abs(result.energy_residual).max()) < 1e-6 * supplied
+
+
+def loose(gap, **actuator):
+    """A joint between two cords on one spool, of a motor whose gears have play."""
+    motor = {**SMOOTH, "friction": {"coulomb": 0.0, "backlash": gap, "stiffness": 50.0}}
+    return finger(motor, opposed=True, drive="position", pretension=3.0, **actuator)
+
+
+def test_a_spool_behind_play_moves_between_cords_and_flanks_as_scipy_has_it():
+    """J_s s'' = T - r (f1 - f2), J_r m'' = tau - T; T from flanks of 10 sigma_0 that only push, J_s a 1e-4 of J."""
+    gap, flank, rebound, spool = 0.05, 500.0, 1.0, 1e-4 * INERTIA
+
+    def rate(_, x):
+        q, s, m, dq, ds, dm = x
+        pulls = [
+            max(0.0, K * (3.0 / K + way * (SPOOL * s - RADIUS * q)) + D * way * (SPOOL * ds - RADIUS * dq))
+            for way in (1.0, -1.0)
+        ]
+        depth, way = abs(s - m) - 0.5 * gap, np.sign(s - m)
+        borne = -way * flank * max(depth, 0.0) * max(1.0 + rebound * way * (ds - dm), 0.0)
+        net = pulls[0] - pulls[1]
+        driven = -(0.4**2) / 3.0 * dm
+        return [
+            dq,
+            ds,
+            dm,
+            RADIUS * net / LINK_INERTIA,
+            (borne - SPOOL * net) / spool,
+            (driven - borne) / (INERTIA - spool),
+        ]
+
+    times, start = np.linspace(0.0, 0.3, 31), [0.06, 0.0, 0.0, 0.0, 0.0, 0.0]
+    expected = solve_ivp(rate, (0.0, 0.3), start, "Radau", times, rtol=1e-9, atol=1e-11, max_step=1e-4).y
+    found = stepped(loose(gap), [0.0, 0.0], times, angle=0.06, spool=0.0)
+    np.testing.assert_allclose(found[:, [0, 2]].T, expected[[0, 2]], atol=1e-5)
+    assert np.ptp(expected[1] - expected[2]) > gap and np.ptp(expected[0]) > 0.08
+
+
+def test_play_adds_its_gap_to_the_swing_of_a_joint_and_closes_the_account():
+    """Pushed or pulled at rest, the pulley swings by the gap times r / R more, whatever the cords and flanks give."""
+    gap, ends, push = 0.0175, {}, 0.05
+    for b in (0.0, gap):
+        for way in (1.0, -1.0):
+            made = loose(b, tendon_damping=50.0)
+            result = fp.simulate(scenario(made, 1.0, environment={"fingertip_force": [0.0, way * push, 0.0]}))
+            ends[b, way] = result.joint_position.values[-1, 0] - SPOOL / RADIUS * result.motor_position.values[-1, 0]
+            supplied = sum(float(abs(result[name]).max()) for name in result if name.startswith("energy_exchanged"))
+            assert float(abs(result.energy_residual).max()) < 1e-6 * supplied
+            # Gears without friction carry what the motor holds, twice.
+            torque = push * LINK["length"] * SPOOL / RADIUS
+            assert float(result.gearbox_load[-1, 0]) == pytest.approx(2.0 * torque, rel=1e-3)
+    more = [abs(ends[gap, way] - ends[0.0, way]) for way in (1.0, -1.0)]
+    flanks = 2.0 * push * LINK["length"] * SPOOL / RADIUS / 500.0
+    assert sum(more) == pytest.approx(SPOOL / RADIUS * (gap + flanks), rel=1e-3)
+
+
+def test_gears_whose_cords_are_all_wound_in_show_no_play():
+    """Cords keep the spool at one flank, so that the joint comes to rest where it does without play."""
+    friction = [{"coulomb": 0.0, "backlash": gap} for gap in (0.0, 0.1)]
+    made = [together({**SMOOTH, "friction": each}, [0.01], spool_radius=SPOOL) for each in friction]
+    ended = [stepped(each, [8.0], [4.0])[0, 0] for each in made]
+    assert ended[1] == pytest.approx(ended[0], abs=1e-5) and ended[0] > 0.3
+
+
+def test_a_servo_that_is_let_go_carries_no_current_and_is_turned_back_through_its_gears():
+    """From 0.3 s on J m'' = -b m' - r f alone, continued by scipy from there; U is what the motor induces."""
+    viscous, stiff, damped, pulley = 2e-3, 0.2, 0.02, 0.01
+    motor = {**SMOOTH, "friction": {"coulomb": 0.0, "viscous": viscous}}
+    loop = {"proportional": 9.2, "torque_off": 0.3}
+    made = together(motor, [pulley], spool_radius=SPOOL, drive="position", position_loop=loop)
+    turn = {"kind": "ramp", "time": 0.0, "duration": 0.2, "height": 0.4}
+    result = fp.simulate(scenario(made, 0.6, reference={"joints": {"a": turn}})).sel(time=slice(0.3 - 1e-9, None))
+
+    def rate(_, x):
+        q, m, dq, dm = x
+        pull = max(0.0, K * (SPOOL * m - pulley * q) + D * (SPOOL * dm - pulley * dq))
+        turned = (pulley * pull - stiff * q - damped * dq) / LINK_INERTIA
+        return [dq, dm, turned, (-viscous * dm - SPOOL * pull) / INERTIA]
+
+    names = ("joint_position", "motor_position", "joint_velocity", "motor_velocity")
+    found, times = np.array([result[name].values[:, 0] for name in names]), result.time.values
+    exact = solve_ivp(rate, times[[0, -1]], found[:, 0], "Radau", times, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(found[:2], exact.y[:2], atol=1e-6)
+    assert found[1, 0] > 0.5 and found[1, -1] < 0.4
+    np.testing.assert_array_equal(result.motor_current, 0.0)
+    np.testing.assert_allclose(result.motor_voltage, 0.4 * result.motor_velocity, rtol=1e-12)
+    supplied = float(abs(result.energy_exchanged_electrical).max())
+    assert float(abs(result.energy_residual).max()) < 1e-6 * supplied
 
 
 def test_hands_of_servos_fall_into_islands_that_move_as_each_does_alone():

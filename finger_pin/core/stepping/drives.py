@@ -18,6 +18,7 @@ from finger_pin.core.jit import (
 )
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.rosenbrock import ADVANCE_ARGS, DONE, FULL, INTEGRATION
+from finger_pin.laws.motor import OPEN_CIRCUIT
 
 
 class Drives(NamedTuple):
@@ -32,6 +33,7 @@ class Drives(NamedTuple):
         resolution: Step of the measured angles, 0 for none, shape (m,), rad.
         gains: k_p, k_d, k_i, shape (3, m).
         supply: V, shape (m,), V.
+        torque_off: Times from which on no current flows, shape (m,), s.
         taken: Memory, the number of samples so far, shape (1,).
         integral: Memory, int e, shape (m,).
         last: Memory, e of the last sample, shape (m,).
@@ -46,6 +48,7 @@ class Drives(NamedTuple):
     resolution: Vector
     gains: Matrix
     supply: Vector
+    torque_off: Vector
     taken: Indices
     integral: Vector
     last: Vector
@@ -89,6 +92,8 @@ def _sample(drives: Any, x: Vector, tension: Vector) -> None:
             # The integral stands still while the supply is at its limit.
             drives.integral[j] = summed
         voltage = drives.supply[j] * min(max(duty, -1.0), 1.0)
+        if drives.taken[0] * drives.period * (1.0 + 1e-12) >= drives.torque_off[j]:
+            voltage = OPEN_CIRCUIT
         # Until the next one is taken, perhaps never.
         drives.voltages[k, j] = drives.voltages[min(k + 1, last), j] = voltage
         tension[drives.channels[j]] = voltage
