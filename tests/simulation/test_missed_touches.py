@@ -126,7 +126,7 @@ def test_what_sleeps_and_is_met_and_left_within_one_step_is_met():
     thin = scene(1.0, {"plate": plate(0.005, 30.0, 0.0, -1.0075), "ball": ball(30.0, 0.0, 0.0)})
     (part,) = (each for each in Setup.of(thin).stepper().parts if len(each.objects))
     width = len(part.tables.prescribed)
-    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.culled[: part.tables.touching])
+    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.culled[: part.tables.contact_rows])
     # Only the ball is integrated as exactly as ever, so that nothing else makes this step short.
     exact = np.concatenate([part.objects, width + part.objects])
     part.atol[np.setdiff1d(np.arange(len(part.atol)), exact)] = 1.0
