@@ -9,7 +9,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.position_drive import PositionDrives
+from finger_pin.control.position_drive import PositionDrives, wound_spools
 from finger_pin.description.loading import list_scenarios, read_scenario, to_toml
 from finger_pin.exceptions import InputError
 
@@ -120,7 +120,11 @@ class Acts:
         yield np.array([loop.finger.layout == self.layout])
         yield from (loop.initial_state(), loop.knots(1e-6), scenario.sample_times())
         if np.any(loop.finger.actuators.holds):
-            drives = PositionDrives(loop.finger, loop.controller, loop.reference, scenario.simulation.duration).compiled
+            wound, settings = wound_spools(scenario, loop.finger), scenario.simulation
+            made = PositionDrives(
+                loop.finger, loop.controller, loop.reference, settings.duration, settings.start_time, wound
+            )
+            drives = made.compiled
             yield from (
                 np.asarray(getattr(drives, name)) for name in ("goals", "gains", "period", "resolution", "supply")
             )
