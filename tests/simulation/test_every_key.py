@@ -45,6 +45,7 @@ HAND = """
 """
 
 
+_SINE = ("amplitude", "frequency", "phase")
 _WAVE = {"offset": 0.05, "amplitude": 0.2, "frequency": 20.0, "phase": 0.3}
 
 
@@ -61,7 +62,8 @@ def imported():
 
 # `pour` is `hand` with more of the objects of `grasp`, and takes as long as all others together.
 SCENARIOS = {name: partial(fp.load_scenario, name) for name in list_scenarios() if name != "pour"} | {
-    "imported": imported
+    "imported": imported,
+    "wound": partial(fp.load_scenario, "wound", {f"controller.spool_angle.servo.{key}": 0.3 for key in _SINE}),
 }
 
 
