@@ -119,7 +119,7 @@ def build_problem(
     signals: list[RecordedSignal] = []
     for recording in taken:
         if recording.settings.kind == "steady":
-            models.append(SteadyReadings(recording, scenario))
+            models.append(SteadyReadings(recording, scenario, finger))
             parts = [np.arange(len(recording.speed))]
         else:
             parts = list(windows(recording))

@@ -46,7 +46,9 @@ class RecordingSettings(Description):
     inputs: dict[str, Column] = Field({}, description="Columns that feed the model, by variable.label.")
     outputs: dict[str, Column] = Field(min_length=1, description="Columns that it is compared with, by variable.label.")
     speed: Column | float | None = Field(
-        None, description="Steady: of sliding, m/s, positive as the tendon is drawn in; a number or a column."
+        None,
+        description="Steady: of sliding, m/s, positive as the tendon is drawn in; a number or a column. Left out, "
+        "postures (joint_position) are those without friction.",
     )
     at_rest: bool = Field(False, strict=True, description="Steady: read at rest, after having slid at that speed.")
     time: Column | None = Field(None, description="Motion: the column of times.")
@@ -70,7 +72,7 @@ class RecordingSettings(Description):
                 if not all(name.partition(".")[::2]):
                     raise problem(f"{group}.{name}", "must be variable.label, such as tendon_tension.T1")
         if self.kind == "steady":
-            if self.speed is None:
+            if self.speed is None and not all(name.startswith("joint_position.") for name in self.outputs):
                 raise problem("speed", "is missing: of sliding, m/s, positive where the tendon is drawn in")
             for name in ("time", "window"):
                 if getattr(self, name) is not None:
