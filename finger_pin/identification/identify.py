@@ -23,8 +23,9 @@ from finger_pin.identification.pipeline import FitPipeline, Progress, starting_p
 from finger_pin.identification.problem import Problem, RecordingModel, Stopped
 from finger_pin.identification.recordings import RecordedSignal, Recording, read_recording, unit_of
 from finger_pin.identification.results import results, write_results
+from finger_pin.identification.scenario_parameters import with_own_values
 from finger_pin.identification.steady_data import SteadyReadings
-from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
+from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.studies.fingerprint import finger_digest
 from finger_pin.typing import Array
@@ -118,20 +119,23 @@ def build_problem(
     models: list[RecordingModel] = []
     signals: list[RecordedSignal] = []
     for recording in taken:
+        own = with_own_values(scenario, recording.name, recording.settings)
+        replacing = None if finger is None else fitted(finger, scenario, own)
         if recording.settings.kind == "steady":
-            models.append(SteadyReadings(recording, scenario, finger))
+            models.append(SteadyReadings(recording, own, replacing))
             parts = [np.arange(len(recording.speed))]
         else:
             parts = list(windows(recording))
-            models += [RecordedMotion(recording, scenario, rows, k, finger) for k, rows in enumerate(parts)]
+            models += [RecordedMotion(recording, own, rows, k, replacing) for k, rows in enumerate(parts)]
         signals += [
             _signal(recording, name, values, rows) for rows in parts for name, values in recording.outputs.items()
         ]
-    low, high = np.array(list(settings.parameters.values()), dtype=float).T
+    bounds = settings.bounds
+    low, high = np.array(list(bounds.values()), dtype=float).T
     count = sum(len(signal.measured) for signal in signals)
     if count <= len(low):
         raise InputError("identify.recordings", f"have {count} readings for {len(low)} parameters: more are needed")
-    return Problem(scenario, tuple(settings.parameters), low, high, models, signals, {})
+    return Problem(scenario, tuple(bounds), low, high, models, signals, {})
 
 
 def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.intp]) -> RecordedSignal:

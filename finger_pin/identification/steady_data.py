@@ -95,17 +95,22 @@ class SteadyReadings:
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of the outputs by the values, shape (m, p) each; by differences."""
-        columns = []
+        columns, here = [], at(values)
+        computed = self.compute(*here)
+
+        def end(k: int, change: float) -> tuple[float, list[Array]]:
+            moved = values.copy()
+            moved[k] += change
+            try:
+                there = at(moved)
+                # What is of another recording changes nothing.
+                return moved[k], computed if there == here else self.compute(*there)
+            except InputError:
+                # At the edge of what is allowed there is one side only.
+                return values[k], computed
+
         for k, size in enumerate(_CHANGE * sizes):
-            ends = []
-            for change in (size, -size):
-                moved = values.copy()
-                moved[k] += change
-                try:
-                    ends.append((moved[k], self.compute(*at(moved))))
-                except InputError:
-                    # At the edge of what is allowed there is one side only.
-                    ends.append((values[k], self.compute(*at(values))))
+            ends = [end(k, change) for change in (size, -size)]
             (right, up), (left, down) = ends
             columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]

@@ -12,7 +12,7 @@ import xarray as xr
 
 from finger_pin.files import write_text
 from finger_pin.views.document import document, image
-from finger_pin.views.plots.identification import plot_identification, plot_profiles
+from finger_pin.views.plots.identification import plot_identification, plot_profiles, short_name
 
 
 def summarize_identification(result: xr.Dataset) -> str:
@@ -166,4 +166,4 @@ def _correlations(result: xr.Dataset) -> str:
     names = [str(each) for each in result["parameter"].values]
     values = result["correlation"].values
     rows = [(name, *(f"{value:.2f}" for value in row)) for name, row in zip(names, values, strict=True)]
-    return _table(["", *(".".join(name.split(".")[-2:]) for name in names)], rows)
+    return _table(["", *map(short_name, names)], rows)

@@ -9,6 +9,10 @@ from pydantic import Field, model_validator
 
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
 
+#: What a parameter of one recording begins with, before its name.
+OF_RECORDINGS = "recordings."
+Bounds = dict[str, Annotated[tuple[float, float], vector(2)]]
+
 
 class Column(Description):
     """A column of a recording: SI value = scale times the number in its unit, plus offset; in a file a name will do."""
@@ -65,8 +69,15 @@ class RecordingSettings(Description):
         0.0, unit="s", source="chosen", doc="Motion: run before what is compared, as bristles begin relaxed."
     )
 
+    values: dict[str, Any] = Field({}, description="By dotted key of the scenario, what holds for this one alone.")
+    parameters: Bounds = Field({}, description="As identify.parameters, what is found for this one alone.")
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        _check_ordered(self.parameters)
+        for key, value in self.values.items():
+            if isinstance(value, dict):
+                raise problem(f"values.{key}", "must be one value, not a table: write its dotted key in quotes")
         for group in ("inputs", "outputs"):
             for name in getattr(self, group):
                 if not all(name.partition(".")[::2]):
@@ -90,17 +101,35 @@ class RecordingSettings(Description):
 class IdentifySettings(Description):
     """The table ``[identify]`` of a scenario: the numbers to be found, the recordings, and rival laws."""
 
-    parameters: dict[str, Annotated[tuple[float, float], vector(2)]] = Field(
-        min_length=1, description="By dotted key of the scenario, the least and the greatest value."
-    )
+    parameters: Bounds = Field({}, description="By dotted key of the scenario, the least and the greatest value.")
     recordings: dict[Name, RecordingSettings] = Field(min_length=1, description="What was recorded, by name.")
     compare: dict[str, dict[str, Any]] = Field(
         {}, description="Other laws, by name: keys with a number that is held, or with bounds."
     )
 
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """The bounds of all that is found, by key; what is of one recording begins with its name."""
+        own = {
+            f"{OF_RECORDINGS}{name}.{key}": each
+            for name, recording in self.recordings.items()
+            for key, each in recording.parameters.items()
+        }
+        return self.parameters | own
+
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        for key, (low, high) in self.parameters.items():
-            if low >= high:
-                raise problem(f"parameters.{key}", "the least value must be below the greatest", [low, high])
+        _check_ordered(self.parameters)
+        if not self.bounds:
+            raise problem("parameters", "is missing: by dotted key of the scenario, the least and the greatest value")
+        for name, recording in self.recordings.items():
+            for key in recording.parameters:
+                if f"{OF_RECORDINGS}{name}.{key}" in self.parameters:
+                    raise problem(f"recordings.{name}.parameters.{key}", "stands in identify.parameters too")
         return self
+
+
+def _check_ordered(bounds: Bounds) -> None:
+    for key, (low, high) in bounds.items():
+        if low >= high:
+            raise problem(f"parameters.{key}", "the least value must be below the greatest", [low, high])

@@ -97,7 +97,12 @@ def _profile(axes: Axes, one: xr.Dataset) -> None:
             axes.axvline(end, color=GREY, linewidth=0.8)
     axes.plot([estimate], [0.0], "o", color=VERMILLION, markersize=5.0)
     unit = str(one["units"].values)
-    key = str(one["parameter"].values)
-    axes.set_title(".".join(key.split(".")[-2:]), color=BLACK)
+    axes.set_title(short_name(str(one["parameter"].values)), color=BLACK)
     axes.locator_params(axis="x", nbins=3)
     axes.set(xlabel="" if unit == "1" else f"({unit})", ylim=(-0.3, max(8.0, 1.2 * _LEVEL)))
+
+
+def short_name(key: str) -> str:
+    """Return the end of a parameter's key, after the name of its recording if it is of one."""
+    parts = key.split(".")
+    return f"{parts[1]}: {'.'.join(parts[-2:])}" if parts[0] == "recordings" else ".".join(parts[-2:])
