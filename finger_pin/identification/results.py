@@ -61,6 +61,7 @@ def results(
     alike = sum(each < least + LEVEL for each in met)
     attrs = {
         "scenario": problem.scenario.name,
+        "scenario_toml": to_toml(problem.scenario),
         "undetermined": [words for words, _ in free],
         "searches": len(fits),
         "searches_alike": alike,
@@ -160,7 +161,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
         "signal_units": ("signal", [signals[k].unit for k in first]),
         "signal_steady": ("signal", [not signals[k].ordered for k in first]),
         "noise": ("signal", best.noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
-        "replicate_noise": ("signal", [_replicates(signals[k]) for k in first], {"long_name": "rms of equal readings"}),
+        "replicate_noise": ("signal", [replicates(signals[k]) for k in first], {"long_name": "rms of equal readings"}),
         "signal_samples": ("signal", np.bincount(whole["signal_index"], minlength=len(first))),
         "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
@@ -168,7 +169,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
     }
 
 
-def _replicates(signal: RecordedSignal) -> float:
+def replicates(signal: RecordedSignal) -> float:
     """Return the scatter of repeated readings about their mean, rms."""
     groups = signal.alike
     if signal.ordered or groups.max() + 1 == len(groups):

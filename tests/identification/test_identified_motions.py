@@ -9,8 +9,8 @@ import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.recordings.bench import RecordingSettings
-from finger_pin.identification.identify import build_problem
 from finger_pin.identification.limits import Limits
+from finger_pin.identification.models import build_problem
 from finger_pin.identification.motions import windows
 from finger_pin.identification.problem import minus_twice_likelihood
 from finger_pin.identification.recordings import read_recording

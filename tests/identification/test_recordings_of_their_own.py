@@ -6,7 +6,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.identification.checkpoint import digest
-from finger_pin.identification.identify import build_problem
+from finger_pin.identification.models import build_problem
 from finger_pin.identification.recordings import read_recording
 from finger_pin.views.report import summarize_identification
 

@@ -5,13 +5,22 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
 
 #: What a parameter of one recording begins with, before its name.
 OF_RECORDINGS = "recordings."
 Bounds = dict[str, Annotated[tuple[float, float], vector(2)]]
+
+
+def _held_out(value: Any) -> bool | tuple[float, float]:
+    if isinstance(value, bool):
+        return value
+    numbers = isinstance(value, list | tuple) and len(value) == 2 and {*map(type, value)} <= {int, float}
+    if not numbers or not 0.0 <= value[0] < value[1] < math.inf:
+        raise problem("", "must be true, or the first and the last second of a part, such as [2.0, 3.0]", value)
+    return float(value[0]), float(value[1])
 
 
 class Column(Description):
@@ -72,8 +81,14 @@ class RecordingSettings(Description):
     values: dict[str, Any] = Field({}, description="By dotted key of the scenario, what holds for this one alone.")
     parameters: Bounds = Field({}, description="As identify.parameters, what is found for this one alone.")
 
+    held_out: Annotated[bool | tuple[float, float], BeforeValidator(_held_out)] = Field(
+        False, description="Whether it, or what lies between two times in s from its start, is predicted, not fitted."
+    )
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.held_out is True and self.parameters:
+            raise problem("parameters", "are for a recording that is fitted, and this one is held out")
         _check_ordered(self.parameters)
         for key, value in self.values.items():
             if isinstance(value, dict):
@@ -88,6 +103,8 @@ class RecordingSettings(Description):
             for name in ("time", "window"):
                 if getattr(self, name) is not None:
                     raise problem(name, "is for motions only")
+            if isinstance(self.held_out, tuple):
+                raise problem("held_out", "must be true or false: only a motion has parts", list(self.held_out))
             if isinstance(self.speed, float) and (not math.isfinite(self.speed) or self.speed == 0.0):
                 raise problem("speed", "must be finite and not zero: friction has the sign of sliding", self.speed)
         else:
@@ -122,6 +139,8 @@ class IdentifySettings(Description):
         _check_ordered(self.parameters)
         if not self.bounds:
             raise problem("parameters", "is missing: by dotted key of the scenario, the least and the greatest value")
+        if all(recording.held_out is True for recording in self.recordings.values()):
+            raise problem("recordings", "are all held out: none is left to be fitted")
         for name, recording in self.recordings.items():
             for key in recording.parameters:
                 if f"{OF_RECORDINGS}{name}.{key}" in self.parameters:
