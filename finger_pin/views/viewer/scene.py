@@ -97,6 +97,8 @@ class Scene:
         self.geometry = shown(finger)
         description = self.geometry.description
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
+        bodies = description.tree
+        self._slides = [name for name, joint in bodies.joints.items() if joint.kind == "slide"] if bodies else []
         self.strands = (*description.actuated_names, *halves)
         self._widths, size = self.geometry.widths, self.geometry.size
         self._size = size
@@ -161,6 +163,7 @@ class Scene:
             "forces": shown.note if shown is not None else "",
             "links": link_names(geometry),
             "joints": list(geometry.description.joints),
+            "slides": self._slides,
             "strands": list(self.strands),
             "tendons": self.tendons,
             "tubeRadius": tube,

@@ -101,7 +101,10 @@ class Player {
       value.textContent = slack ? "slack" : this.hand ? tensions[i].toFixed(1) : `${tensions[i].toFixed(2)} N`;
       value.classList.toggle("slack", slack);
     });
-    this.angles.forEach((cell, i) => { cell.textContent = degrees(angles[i], this.hand ? 0 : 1); });
+    this.angles.forEach((cell, i) => {
+      const slides = this.config.slides.includes(this.config.joints[i]);
+      cell.textContent = slides ? `${(1e3 * angles[i]).toFixed(1)} mm` : degrees(angles[i], this.hand ? 0 : 1);
+    });
   }
 
   refresh() {
