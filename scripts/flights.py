@@ -47,11 +47,11 @@ def fly(flight: Flight, method: str, tolerance: float) -> tuple[Trajectory, Arra
         links = [link_solid("joint", "link", joint, Link(length=0.1, width=0.01, mass=0.1), True)]
     body = add_free_objects(RigidBody(model, []), flight.objects)
     width = body.model.nv
-    guided = np.full(width, -1)
+    prescribed = np.full(width, -1)
     if flight.path is not None:
-        guided[:6] = np.arange(6)
+        prescribed[:6] = np.arange(6)
     rows = contact_rows([*links, *object_solids(flight.objects, body)], width)
-    mechanism = Mechanism(body, [rows], guided=guided)
+    mechanism = Mechanism(body, [rows], prescribed=prescribed)
     start, moving = np.zeros(mechanism.size), len(links)
     start[: body.model.nq] = flight.exact(np.zeros(1))[0]
     velocity = start[body.model.nq :]

@@ -1,6 +1,8 @@
 """The layout of the package, read from its own imports."""
 
 import ast
+import re
+import tomllib
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -23,3 +25,11 @@ def test_no_file_imports_itself_through_others():
     # A cycle is an error of the sorter, which names it.
     order = tuple(TopologicalSorter({name: imported(path) for name, path in MODULES.items()}).static_order())
     assert set(order) == set(MODULES)
+
+
+def test_the_version_is_the_newest_of_the_changes_and_the_one_to_cite():
+    root = PACKAGE.parent
+    version = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    changes = (PACKAGE / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (.*)$", changes, re.MULTILINE)[0] == version
+    assert f"version: {version}\n" in (root / ".github" / "CITATION.cff").read_text(encoding="utf-8")

@@ -96,7 +96,7 @@ def pin_wrench(
         pull = strands[:, routing.strand(cut.tendon, distal=cut.distal), None] * (turn @ cut.direction)
         tendons[:, j] += pull
         moment[:, j] += np.cross(turn @ cut.point + links.translation[:, cut.link] - origin[:, j], pull)
-    directions = np.einsum("mjrc,jc->mjr", links.rotation[:, body.carriers[1:]], body.proximal_axes[1:])
+    directions = np.einsum("mjrc,jc->mjr", links.rotation[:, body.parent_links[1:]], body.proximal_axes[1:])
     return PinWrench(
         axis=links.rotation[:, 1:, :, 2],
         paper=directions * (strands @ routing.loads.T)[..., None],

@@ -180,8 +180,8 @@ class ClosedLoop:
 
     def knots(self, tolerance: float) -> Array:
         """Return the times at which a signal bends or jumps by more than a relative tolerance, s, in order."""
-        guided = [each and each.signal for each in (self.palm, self.guides)]
-        other = [each for each in (self.varying_force, *guided) if each]
+        prescribed = [each and each.signal for each in (self.palm, self.guides)]
+        other = [each for each in (self.varying_force, *prescribed) if each]
         signals = (*self.reference.signals(), *self.controller.signals(), *other)
         return _knots(signals, tolerance).copy()
 

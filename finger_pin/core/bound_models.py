@@ -30,7 +30,7 @@ from finger_pin.typing import Array
 FEW = 1000
 
 
-class Room(NamedTuple):
+class SignalBuffer(NamedTuple):
     """Output buffers of `evaluate_many` for m states.
 
     The rows are those of more states, these from the ``first`` on: compiled code takes them whole; ``column`` is the
@@ -47,12 +47,12 @@ class Room(NamedTuple):
     booked: Array
     touches: Array
 
-    def part(self, at: slice) -> Room:
-        """Return the room of some of the states, the same memory."""
+    def part(self, at: slice) -> SignalBuffer:
+        """Return the buffer of some of the states, the same memory."""
         first = self.first + at.indices(len(self.packed))[0]
         own = (self.packed, self.rates, self.torques, self.externals, self.booked, self.touches)
         packed, rates, torques, externals, booked, touches = (values[at] for values in own)
-        return Room(packed, rates, self.rows, first, self.column, torques, externals, booked, touches)
+        return SignalBuffer(packed, rates, self.rows, first, self.column, torques, externals, booked, touches)
 
     def states(
         self, at: slice, model: int, states: Array, commands: Array, forces: Array, bases: Array, attitudes: Array
@@ -140,7 +140,7 @@ class Models:
         """
         if (loaded, thread) not in self._known:
             tables = self.tables
-            own = copied(tables)._replace(loaded=loaded)
+            own = copied(tables)._replace(has_tip_force=loaded)
             work = build_work(own, self._laws, self._channels)
             control = held_control(self._channels, len(work.torque))
             self._known[loaded, thread] = BoundModel(own, control, work, self._moved, False)
@@ -148,24 +148,30 @@ class Models:
 
 
 def fill(
-    models: Models, room: Room, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
+    models: Models,
+    buffer: SignalBuffer,
+    states: Array,
+    attitudes: Array,
+    commands: Array,
+    forces: Array,
+    base: Array | None,
 ) -> None:
-    """Fill a room with the signals of states of the core.
+    """Fill a buffer with the signals of states of the core.
 
     Args:
         models: Of the mechanism.
-        room: What is filled.
+        buffer: What is filled.
         states: Shape (m, size), of the core.
         attitudes: Of free bodies, shape (m, f, 4).
         commands: Inputs, shape (m, u).
         forces: At the tips, shape (m, t, 3), N.
         base: Motion of the base, as for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
     """
-    bases = path_motions(base, len(states), int(models.tables.guided.max(initial=-1)) + 1)
+    bases = path_motions(base, len(states), int(models.tables.prescribed.max(initial=-1)) + 1)
     loaded, count = bool(np.any(forces)), len(states)
 
     def fill_part(model: BoundModel, part: slice) -> None:
-        asked = room.states(part, model.address, states, commands, forces, bases, attitudes)
+        asked = buffer.states(part, model.address, states, commands, forces, bases, attitudes)
         call(evaluate_many, asked, STATES)
 
     if count < FEW or threads() < 2:
@@ -176,12 +182,12 @@ def fill(
         in_threads(lambda each: fill_part(*each), list(zip(pair, (slice(half), slice(half, None)), strict=True)))
 
 
-def path_motions(base: Array | None, count: int, guided: int) -> Array:
-    """Return the motions of the base and of the guided coordinates, shape (count, 15 + g), or no rows at rest."""
+def path_motions(base: Array | None, count: int, prescribed: int) -> Array:
+    """Return the motions of the base and of the prescribed coordinates, shape (count, 15 + g), or no rows at rest."""
     if base is None:
-        return np.zeros((0, 15 + guided))
-    given = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + guided]], axis=-1)
-    return rows_of(given, (count, 15 + guided))
+        return np.zeros((0, 15 + prescribed))
+    given = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + prescribed]], axis=-1)
+    return rows_of(given, (count, 15 + prescribed))
 
 
 def rows_of(values: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -78,7 +78,7 @@ class Work(NamedTuple):
 
 def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) -> Work:
     """Allocate the memory for tables whose rows follow some laws."""
-    size, count, width, tips = len(tables.parents), len(tables.state), len(tables.guided), len(tables.tip_body)
+    size, count, width, tips = len(tables.parents), len(tables.state), len(tables.prescribed), len(tables.tip_body)
     columns, powers = widest(laws)
     work = Work(
         rotation=np.zeros((size, 3, 3)),
@@ -109,8 +109,8 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         bias=np.zeros(width),
         acceleration=np.zeros(width),
         command=np.zeros(channels),
-        guide=np.zeros(int(tables.guided.max(initial=-1)) + 1),
-        guide_rate=np.zeros(int(tables.guided.max(initial=-1)) + 1),
+        guide=np.zeros(int(tables.prescribed.max(initial=-1)) + 1),
+        guide_rate=np.zeros(int(tables.prescribed.max(initial=-1)) + 1),
         paths=build_path_work(tables.paths, count, width),
     )
     # No path and no moving body changes these.
@@ -163,9 +163,9 @@ class Blocks(NamedTuple):
 
 def build_blocks(tables: Tables, control: InputTable) -> Blocks:
     """Return the blocks of tables while nothing touches."""
-    count, width, states = len(tables.state), len(tables.guided), len(tables.state_row)
+    count, width, states = len(tables.state), len(tables.prescribed), len(tables.state_row)
     atom, row_atom, atoms = np.zeros(width, dtype=np.int64), np.zeros(count, dtype=np.int64), 1
-    if tables.touching:
+    if tables.contact_rows:
         islands = find_islands(tables, control, False)
         atoms = len(islands)
         for index, island in enumerate(islands):
@@ -185,7 +185,7 @@ def build_blocks(tables: Tables, control: InputTable) -> Blocks:
         row_start=np.array([0, *[count] * atoms]),
         rows=np.arange(count),
         touch_start=room(atoms + 1),
-        touches=room(tables.touching // 3),
+        touches=room(tables.contact_rows // 3),
         state_start=np.array([0, *[states] * atoms]),
         states=np.arange(states),
         place=np.arange(width),
@@ -256,7 +256,7 @@ class Linear(NamedTuple):
 
 def build_linear(tables: Tables, control: InputTable) -> Linear:
     """Allocate the linearisation of tables."""
-    count, width, states = len(tables.state), len(tables.guided), len(tables.state_row)
+    count, width, states = len(tables.state), len(tables.prescribed), len(tables.state_row)
     wide = 2 * width + states + 1
     linear = Linear(
         mass=np.zeros((width, width)),

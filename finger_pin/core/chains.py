@@ -21,7 +21,7 @@ PRISMATIC = 1
 
 _STILL = 1e-8
 _UPPER = np.triu_indices(3)
-# Farther than anything slides, m, but for what is led.
+# Farther than anything slides, m, but for what is moved along a path.
 _ANYWHERE = 1e3
 
 
@@ -134,9 +134,9 @@ def tree_arrays(body: RigidBody, chains: Chains) -> dict[str, Any]:
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
     tips = [model.frames[tip] for tip in body.tips]
     holders = [int(tip.parentJoint) for tip in tips]
-    carriers = [body.carriers[joint] for joint in joint_of]
+    parent_links = [body.parent_links[joint] for joint in joint_of]
     offsets = [turns[joint].T @ tip.placement.translation for joint, tip in zip(holders, tips, strict=True)]
-    directions = [turns[at].T @ body.proximal_axes[joint] for at, joint in zip(carriers, joint_of, strict=True)]
+    directions = [turns[at].T @ body.proximal_axes[joint] for at, joint in zip(parent_links, joint_of, strict=True)]
     return {
         "parents": chains.parents,
         "roots": chains.roots,
@@ -145,7 +145,7 @@ def tree_arrays(body: RigidBody, chains: Chains) -> dict[str, Any]:
         "chart_frames": chains.chart_frames,
         "tip_body": np.array([last[joint] for joint in holders], dtype=np.int64),
         "tip_offset": np.array(offsets).reshape(-1, 3),
-        "carriers": np.array([last[joint] for joint in carriers], dtype=np.int64),
+        "parent_links": np.array([last[joint] for joint in parent_links], dtype=np.int64),
         "directions": np.array(directions).reshape(-1, 3),
-        "carried": np.ascontiguousarray(body.supports[:, joint_of - 1]),
+        "supported_by": np.ascontiguousarray(body.supports[:, joint_of - 1]),
     }

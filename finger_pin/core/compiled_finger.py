@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.bound_models import FEW, Models, Room, fill, path_motions, rows_of
+from finger_pin.core.bound_models import FEW, Models, SignalBuffer, fill, path_motions, rows_of
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
@@ -63,17 +63,17 @@ class CompiledMechanism:
         Without accelerations, which take most of the time, they and the rate are NaN. Of many states the rows' forces
         alone take less again.
         """
-        room = self.room(len(np.atleast_2d(x)), accelerated=accelerated, forces_only=forces_only)
-        self.fill(room, x, command, force, base)
-        return self.found(room, slice(None) if np.ndim(x) > 1 else 0)
+        buffer = self.allocate(len(np.atleast_2d(x)), accelerated=accelerated, forces_only=forces_only)
+        self.fill(buffer, x, command, force, base)
+        return self.to_evaluation(buffer, slice(None) if np.ndim(x) > 1 else 0)
 
-    def room(
+    def allocate(
         self, count: int, *, accelerated: bool = True, booked_only: bool = False, forces_only: bool = False
-    ) -> Room:
+    ) -> SignalBuffer:
         """Return buffers for the signals of m states: all, or powers and J^T F, or the rows' forces."""
         mechanism, (columns, rows) = self.mechanism, self.models.model().model.work.rows.shape
         width, kept, booked = mechanism.coordinates, 0 if booked_only else count, 0 if forces_only else count
-        return Room(
+        return SignalBuffer(
             packed=np.empty((count, mechanism.size)),
             rates=np.empty((min(kept, booked) if accelerated else 0, self.charts.size)),
             rows=np.empty((1 if forces_only else columns, kept, rows)),
@@ -83,18 +83,18 @@ class CompiledMechanism:
             externals=np.empty((booked, width)),
             booked=np.empty((booked, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
             # Of what touches, forces are added up.
-            touches=np.zeros((min(kept, booked), self.tables.touching // CONTACT.arms, 9)),
+            touches=np.zeros((min(kept, booked), self.tables.contact_rows // CONTACT.arms, 9)),
         )
 
-    def found(self, room: Room, at: slice | int = slice(None)) -> Evaluation:
-        """Return the evaluation in a room, or at one place of it."""
-        mechanism, rates, rows = self.mechanism, room.rates, room.rows[:, room.first :][:, : len(room.packed)]
+    def to_evaluation(self, buffer: SignalBuffer, at: slice | int = slice(None)) -> Evaluation:
+        """Return the evaluation in a buffer, or at one place of it."""
+        mechanism, rates, rows = self.mechanism, buffer.rates, buffer.rows[:, buffer.first :][:, : len(buffer.packed)]
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         if not len(rates):
-            rates = np.broadcast_to(np.nan, room.packed.shape)
+            rates = np.broadcast_to(np.nan, buffer.packed.shape)
         acceleration, rate = rates[:, width : 2 * width], rates
-        if mechanism.positions != width and len(room.rates):
-            acceleration, (q, v, _) = acceleration.copy(), mechanism.split(room.packed)
+        if mechanism.positions != width and len(buffer.rates):
+            acceleration, (q, v, _) = acceleration.copy(), mechanism.split(buffer.packed)
             for i in self.charts.angles:
                 # From the second derivatives of the angles to the angular acceleration.
                 a, b, c = v[:, i], v[:, i + 1], v[:, i + 2]
@@ -105,7 +105,7 @@ class CompiledMechanism:
         for table in mechanism.rows:
             end = begin + table.count
             own, arms, begin = rows[:, at, begin:end], table.law.arms, end
-            if room.column == FORCE:
+            if buffer.column == FORCE:
                 found[table.group] = RowSignals(table, None, own[0], own[0, ..., :0], ())
                 continue
             stateful = np.arange(table.count) % arms > 0 if arms > 1 else slice(None)
@@ -117,40 +117,42 @@ class CompiledMechanism:
         return Evaluation(
             mechanism.energies,
             found,
-            room.torques[at],
-            room.externals[at],
+            buffer.torques[at],
+            buffer.externals[at],
             acceleration[at],
             rate[at],
-            base_power=room.booked[at][..., -1:] if mechanism.moved else None,
-            booked=room.booked[at],
-            touching=ContactPoints(*np.split(room.touches[at], 3, axis=-1)) if room.touches.size else None,
+            base_power=buffer.booked[at][..., -1:] if mechanism.moved else None,
+            booked=buffer.booked[at],
+            touching=ContactPoints(*np.split(buffer.touches[at], 3, axis=-1)) if buffer.touches.size else None,
         )
 
     def powers(
         self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return the powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, (m, N)."""
-        room = self.room(len(x), booked_only=True)
-        self.fill(room, x, command, force, base)
-        return room.booked[:, len(self.mechanism.energies.stored) :], room.externals
+        buffer = self.allocate(len(x), booked_only=True)
+        self.fill(buffer, x, command, force, base)
+        return buffer.booked[:, len(self.mechanism.energies.stored) :], buffer.externals
 
-    def fill(self, room: Room, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> None:
-        """Fill a room with the signals of packed states, shape (size,) or (m, size)."""
+    def fill(
+        self, buffer: SignalBuffer, x: Array, command: Array, force: Array | None = None, base: Array | None = None
+    ) -> None:
+        """Fill a buffer with the signals of packed states, shape (size,) or (m, size)."""
         mechanism, tables = self.mechanism, self.tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
-        room.packed[:] = x
-        count, tips = len(room.packed), len(tables.tip_body)
+        buffer.packed[:] = x
+        count, tips = len(buffer.packed), len(tables.tip_body)
         commands = rows_of(command, (count, mechanism.channels))
         loaded = force is not None and bool(np.any(force))
         forces = np.zeros((count, tips, 3))
         if loaded:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
-        states, attitudes = room.packed, np.zeros((count, 0, 4))
+        states, attitudes = buffer.packed, np.zeros((count, 0, 4))
         if self.charts.quaternions:
             states, attitudes = self.charts.to_core(states)
-        fill(self.models, room, states, attitudes, commands, forces, base)
+        fill(self.models, buffer, states, attitudes, commands, forces, base)
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n).
@@ -172,7 +174,7 @@ class CompiledMechanism:
         return Motion(tips.copy(), motions.kinetic.copy(), motions.potential.copy())
 
     def _bound_motions(self, count: int, base: Array | None) -> _Asked:
-        """Return room for postures, its tips, and the block by which compiled code finds it."""
+        """Return buffers for postures, its tips, and the block by which compiled code finds it."""
         tables = self.tables
         shape = (count, len(tables.parents))
         filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)

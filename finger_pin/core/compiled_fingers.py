@@ -38,13 +38,13 @@ class CompiledFingers:
         self._mover = fingers[0]
         mechanism, count = self._first.mechanism, len(fingers)
         tables = mechanism.tables
-        self._room = mechanism.room(count, accelerated=accelerated)
+        self._buffer = mechanism.allocate(count, accelerated=accelerated)
         self._states = np.zeros((count, mechanism.charts.size))
         self._attitudes = np.zeros((count, len(mechanism.charts.quaternions), 4))
         self._commands = np.zeros((count, mechanism.mechanism.channels))
         self._forces = np.zeros((count, len(tables.tip_body), 3))
-        self._guided = int(tables.guided.max(initial=-1)) + 1
-        self._bases = np.zeros((count, 15 + self._guided))
+        self._prescribed = int(tables.prescribed.max(initial=-1)) + 1
+        self._bases = np.zeros((count, 15 + self._prescribed))
         # By whether there are forces at the tips, and whether the base moves.
         self._blocks: dict[tuple[bool, bool], list[Block]] = {}
         # Whether tendons have other arms than the first one's, and whether tips are elsewhere than the mover's.
@@ -82,7 +82,7 @@ class CompiledFingers:
         model = self._fingers[index].mechanism.models.model(loaded)
         bases = self._bases if moved else self._bases[:0]
         given = (self._states, self._commands, self._forces, bases, self._attitudes)
-        return pack(self._room.states(slice(index, index + 1), model.address, *given), STATES)
+        return pack(self._buffer.states(slice(index, index + 1), model.address, *given), STATES)
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -90,26 +90,26 @@ class CompiledFingers:
         """Return all signals of (18) at packed states, shape (m, size); see `Finger.evaluate`."""
         force = np.zeros(3) if fingertip_force is None else fingertip_force
         mechanism, loaded = self._first.mechanism, bool(np.any(force))
-        self._room.packed[:], self._commands[:] = x, command
+        self._buffer.packed[:], self._commands[:] = x, command
         # Of what touches, forces are added up.
-        self._room.touches[:] = 0.0
-        self._states[:], self._attitudes[:] = mechanism.charts.to_core(self._room.packed)
+        self._buffer.touches[:] = 0.0
+        self._states[:], self._attitudes[:] = mechanism.charts.to_core(self._buffer.packed)
         # Of one tip, forces have no axis of their own for it.
         self._forces[:] = force if force.ndim == 1 or self._forces.shape[1] > 1 else force[:, None]
         if base is not None:
-            self._bases[:, :15], self._bases[:, 15:] = base[:, :15], base[:, GUIDES : GUIDES + self._guided]
+            self._bases[:, :15], self._bases[:, 15:] = base[:, :15], base[:, GUIDES : GUIDES + self._prescribed]
         kind = loaded, base is not None
         if kind not in self._blocks:
             self._blocks[kind] = [self._bound(index, *kind) for index in range(len(self._fingers))]
         for block in self._blocks[kind]:
             evaluate_many(block.address)
-        found = mechanism.found(self._room)
+        found = mechanism.to_evaluation(self._buffer)
         signals = self._first.finger.signals(x, command, fingertip_force, found)
         if not self._differs[:, 0].any():
             return signals
 
         def pulling() -> Array:
-            own = [each.mechanism.found(self._room, index).rows for index, each in enumerate(self._fingers)]
+            own = [each.mechanism.to_evaluation(self._buffer, index).rows for index, each in enumerate(self._fingers)]
             return np.array([each.finger.tendon_torque(*at) for each, *at in zip(self._fingers, x, own, strict=True)])
 
         return replace(signals, pulling=pulling)
@@ -122,7 +122,7 @@ class CompiledFingers:
         """Return powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, shape (m, N)."""
         self.evaluate(x, command, fingertip_force, base)
         stored = len(self._first.finger.mechanism.energies.stored)
-        return self._room.booked[:, stored:], self._room.externals
+        return self._buffer.booked[:, stored:], self._buffer.externals
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertips and energies of the rigid bodies at positions and velocities, shape (m, n)."""

@@ -25,7 +25,7 @@ class Paths(NamedTuple):
     """E pieces, and the L legs with which R rows use them.
 
     Attributes:
-        carriers: Bodies of both points, of the frame, and of a side point, -1 for the base, shape (E, 4).
+        bodies: Bodies of both points, of the frame, and of a side point, -1 for the base, shape (E, 4).
         points: Both points, and the side point, in the frames of their bodies, shape (E, 9), m.
         rotation: Of the piece's frame in its body's, shape (E, 3, 3).
         origin: Of the piece's frame in its body's, shape (E, 3), m.
@@ -52,7 +52,7 @@ class Paths(NamedTuple):
         bends: Whether each leg's turn counts, shape (L,).
     """
 
-    carriers: Annotated[IndexTable, along("piece", "x", of="body")]
+    bodies: Annotated[IndexTable, along("piece", "x", of="body")]
     points: Annotated[Matrix, along("piece", "x")]
     rotation: Annotated[Layers, along("piece", "x", "y")]
     origin: Annotated[Matrix, along("piece", "x")]
@@ -152,8 +152,8 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
     legs = [leg for each in paths for leg in each]
     ends = [(*p.ends, Place(0, np.zeros(3)))[:3] for p in pieces]
     carried = [(a.joint, b.joint, p.joint, side.joint) for p, (a, b, side) in zip(pieces, ends, strict=True)]
-    carriers = np.array([[last[joint] for joint in row] for row in carried], dtype=np.int64).reshape(-1, 4)
-    entries = [_movers(row, parents) for row in carriers]
+    bodies = np.array([[last[joint] for joint in row] for row in carried], dtype=np.int64).reshape(-1, 4)
+    entries = [_movers(row, parents) for row in bodies]
     parameters = np.zeros((len(pieces), max((len(p.shape.parameters) for p in pieces), default=0)))
     for row, piece in zip(parameters, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
@@ -168,7 +168,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
             carries[:, body] = carries[:, parent]
             carries[parent, body] = 1
     return Paths(
-        carriers=carriers,
+        bodies=bodies,
         points=np.array(points).reshape(-1, 9),
         rotation=np.array([turns[p.joint].T @ p.frame.rotation for p in pieces]).reshape(-1, 3, 3),
         origin=np.array([turns[p.joint].T @ p.frame.translation for p in pieces]).reshape(-1, 3),
@@ -204,10 +204,10 @@ def reached(paths: Paths, count: int, width: int) -> NDArray[np.bool_]:
     return found
 
 
-def _movers(carriers: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _movers(bodies: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the coordinates that move some bodies, and a mask of the first three for each."""
     moves = np.zeros((len(parents), 4), dtype=np.int64)
-    for which, body in enumerate(carriers):
+    for which, body in enumerate(bodies):
         at = int(body)
         while at >= 0:
             moves[at, which] = 1

@@ -37,14 +37,14 @@ class Tables(NamedTuple):
         bodies: Placement and inertia, columns of `rigid_body`, shape (n, BODY_COLUMNS).
         charts: First of the three bodies that turn a free one, shape (f,).
         chart_frames: Rotation of each one's spherical joint in the body before it, shape (f, 3, 3).
-        guided: For coordinates that are moved along paths, the number of their acceleration; -1 else, shape (N,).
+        prescribed: For coordinates that are moved along paths, the number of their acceleration; -1 else, shape (N,).
         gravity: Shape (3,), m/s2.
         lumps: Inertia of the other coordinates, shape (N - n,).
         tip_body: Shape (t,).
         tip_offset: In the frame of the body, shape (t, 3), m.
         tip_force: Shape (t, 3), N, base frame; changed in place.
-        loaded: Whether forces at the tips count.
-        carriers: Body that has the link before each joint, -1 for the base, shape (n,).
+        has_tip_force: Whether forces at the tips count.
+        parent_links: Body that has the link before each joint, -1 for the base, shape (n,).
         directions: Unit vector of that link in its frame, shape (n, 3).
         groups: First and last + 1 row of each, whether it has inputs from earlier rows, or loads, and the column of
             its rows' kink, -1 for none, shape (G, 5).
@@ -60,15 +60,15 @@ class Tables(NamedTuple):
         state: Index of each row's state in z, -1 without one, shape (K,).
         state_row: The row of each state, shape (states,).
         touch: 1 for the first of the three rows of a contact, 2 for the others, 0 for all else, shape (K,).
-        touching: Number of rows of contacts, which stand before all others.
+        contact_rows: Number of rows of contacts, which stand before all others.
         channel: Index of its input from outside, -1 without one, shape (K,).
-        fed_row: Rows that have an input, from outside or from earlier rows, ascending.
+        input_rows: Rows that have an input, from outside or from earlier rows, ascending.
         input_start: First index of the terms of its input from earlier rows in ``terms``, shape (K + 1,).
         load_start: First index of the terms of its load, shape (K + 1,).
         terms: Earlier rows, shape (terms,).
         weights: Their weights, shape (terms,).
-        pins: The body whose pin the row is, -1 for none, shape (K,).
-        carried: One where a force at a tip passes the pin of a body, shape (t, n).
+        joint_pin: The body whose pin the row is, -1 for none, shape (K,).
+        supported_by: One where a force at a tip passes the pin of a body, shape (t, n).
         bend_start: First index of the row's bends, shape (K + 1,).
         bend_at: Coordinates that bend its path, shape (bends,).
         bend_row: The row, shape (bends,).
@@ -83,14 +83,14 @@ class Tables(NamedTuple):
     bodies: Annotated[Matrix, along("body", "c")]
     charts: Annotated[Indices, along("chart", of="body")]
     chart_frames: Annotated[Layers, along("chart", "x", "y")]
-    guided: Annotated[Indices, along("coordinate")]
+    prescribed: Annotated[Indices, along("coordinate")]
     gravity: Vector
     lumps: Annotated[Vector, along("lump")]
     tip_body: Annotated[Indices, along("tip", of="body")]
     tip_offset: Annotated[Matrix, along("tip", "x")]
     tip_force: Annotated[Matrix, along("tip", "x")]
-    loaded: bool
-    carriers: Annotated[Indices, along("body", of="body")]
+    has_tip_force: bool
+    parent_links: Annotated[Indices, along("body", of="body")]
     directions: Annotated[Matrix, along("body", "x")]
     groups: IndexTable
     laws: Annotated[IndexTable, along("group", "c")]
@@ -105,15 +105,15 @@ class Tables(NamedTuple):
     state: Annotated[Indices, along("row", of="state")]
     state_row: Annotated[Indices, along("state", of="row")]
     touch: Annotated[Indices, along("row")]
-    touching: int
+    contact_rows: int
     channel: Annotated[Indices, along("row", of="channel")]
-    fed_row: Annotated[Indices, along("fed", of="row")]
+    input_rows: Annotated[Indices, along("input row", of="row")]
     input_start: Annotated[Indices, along("row", starts="term")]
     load_start: Annotated[Indices, along("row", starts="term")]
     terms: Annotated[Indices, along("term", of="row")]
     weights: Annotated[Vector, along("term")]
-    pins: Annotated[Indices, along("row", of="body")]
-    carried: Annotated[Matrix, along("tip", "body")]
+    joint_pin: Annotated[Indices, along("row", of="body")]
+    supported_by: Annotated[Matrix, along("tip", "body")]
     bend_start: Annotated[Indices, along("row", starts="bend")]
     bend_at: Annotated[Indices, along("bend", of="coordinate")]
     bend_row: Annotated[Indices, along("bend", of="row")]
@@ -158,12 +158,12 @@ def _read(mechanism: Mechanism) -> Tables:
     if body not in _WEIGHED:
         _WEIGHED[body] = weighed(chains, body.model)
     return Tables(
-        guided=mechanism.guided,
+        prescribed=mechanism.prescribed,
         lumps=mechanism.inertia,
         bodies=_WEIGHED[body],
         gravity=np.array(body.model.gravity.linear),
         tip_force=np.zeros((len(body.tips), 3)),
-        loaded=False,
+        has_tip_force=False,
         parameters=_parameters(rows),
         **placed,
         **wired,
@@ -218,7 +218,7 @@ def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
         "state": state,
         "state_row": np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
         "touch": touch,
-        "touching": int(np.count_nonzero(touch)),
+        "contact_rows": int(np.count_nonzero(touch)),
     }
 
 
@@ -251,12 +251,12 @@ def _of_wiring(mechanism: Mechanism, count: int) -> dict[str, Any]:
     return {
         "groups": np.array(groups, dtype=np.int64).reshape(-1, 5),
         "channel": channel,
-        "fed_row": np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
+        "input_rows": np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
         "input_start": np.array(starts[0], dtype=np.int64),
         "load_start": np.array(starts[1], dtype=np.int64),
         "terms": np.array(terms, dtype=np.int64),
         "weights": np.array(weights, dtype=float),
-        "pins": np.array([first_body[pin] for table in rows for pin in table.pins], dtype=np.int64),
+        "joint_pin": np.array([first_body[pin] for table in rows for pin in table.pins], dtype=np.int64),
     }
 
 

@@ -93,11 +93,10 @@ class Tree(Description):
         The first part is what comes before its first pulley; each with the divisor of its tension.
         """
         described = self.tendons[tendon]
-        if described.path is None:
-            return [(1.0, frozenset(name for name, coefficient in (described.joints or {}).items() if coefficient))]
-        found: list[tuple[float, set[str]]] = [(1.0, set())]
+        around = {name for name, coefficient in (described.joints or {}).items() if coefficient}
+        found: list[tuple[float, set[str]]] = [(1.0, around)]
         before: set[str] | None = None
-        for each in described.path.values():
+        for each in (described.path or {}).values():
             if each.kind == "pulley":
                 before = None
                 found.append((each.divisor, set()))
@@ -135,8 +134,8 @@ class Tree(Description):
         return tuple(name for name in self.tendons if self._is_cord(name) and (self._pulled(name) or self.linked(name)))
 
     def _is_cord(self, name: str) -> bool:
-        around = self.tendons[name].joints
-        return around is None or all(
+        around = self.tendons[name].wound
+        return all(
             self.joints[joint].kind == "hinge" and abs(radius) <= LARGEST_RADIUS for joint, radius in around.items()
         )
 
@@ -151,9 +150,10 @@ class Tree(Description):
         A model whose actuators turn joints says nothing of the cords that do it: those about a joint that pull the same
         way share its torque. Empty for cords that have a spring or an actuator of their own.
         """
-        around = {joint: radius for joint, radius in (self.tendons[name].joints or {}).items() if radius}
+        tendon = self.tendons[name]
+        around = {joint: radius for joint, radius in tendon.wound.items() if radius}
         driven = any(each.tendon == name for each in self.actuators.values())
-        if len(around) != 1 or driven or self.tendons[name].stiffness > 0.0:
+        if len(around) != 1 or driven or tendon.stiffness > 0.0:
             return {}
         ((joint, radius),) = around.items()
         alike = sum(other * radius > 0.0 for other in self._radii_about(joint))
@@ -162,12 +162,12 @@ class Tree(Description):
 
     def opposed(self, name: str) -> bool:
         """Return whether another cord pulls the other way about the only joint of a cord."""
-        ((joint, radius),) = ((key, each) for key, each in (self.tendons[name].joints or {}).items() if each)
+        ((joint, radius),) = ((key, each) for key, each in self.tendons[name].wound.items() if each)
         return any(other * radius < 0.0 for other in self._radii_about(joint))
 
     def _radii_about(self, joint: str) -> list[float]:
         """Return the radii of the cords that wind about one joint alone."""
-        tables = [{key: r for key, r in (each.joints or {}).items() if r} for each in self.tendons.values()]
+        tables = [{key: r for key, r in each.wound.items() if r} for each in self.tendons.values()]
         return [table[joint] for table in tables if list(table) == [joint]]
 
     def _movers(self, body: str | None) -> set[str]:

@@ -121,15 +121,21 @@ class TreeJoint(Description):
 
 
 class TreeTendon(Description):
-    """A tendon: a sum of joint positions, or a path through space, with spring, damper and friction along it."""
+    """A tendon: a sum of joint positions, a path through space, or both, with spring, damper and friction along it."""
 
     joints: dict[Name, Annotated[float, real(-1e3, 1e3)]] | None = quantity(
-        None, unit="m/rad", source="design", doc="Length gained per joint position."
+        None, unit="m/rad", source="design", doc="Length gained per joint position; beside a path, besides its own."
     )
     path: dict[Name, Waypoint] | None = Field(None, description="By name, in order.")
     stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="Of its spring.")
     rest: Annotated[Pair, vector(2, -1e3, 1e3)] = quantity(
         (0.0, 0.0), unit="m", source="design", doc="Lengths between which its spring is relaxed."
+    )
+    slack: Annotated[float, real(-1.0, 1.0, hint=_MILLIMETRES)] | None = quantity(
+        None,
+        unit="m",
+        source="design",
+        doc="In place of rest: a cord, which only pulls, this much longer than its way at the joints' references.",
     )
     damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N s/m", source="design", doc="Damping.")
     range: Annotated[Pair, vector(2, -1e3, 1e3)] | None = quantity(
@@ -150,14 +156,23 @@ class TreeTendon(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if (self.joints is None) == (self.path is None):
-            raise problem("", "needs joints or a path, and not both")
+        if self.joints is None and self.path is None:
+            raise problem("", "needs joints or a path")
         if self.range is not None and self.range[0] >= self.range[1]:
             raise problem("range", "the least length must be below the largest", list(self.range))
         if self.rest[0] > self.rest[1]:
             raise problem("rest", "the first length must not be above the second", list(self.rest))
+        if self.slack is not None and self.rest != (0.0, 0.0):
+            raise problem("slack", "has no place beside rest", self.slack)
+        if self.slack is not None and "stiffness" not in self.model_fields_set:
+            raise problem("slack", "has no effect without stiffness; leave it out", self.slack)
         check_path(self.path or {})
         return self
+
+    @property
+    def wound(self) -> dict[str, float]:
+        """Radii about the joints that it winds about, m, by joint; none with a path, which shows where it bends."""
+        return (self.joints or {}) if self.path is None else {}
 
 
 class Coupling(Description):

@@ -218,6 +218,9 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
     if found["type"] == "missing":
         raise InputError(entry, f"is missing: {_document(model, location)}") from None
     message = found["msg"]
+    cause = found.get("ctx", {}).get("error")
+    if isinstance(cause, InputError):
+        raise cause from None
     raise InputError(entry, _MESSAGES.get(found["type"], message[:1].lower() + message[1:]), value) from None
 
 

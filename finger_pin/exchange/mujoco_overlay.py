@@ -5,12 +5,13 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from finger_pin.description.tree_parts import TreeTendon
-from finger_pin.description.validation import quantity, real, suggestion, validate
+from finger_pin.description.validation import problem, quantity, real, suggestion, validate
 from finger_pin.exceptions import InputError
 
 
@@ -20,6 +21,14 @@ class LaidTendon(TreeTendon):
     pull: Annotated[float, real(0.0, 1e6)] = quantity(
         100.0, unit="N", source="design", doc="The most that its motor pulls with; 0: it has none."
     )
+
+    @model_validator(mode="after")
+    def _of_mujoco(self) -> Self:
+        if self.slack is not None:
+            raise problem("slack", "is not for MuJoCo's springs, which have a rest", self.slack)
+        if self.joints is not None and self.path is not None:
+            raise problem("", "needs joints or a path, and not both")
+        return self
 
 
 def add_tendons(spec: Any, tendons: Mapping[str, Mapping[str, Any]] | str | Path) -> None:

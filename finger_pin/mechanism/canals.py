@@ -21,7 +21,7 @@ from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths, Wrap, find_wraps
 from finger_pin.mechanism.tendons import BRISTLES, LOSSES, SLACK, SOURCES, Tendons
-from finger_pin.mechanism.tree import table_of
+from finger_pin.mechanism.tree import ELASTIC, table_of
 from finger_pin.typing import Array
 
 #: The tables, in the order of evaluation; those of further wraps have a number, from 2, at the end.
@@ -180,20 +180,21 @@ class Canals:
         sources: dict[tuple[str, str], float] = {}
         # No path through space has a length below zero, at which its spring or its range would push.
         one_way = not tendon.friction
-        if tendon.stiffness:
+        if tendon.slack is not None:
+            sources[ELASTIC, name] = 1.0
+        elif tendon.stiffness:
             sources["tendon_spring", name] = -1.0
-            one_way &= tendon.path is not None and tendon.rest[0] <= 0.0
+            one_way &= tendon.joints is None and tendon.rest[0] <= 0.0
         if tendon.range is not None:
             sources["tendon_limit", name] = -1.0
-            one_way &= tendon.path is not None and tendon.range[0] <= 0.0
+            one_way &= tendon.joints is None and tendon.range[0] <= 0.0
         for key, each in tree.actuators.items():
             if each.tendon == name:
                 sources[table_of(each), key] = -each.gear
                 one_way &= each.only_pulls
         if tree.linked(name):
             sources[CORDS, name] = 1.0
-        around = tendon.joints or {}
-        bends = np.array([float(bool(around.get(joint))) for joint in self._joints])
+        bends = np.array([float(bool(tendon.wound.get(joint))) for joint in self._joints])
         index = len(self._tendons.routing.tendons) + tree.rubbing.index(name)
         crossed, wraps = tree.crossed(name)[0][1], find_wraps(self._description, name)
         route = routes.routes[name]

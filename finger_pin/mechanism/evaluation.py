@@ -37,7 +37,7 @@ class Evaluation:
         acceleration: v', shape (..., N).
         rate: Time derivative of the packed state, shape (..., size).
         base_power: Power of a base that moves, shape (..., 1), W.
-        guided_power: Power of the guides that move coordinates along paths, shape (...,), W.
+        prescribed_power: Power of the guides that move coordinates along paths, shape (...,), W.
         booked: Energies and powers in the order of `Energies`, shape (..., energies), J and W, where they are known.
         touching: Contacts in space, where they are known.
     """
@@ -49,7 +49,7 @@ class Evaluation:
     acceleration: Array
     rate: Array
     base_power: Array | None = None
-    guided_power: Array | None = None
+    prescribed_power: Array | None = None
     booked: Array | None = None
     touching: ContactPoints | None = None
 
@@ -69,8 +69,8 @@ class Evaluation:
             energies[signals.rows.stored.name] = energies[signals.rows.stored.name] + energy
             for name, value in taken.items():
                 powers[name] = powers[name] + value
-        if self.guided_power is not None:
-            powers[GUIDED.name] = self.guided_power
+        if self.prescribed_power is not None:
+            powers[GUIDED.name] = self.prescribed_power
         if self.base_power is not None:
             powers[BASE.name] = self.base_power[..., 0]
         return energies, powers

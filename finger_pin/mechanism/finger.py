@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from functools import partial
 
@@ -22,7 +21,7 @@ from finger_pin.mechanism.from_pinocchio import on_model
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
-from finger_pin.mechanism.scene import Scene, same_but_for_path
+from finger_pin.mechanism.scene import Scene
 from finger_pin.mechanism.state import State
 from finger_pin.mechanism.tendon_paths import Excursions, TendonPaths
 from finger_pin.mechanism.tree import build_tree, tree_rows
@@ -165,14 +164,7 @@ class Finger:
 
     def changed(self, description: FingerDescription, objects: Mapping[str, Object] | None) -> Finger:
         """Return the finger that another description and other objects make, with the body and rows that were given."""
-        (rigid_body, rows, known), around = self.constructor_args, self.scene
-        led = objects is known or (around is not None and around.same_but_for_paths(objects))
-        if led and same_but_for_path(self.description, description):
-            # The mechanism does not know where its palm and objects are led.
-            finger = copy.copy(self)
-            finger.description, finger.constructor_args = description, (rigid_body, rows, objects)
-            finger.scene = around and around.with_objects(objects or {})
-            return finger
+        rigid_body, rows, _ = self.constructor_args
         finger = Finger(description, rigid_body, rows, objects)
         finger.visuals = self.visuals
         return finger

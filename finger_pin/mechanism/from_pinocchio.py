@@ -55,7 +55,7 @@ def on_model(
     reduced.gravity.linear[:] = description.gravity
     body = RigidBody(reduced, tips)
     for index, name in enumerate(description.joints, start=1):
-        if body.carriers[index] == 0:
+        if body.parent_links[index] == 0:
             own = fingers.index(name.split(".")[0]) if len(fingers) > 1 or fingers[0] else 0
             body.proximal_axes[index] = np.asarray(axes[own], dtype=float)
     return body, shown

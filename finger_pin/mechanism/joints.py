@@ -82,6 +82,8 @@ class JointFriction:
         law, size = description.joint_friction, len(description.joints)
         tree = description.tree
         bearing = np.array([tree is None or tree.joints[name].bearing for name in description.joints])
+        numbers = bristles(law, size)
+        numbers["viscous"] = bearing * numbers["viscous"]
         chosen = _law(law.law)
         if np.any(law.drag) and "drag" not in chosen.parameters:
             raise InputError("finger.joint_friction.drag", f"has no effect with law = {law.law!r}, which lacks it")
@@ -90,7 +92,7 @@ class JointFriction:
             bearing=bearing,
             kinetic=expand(law.coulomb, size),
             static=expand(law.break_away, size),
-            **bristles(law, size),
+            **numbers,
             drag=bearing * expand(law.drag, size),
             reversal_speed=expand(law.reversal_speed, size),
             law=chosen,

@@ -44,7 +44,7 @@ class Mechanism:
         energies: Energies and powers of the rows.
         channels: Number of inputs from outside.
         moved: Whether the base moves along a path.
-        guided: For coordinates that are moved along paths, the number of their acceleration among all; else -1.
+        prescribed: For coordinates that are moved along paths, the number of their acceleration among all; else -1.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Mechanism:
         inertia: Array | None = None,
         channels: int = 0,
         moved: bool = False,
-        guided: NDArray[np.int64] | None = None,
+        prescribed: NDArray[np.int64] | None = None,
     ) -> None:
         """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
 
@@ -66,8 +66,8 @@ class Mechanism:
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         self.rows = tuple(rows)
         self.moved = moved
-        self.guided = np.full(self.coordinates, -1) if guided is None else guided
-        self.energies = Energies.of(self.rows, moved, not moved and bool(np.any(self.guided >= 0)))
+        self.prescribed = np.full(self.coordinates, -1) if prescribed is None else prescribed
+        self.energies = Energies.of(self.rows, moved, not moved and bool(np.any(self.prescribed >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
@@ -193,16 +193,16 @@ class Mechanism:
             [self.body.forward_dynamics(turning, v[..., :joints], net[..., :joints]), net[..., joints:] / self.inertia],
             axis=-1,
         )
-        led, guided_power = np.flatnonzero(self.guided >= 0), None
+        led, prescribed_power = np.flatnonzero(self.prescribed >= 0), None
         if len(led):
-            given = self.guided[led] + GUIDES
+            given = self.prescribed[led] + GUIDES
             acceleration[..., led] = 0.0 if base is None else base[..., given]
-            guided_power = -np.sum(torque[..., led] * v[..., led], axis=-1)
+            prescribed_power = -np.sum(torque[..., led] * v[..., led], axis=-1)
         if base is not None and self.moved:
             power = self._base_power(turning, v[..., :joints], acceleration[..., :joints], base)
-            if guided_power is not None:
+            if prescribed_power is not None:
                 # What pushes against a world that stands still does no work; the palm feels it.
-                power, guided_power = power + guided_power[..., None], None
+                power, prescribed_power = power + prescribed_power[..., None], None
         moving = self.body.position_rate(turning, v[..., :joints])
         rates = [found[t.group].rate for t in self.rows if t.states]
         return Evaluation(
@@ -212,7 +212,7 @@ class Mechanism:
             external=external,
             acceleration=acceleration,
             base_power=np.zeros((*lead, 1)) if power is None and self.moved else power,
-            guided_power=guided_power,
+            prescribed_power=prescribed_power,
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
 

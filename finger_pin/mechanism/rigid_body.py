@@ -70,7 +70,7 @@ class RigidBody:
         supports: Shape (t, joints), one where a joint carries a tip.
         joints: Names of the joints, in the order of the model.
         proximal_axes: e_j of (17) of every joint of the model, the base first, in the frame of the body that has it.
-        carriers: Index of the joint that carries that body, 0 for the base.
+        parent_links: Index of the joint that carries that body, 0 for the base.
         form: Shared by all bodies that differ in inertias and gravity alone.
     """
 
@@ -107,13 +107,13 @@ class RigidBody:
         self.joints: tuple[str, ...] = tuple(model.names[1:])
         self.form, self._own = Topology(), threading.local()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
-        self.carriers: list[int] = [0]
+        self.parent_links: list[int] = [0]
         for index in range(1, model.njoints):
             offset, parent = np.array(model.jointPlacements[index].translation), int(model.parents[index])
             length = float(np.linalg.norm(offset))
             # At the base, and where axes meet in a point, no link lies in between: the joint has the link of the other.
             shared = parent == 0 or length == 0.0
-            self.carriers.append(self.carriers[parent] if shared else parent)
+            self.parent_links.append(self.parent_links[parent] if shared else parent)
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
 
     @property
@@ -316,5 +316,5 @@ class RigidBody:
 
     def _directions(self) -> Array:
         placements = self._data.oMi
-        rows = [placements[at].rotation @ axis for at, axis in zip(self.carriers, self.proximal_axes, strict=True)]
+        rows = [placements[at].rotation @ axis for at, axis in zip(self.parent_links, self.proximal_axes, strict=True)]
         return np.array(rows[1:])

@@ -60,9 +60,9 @@ class Energies:
     powers: tuple[Energy, ...]
 
     @classmethod
-    def of(cls, rows: Sequence[Rows], moved: bool = False, guided: bool = False) -> Energies:
+    def of(cls, rows: Sequence[Rows], moved: bool = False, prescribed: bool = False) -> Energies:
         """Collect those of tables, and those of moved coordinates and of a base that moves."""
-        base = ((GUIDED,) if guided else ()) + ((BASE,) if moved else ())
+        base = ((GUIDED,) if prescribed else ()) + ((BASE,) if moved else ())
         return cls(_once(table.stored for table in rows), (*_once(p for table in rows for p in table.powers), *base))
 
 

@@ -133,18 +133,6 @@ class Scene:
                     raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
         return contact_rows([*own, *object_solids(objects, extended)], width, pairs_within(description))
 
-    def same_but_for_paths(self, objects: Mapping[str, Object] | None) -> bool:
-        """Return whether some objects are the same but for the paths of theirs and of the palm."""
-        # A world that a moving palm sees has to be as wide as the palm's path.
-        if self.world or objects is None or [*objects] != [*self.objects]:
-            return False
-        pairs = [(each, objects[name]) for name, each in self.objects.items()]
-        return all(one is two or (one.moves == two.moves and one.updated(path=two.path) == two) for one, two in pairs)
-
-    def with_objects(self, objects: Mapping[str, Object]) -> Scene:
-        """Return the same around a finger with such objects."""
-        return replace(self, objects=objects, free={name: objects[name] for name in self.free})
-
     def around(self, mechanism: Mechanism) -> Mechanism:
         """Return the finger with its surroundings: free objects after the joints, contacts before all other rows.
 
@@ -158,12 +146,12 @@ class Scene:
             form = _spread(table.form, places, width)
             rows.append(form if table.form is table else form.numbered(table.parameters))
         lumps_of = mechanism.lumps, mechanism.inertia
-        guided = np.full(bodies + lumps, -1)
-        guided[bodies - len(self.world) : bodies] = np.arange(len(self.world))
+        prescribed = np.full(bodies + lumps, -1)
+        prescribed[bodies - len(self.world) : bodies] = np.arange(len(self.world))
         led = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
         for number, first in enumerate(led):
-            guided[first : first + VELOCITY] = VELOCITY * number + np.arange(VELOCITY)
-        return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, guided)
+            prescribed[first : first + VELOCITY] = VELOCITY * number + np.arange(VELOCITY)
+        return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, prescribed)
 
     @property
     def world(self) -> tuple[str, ...]:
@@ -242,12 +230,3 @@ def _placed(state: State) -> Array:
     """Return the positions of the bodies of the surroundings, shape (..., nq)."""
     parts = (state.position, state.object_pose, state.world_position)
     return np.concatenate([each for each in parts if each is not None], axis=-1)
-
-
-def same_but_for_path(one: FingerDescription, other: FingerDescription) -> bool:
-    """Return whether two descriptions have the same parts, and hands with palms that both move or both rest."""
-    if one.hand is None or other.hand is None:
-        return one == other
-    parts = all(getattr(one, name) is getattr(other, name) for name in FingerDescription.model_fields)
-    moving = (one.hand.palm.path is None) == (other.hand.palm.path is None)
-    return parts and moving and one.hand.fingers_touch == other.hand.fingers_touch

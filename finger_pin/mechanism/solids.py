@@ -220,7 +220,7 @@ def _extended(body: RigidBody, moved: Sequence[str], world: Sequence[float]) -> 
         carried = model.addJoint(carried, kind(), place, name, np.full(1, np.inf), np.full(1, np.inf), -most, most)
     extended = RigidBody(model, [model.frames[tip].name for tip in body.tips])
     count = body.model.njoints
-    extended.proximal_axes[:count], extended.carriers[:count] = body.proximal_axes, body.carriers
+    extended.proximal_axes[:count], extended.parent_links[:count] = body.proximal_axes, body.parent_links
     return extended
 
 

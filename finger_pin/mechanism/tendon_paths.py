@@ -116,8 +116,8 @@ def _stretches(description: FingerDescription, tendon: str, branch: int) -> tupl
     assert tree is not None
     route = tree.tendons[str(own.along) if own else tendon]
     offset = 0.0 if branch else (own or route).curvature_offset
-    if route.joints is not None:
-        around = route.joints.items()
+    if route.path is None:
+        around = route.wound.items()
         return [_Stretch(name, bool(r), bool(r), 0.0, frozenset({name})) for name, r in around], offset
     legs = enumerate(tree.legs(str(own.along) if own else tendon)[branch], start=1)
     return [_Stretch(str(k), k > 1 or wraps, bool(crossed), 0.0, crossed) for k, (wraps, crossed) in legs], offset

@@ -20,7 +20,7 @@ from finger_pin.laws.bristle import PIN_FRICTION
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.muscle import MUSCLE
-from finger_pin.laws.spring import CONSTANT_FORCE, DEAD_BAND_SPRING, JOINT_SPRING
+from finger_pin.laws.spring import CONSTANT_FORCE, DEAD_BAND_SPRING, ELASTIC_TENDON, JOINT_SPRING
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
@@ -31,6 +31,8 @@ from finger_pin.typing import Array
 
 #: The tables of actuators without and with a state.
 STATELESS, STATEFUL, MUSCLES = "actuator", "actuator_with_state", "muscle"
+#: The table of tendons that stretch and only pull.
+ELASTIC = "elastic_cords"
 _TIP = "fingertip"
 # Dry friction of a tendon holds until it has slid so far, m.
 _HOLDS = 1e-4
@@ -38,6 +40,7 @@ _UNLIMITED = (-np.inf, np.inf)
 # What rows of a tree store and exchange, by table.
 _STORED = {
     "tendon_spring": Energy("tendon_spring", "tendons' springs"),
+    ELASTIC: Energy("tendon_spring", "tendons' springs"),
     "tendon_limit": Energy("tendon_limit", "tendons' limits"),
     "coupling": Energy("coupling", "couplings"),
     "loop": Energy("loop", "loops"),
@@ -48,6 +51,7 @@ _STORED = {
 }
 _EXCHANGED = {
     "tendon_spring": (Energy("tendon_spring_damping", "tendons' dampers"),),
+    ELASTIC: (Energy("tendon_spring_damping", "tendons' dampers"),),
     "tendon_limit": (Energy("tendon_limit_limiter", "tendons' limits"),),
     "coupling": (Energy("coupling_damping", "couplings"),),
     "loop": (Energy("loop_damping", "loops"),),
@@ -109,16 +113,21 @@ def along_paths(description: FingerDescription, routes: TendonPaths, table: Rows
     if table.group != "driven_tendons" and not table.pulls:
         return table
     arm, offset, paths = table.arm.copy(), table.offset.copy(), list(table.paths)
-    rest = np.array([joint.reference for joint in description.tree.joints.values()])
-    lengths = dict(zip(routes.routes, routes.length(rest), strict=True))
+    lengths, joints = _reference_lengths(description.tree, routes), len(description.joints)
     for k, name in enumerate(table.pulls or table.names):
         along = description.tendons[name].along
         if along is not None:
             route, first = routes.routes[along].times(-1.0), find_wraps(description, name)[0]
             route = route.beyond(first, route.coefficients)
-            arm[k, : len(rest)], paths[k] = route.coefficients, route.legs
+            arm[k, :joints], paths[k] = route.coefficients, route.legs
             offset[k] += lengths[along]
     return replace(table, arm=arm, measure=arm, offset=offset, paths=tuple(paths))
+
+
+def _reference_lengths(tree: Tree, routes: TendonPaths) -> dict[str, float]:
+    """Return the lengths of all tendons with the joints at their references, m."""
+    rest = np.array([joint.reference for joint in tree.joints.values()])
+    return dict(zip(routes.routes, routes.length(rest).tolist(), strict=True))
 
 
 def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -> list[Rows]:
@@ -145,6 +154,13 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
     ):
         if along:
             tables.append(table(group, law, along, numbers))
+    cords = {name: each for name, each in tree.tendons.items() if each.slack is not None}
+    if cords:
+        lengths = _reference_lengths(tree, routes)
+        along = {name: routes.routes[name].times(-1.0) for name in cords}
+        offset = np.array([lengths[name] + (each.slack or 0.0) for name, each in cords.items()])
+        numbers = [(each.stiffness, each.damping) for each in cords.values()]
+        tables.append(table(ELASTIC, ELASTIC_TENDON, along, numbers, offset=offset, unit="m"))
     first = len(description.actuated_names)
     for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE), (MUSCLES, MUSCLE)):
         own = {name: each for name, each in tree.actuators.items() if table_of(each) == group}
@@ -164,7 +180,7 @@ _Described = tuple[str, Law, dict[str, TendonPath], Sequence[Sequence[float]]]
 def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     """Return springs, ranges, and the dry friction of tendons that no load presses."""
     tendons = tree.tendons
-    sprung = {name: each for name, each in tendons.items() if each.stiffness or each.damping}
+    sprung = {name: each for name, each in tendons.items() if each.slack is None and (each.stiffness or each.damping)}
     limited = {name: each for name, each in tendons.items() if each.range is not None}
     rubbing = {name: each for name, each in tendons.items() if each.friction and name not in tree.rubbing}
 

@@ -244,9 +244,9 @@ def join_bodies(parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | 
             tips.append(f"{part}.{frame.name}")
             held = frame.placement if holder else place * frame.placement
             model.addFrame(pin.Frame(tips[-1], holder, 0, held, pin.FrameType.OP_FRAME), False)
-        along = zip(body.proximal_axes[1:], body.carriers[1:], strict=True)
+        along = zip(body.proximal_axes[1:], body.parent_links[1:], strict=True)
         axes += [axis if carrier else place.rotation @ axis for axis, carrier in along]
-        carriers += [carrier and carrier + shift for carrier in body.carriers[1:]]
+        carriers += [carrier and carrier + shift for carrier in body.parent_links[1:]]
     joined = RigidBody(model, tips)
-    joined.proximal_axes, joined.carriers = axes, carriers
+    joined.proximal_axes, joined.parent_links = axes, carriers
     return joined

@@ -202,7 +202,7 @@ class Bound:
         tables = build_tables(mechanism)
         if force is not None and np.any(force):
             tables.tip_force[:] = force
-            tables = tables._replace(loaded=True)
+            tables = tables._replace(has_tip_force=True)
         work = build_work(tables, [table.law for table in mechanism.rows], len(control.tension))
         self.mechanism = mechanism
         self._bound = BoundModel(tables, control, work)

@@ -79,7 +79,7 @@ def test_islands_found_for_other_numbers_of_the_same_wiring_select_the_same_tabl
     keys = ("tendon_friction.coulomb", "joint_friction.stiction", "joints.medial.link.length")
     more = {f"hand.fingers.index.finger.{key}": value for key, value in zip(keys, (0.07, 0.03, 0.041), strict=True)}
     one, other = (build_tables(fp.Finger(fp.load_scenario("hand", each)).mechanism) for each in ({}, more))
-    control = held_control(int(one.channel.max()) + 1, len(one.guided))
+    control = held_control(int(one.channel.max()) + 1, len(one.prescribed))
     found = selections(one, control)
     assert len(found) > 1 and selections(other, control) is found
     for each in found:

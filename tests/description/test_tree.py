@@ -33,6 +33,7 @@ FINGER = {
         "actuators": {"motor": {"tendon": "sum"}},
     },
 }
+CORD = {"joints": {"hinge": 0.01}, "stiffness": 1e3, "slack": 0.0}
 
 
 def changed(**entries):
@@ -76,7 +77,10 @@ def test_the_tree_itself_is_taken():
         ("tree__tendons__upper__path__b", None, "must end with a point"),
         ("tree__tendons__upper__path__wrap__radius", 0.0, "must be above 0"),
         ("tree__tendons__upper__path__wrap__radius", 0.5, "path.wrap: the point a lies inside of it"),
-        ("tree__tendons__upper__joints", {"hinge": 1.0}, "needs joints or a path, and not both"),
+        ("tree__tendons__upper__path", None, "needs joints or a path"),
+        ("tree__tendons__upper__slack", 0.0, "slack = 0.0: has no effect without stiffness; leave it out"),
+        ("tree__tendons__upper", {**CORD, "rest": [0.0, 1.0]}, "upper.slack = 0.0: has no place beside rest"),
+        ("tree__tendons__upper", {**CORD, "slack": 2.0}, "upper.slack = 2.0: must be at most 1 m (is it in mill"),
         ("tree__tendons__sum__joints", {"elbow": 1.0}, "no such joint; there are hinge"),
         ("tree__tendons__sum__range", [1.0, 0.0], "the least length must be below the largest"),
         ("tree__tendons__sum__rest", [1.0, 0.0], "the first length must not be above the second"),

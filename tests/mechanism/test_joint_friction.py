@@ -7,6 +7,7 @@ import pytest
 from exerted import pin_forces
 
 import finger_pin as fp
+from finger_pin.description.loading import read_scenario
 from finger_pin.mechanism.joints import JointFriction
 
 COULOMB, STICTION, STIFFNESS, VISCOUS, STRIBECK, FLOOR = 2.5e-4, 3.5e-4, 5.0, 1e-3, 0.1, 1e-7
@@ -88,3 +89,18 @@ def test_coefficients_can_differ_from_joint_to_joint(routing):
     strands = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
     forces = pin_forces(joints, np.zeros(4), np.zeros(4), strands)
     np.testing.assert_allclose(forces.level, np.array(stiction) * [15.0, 15.0, 28.0, 40.0], rtol=1e-12)
+
+
+def test_a_joint_without_a_bearing_does_not_slow_down():
+    cart = {"mass": 0.1, "inertia": [1e-5, 1e-5, 1e-5, 0.0, 0.0, 0.0]}
+    rail = {"body": "cart", "kind": "slide", "axis": [1.0, 0.0, 0.0], "bearing": False}
+    tree = {
+        "bodies": {"cart": cart, "arm": cart | {"parent": "cart"}},
+        "joints": {"rail": rail, "pin": {"body": "arm"}},
+    }
+    tree |= {"tip": {"body": "arm"}, "actuators": {"push": {"joint": "rail", "gain": 1.0}}}
+    table = {"name": "cart", "gravity": [0.0, 0.0, 0.0], "tendons": {}, "tree": tree}
+    table["joints"] = {"rail": {"range": [-1.0, 1.0]}, "pin": {"range": [-1.0, 1.0]}}
+    finger = fp.Finger(read_scenario({"name": "cart", "finger": table, "controller": {"kind": "tensions"}}).finger)
+    moving = finger.evaluate(finger.rest_state(np.zeros(2), np.array([0.3, 0.0])), np.zeros(1))
+    assert moving.acceleration == pytest.approx([0.0, 0.0], abs=1e-12)

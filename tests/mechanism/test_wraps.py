@@ -273,3 +273,8 @@ def test_mujoco_is_refused_what_it_cannot_do():
         fp.to_mjcf(antagonists("bends").description, friction=True)
     with pytest.raises(fp.InputError, match="canal, bends"):
         read_scenario(table(HELD, place="bend"))
+
+
+def test_fingers_of_a_hand_rub_at_the_same_kind_of_place():
+    with pytest.raises(fp.InputError, match=r"^hand.fingers: must have one tendon_friction.place, not canal, bends$"):
+        fp.load_scenario("hand", {"hand.fingers.index.finger.tendon_friction.place": "bends"})

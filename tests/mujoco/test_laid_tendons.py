@@ -73,6 +73,8 @@ def test_they_move_alike_there_and_here_with_friction_around_joints_and_along_a_
         ({"t": {"joints": {"mpc": 0.01}}}, "tendons.t.joints.mpc"),
         ({"t": {"joints": {"mcp": 0.01}, "pul": 1.0}}, "tendons.t.pul"),
         ({"t": {}}, "tendons.t"),
+        ({"t": {"joints": {"mcp": 0.01}, "stiffness": 1.0, "slack": 0.0}}, "tendons.t.slack"),
+        ({"t": {"joints": {"mcp": 0.01}, "path": {}}}, "tendons.t"),
         ("nowhere.toml", "tendons nowhere.toml"),
     ],
 )

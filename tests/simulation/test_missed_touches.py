@@ -81,7 +81,7 @@ def test_a_step_that_meets_a_plate_ends_just_behind_the_touch_without_another_tr
     while part.time <= touch:
         before, rejected = part.time, part.memory.rejected_steps[0]
         part.advance(1.0, room)
-    width, fall = len(part.tables.guided), part.objects[2]
+    width, fall = len(part.tables.prescribed), part.objects[2]
     assert part.memory.rejected_steps[0] == rejected
     assert 0.0 < part.time - touch < 1e-3 * (part.time - before)
     np.testing.assert_allclose(part.x[width + fall], -gravity * part.time, rtol=1e-6)
@@ -125,8 +125,8 @@ def test_what_sleeps_and_is_met_and_left_within_one_step_is_met():
     """A ball falls 1 m onto a thin plate, with a step that would end far behind it, and is thrown back as fast."""
     thin = scene(1.0, {"plate": plate(0.005, 30.0, 0.0, -1.0075), "ball": ball(30.0, 0.0, 0.0)})
     (part,) = (each for each in Setup.of(thin).stepper().parts if len(each.objects))
-    width = len(part.tables.guided)
-    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.culled[: part.tables.touching])
+    width = len(part.tables.prescribed)
+    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.culled[: part.tables.contact_rows])
     # Only the ball is integrated as exactly as ever, so that nothing else makes this step short.
     exact = np.concatenate([part.objects, width + part.objects])
     part.atol[np.setdiff1d(np.arange(len(part.atol)), exact)] = 1.0

@@ -106,14 +106,14 @@ def set_culled(k: int, value: int, culled: Indices) -> None:
 def activate_all(tables: Tables, own: PathWork) -> None:
     """Make all contact pairs active, outside compiled code."""
     own.culled[:], own.active_pairs[:] = 0, np.arange(own.active_pairs.size)
-    own.active_pair_count[0] = tables.touching // COLUMNS
+    own.active_pair_count[0] = tables.contact_rows // COLUMNS
 
 
 @njit_inline
 def list_active_pairs(tables: Tables, own: PathWork) -> None:
     """List the active contact pairs."""
     count = 0
-    for e in range(tables.touching // COLUMNS):
+    for e in range(tables.contact_rows // COLUMNS):
         if own.culled[tables.paths.row[e]] == 0:
             own.active_pairs[count] = e
             count += 1
@@ -183,7 +183,7 @@ def update_culling(tables: Tables, rows: Matrix, own: PathWork, states: Vector) 
 @njit_inline
 def activate_all_pairs(tables: Tables, work: Work) -> None:
     """Make all contact pairs active, as where nothing is known of them."""
-    for k in range(tables.touching):
+    for k in range(tables.contact_rows):
         work.paths.culled[k] = 0
     for e in range(work.paths.path.size):
         work.paths.path[e] = 0.0
@@ -202,7 +202,7 @@ def activate_since(tables: Tables, work: Work, first: Matrix, second: Matrix, be
     bound_linear_motion(before, after, tables.parents.size, work.paths)
     activate_near(tables, work.paths)
     width = work.torque.size
-    for k in range(tables.touching):
+    for k in range(tables.contact_rows):
         # Bent bristles tell of a contact that was closed meanwhile.
         if tables.state[k] >= 0 and after[2 * width + tables.state[k]] != 0.0:
             set_culled(k - k % 3, 0, work.paths.culled)

@@ -83,7 +83,7 @@ def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
                 blocks.states[states], blocks.loose[state] = state, 0.0
                 blocks.state_place[state] = states - blocks.state_start[b]
                 states += 1
-        for k in range(tables.touching, blocks.row_atom.size):
+        for k in range(tables.contact_rows, blocks.row_atom.size):
             if blocks.label[blocks.row_atom[k]] != b:
                 continue
             blocks.rows[rows] = k

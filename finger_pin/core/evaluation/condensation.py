@@ -50,12 +50,12 @@ def _outside(model: Model, address: int, g: float, b: int, width: int, wide: int
         for c in range(wide):
             force[j, c] = 0.0
         force[j, last] -= linear.bias_rate[places[j]]
-    if tables.loaded:
+    if tables.has_tip_force:
         for t in range(tables.tip_body.size):
             for j in range(width):
                 for r in range(3):
                     force[j, last] += work.jacobian[t, r, places[j]] * work.force_rate[t, r]
-    if tables.touching:
+    if tables.contact_rows:
         linear.blocks.current[0] = b
         call_at(model.fill_contact_gains, address, g)
 
@@ -65,11 +65,11 @@ def _load(model: Model, address: int, k: int, places: Indices, width: int, wide:
     """Fill the change of a row's load."""
     tables, linear, load = model.tables, model.linear, model.linear.load
     _terms(tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, wide, load)
-    if (tables.loaded or tables.touching) and tables.pins[k] >= 0:
+    if (tables.has_tip_force or tables.contact_rows) and tables.joint_pin[k] >= 0:
         for c in range(width):
             load[c] += linear.load_by_position[k, places[c]]
         load[wide - 1] += linear.load_by_time[k]
-        if tables.touching:
+        if tables.contact_rows:
             call_at(model.add_pushes, address, float(k))
 
 
@@ -124,7 +124,7 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
         if state >= 0:
             for c in range(wide):
                 own[c] = 0.0
-        pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.touching and tables.pins[k] >= 0)
+        pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.contact_rows and tables.joint_pin[k] >= 0)
         if pressed and (of_load != 0.0 or by_load != 0.0):
             _load(model, address, k, own_places, width, wide)
             for c in range(wide):
@@ -239,14 +239,14 @@ def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
             velocity[i, width + j] = of_mass[places[j]]
         for c in range(2 * width, wide):
             velocity[i, c] = force[i, c]
-        if model.tables.guided[at_row] >= 0:
+        if model.tables.prescribed[at_row] >= 0:
             # v' is given as a function of time.
             for j in range(width):
                 reduced[i, j] = 0.0
             for c in range(wide):
                 velocity[i, c] = 0.0
             reduced[i, i], velocity[i, width + i] = g, 1.0
-            velocity[i, wide - 1] = model.work.guide_rate[model.tables.guided[at_row]]
+            velocity[i, wide - 1] = model.work.guide_rate[model.tables.prescribed[at_row]]
     if not factorise(reduced, width, linear.pivots):
         return False
     substitute(reduced, width, linear.pivots, velocity, wide)

@@ -16,7 +16,7 @@ def measure(address: int, _time: float) -> int:
     """Fill lengths, turns and arms of rows with paths through space, and forces of contacts, after `move`."""
     model = unpack(address, MODEL)
     measure_paths(model.tables, model.work)
-    if model.tables.touching:
+    if model.tables.contact_rows:
         width = model.work.torque.size
         _exert(model.tables, model.state[width : 2 * width], model.state[2 * width :], model.work)
     return 1
@@ -28,7 +28,7 @@ def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
     rows, paths = work.rows, work.paths
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        if begin >= tables.touching:
+        if begin >= tables.contact_rows:
             continue
         for index in range(paths.active_pair_count[0]):
             e = paths.active_pairs[index]
@@ -121,7 +121,7 @@ def add_pushes(address: int, row: float) -> int:
     _, wide = extent(blocks, blocks.current[0])
     for index in range(own.closed_count[0]):
         e = own.closed[index]
-        passing = passes(paths, e, tables.pins[k])
+        passing = passes(paths, e, tables.joint_pin[k])
         if passing == 0.0 or work.rows[at.SIDE, paths.row[e]] < 0.0:
             continue
         size = max(work.rows[at.LOAD, k], 1e-100)

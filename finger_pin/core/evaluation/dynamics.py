@@ -43,8 +43,8 @@ def _tips(tables: Tables, work: Work) -> None:
 @njit_always_inline
 def _pin_load(tables: Tables, k: int, load: float, work: Work) -> float:
     """Return |-e S + F| of (17) for row k, and keep the vector and e."""
-    body = tables.pins[k]
-    carrier = tables.carriers[body]
+    body = tables.joint_pin[k]
+    carrier = tables.parent_links[body]
     pull = work.pull[k]
     for r in range(3):
         value = tables.directions[body, r]
@@ -55,7 +55,7 @@ def _pin_load(tables: Tables, k: int, load: float, work: Work) -> float:
         work.lever[k, r] = value
         pull[r] = -load * value
         for t in range(tables.tip_body.size):
-            pull[r] += tables.carried[t, body] * tables.tip_force[t, r]
+            pull[r] += tables.supported_by[t, body] * tables.tip_force[t, r]
     for index in range(work.paths.closed_count[0]):
         e = work.paths.closed[index]
         passing = passes(tables.paths, e, body)
@@ -78,7 +78,7 @@ def _see(tables: Tables, q: Vector, v: Vector, z: Vector, work: Work) -> None:
 
     One entry after the other, whatever row it belongs to: short loops inside a long one would cost twice as much.
     """
-    rows, first = work.rows, tables.touching
+    rows, first = work.rows, tables.contact_rows
     for k in range(first, rows.shape[1]):
         rows[LENGTH, k] = tables.offset[k] + work.paths.length[k]
         rows[SPEED, k] = 0.0
@@ -91,8 +91,8 @@ def _see(tables: Tables, q: Vector, v: Vector, z: Vector, work: Work) -> None:
         rows[CURVATURE, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
     for i in range(2 * first // 3, tables.state_row.size):
         rows[STATE, tables.state_row[i]] = z[i]
-    for i in range(tables.fed_row.size):
-        k = tables.fed_row[i]
+    for i in range(tables.input_rows.size):
+        k = tables.input_rows[i]
         rows[COMMAND, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
 
 
@@ -102,7 +102,7 @@ def _act(tables: Tables, work: Work) -> None:
     rows = work.rows
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        if begin < tables.touching:
+        if begin < tables.contact_rows:
             continue
         if tables.groups[g, FED]:
             for k in range(begin, end):
@@ -110,7 +110,7 @@ def _act(tables: Tables, work: Work) -> None:
         if tables.groups[g, PRESSED]:
             for k in range(begin, end):
                 load = _sum_of_terms(tables, tables.load_start[k], tables.load_start[k + 1], work)
-                if (tables.loaded or tables.touching) and tables.pins[k] >= 0:
+                if (tables.has_tip_force or tables.contact_rows) and tables.joint_pin[k] >= 0:
                     rows[LOAD, k] = _pin_load(tables, k, load, work)
                 else:
                     work.pull[k, 0] = load
@@ -122,13 +122,13 @@ def _act(tables: Tables, work: Work) -> None:
 def _drive(tables: Tables, work: Work, rate: Vector) -> None:
     """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
     rows, torque = work.rows, work.torque
-    for e in range(tables.arm_start[tables.touching], tables.arm_at.size):
+    for e in range(tables.arm_start[tables.contact_rows], tables.arm_at.size):
         torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
     for index in range(work.paths.active_pair_count[0]):
         k = tables.paths.row[work.paths.active_pairs[index]]
         for m in range(k + 1, k + 3):
             rate[tables.state[m]] = rows[RATE, m]
-    for i in range(2 * tables.touching // 3, tables.state_row.size):
+    for i in range(2 * tables.contact_rows // 3, tables.state_row.size):
         rate[i] = rows[RATE, tables.state_row[i]]
 
 
@@ -138,7 +138,7 @@ def exert(address: int, time: float) -> int:
     model = unpack(address, MODEL)
     tables, control, x, work = model.tables, model.control, model.state, model.work
     width = work.torque.size
-    if tables.loaded:
+    if tables.has_tip_force:
         tip_forces(control, time, 0, tables.tip_force)
         _tips(tables, work)
     for j in range(width):
@@ -175,8 +175,8 @@ def evaluate(address: int, time: float) -> int:
         if control.palm.harmonics.shape[0] == 0:
             signal_derivatives(control.guide, time, 2, work.guide)
         for j in range(width):
-            if tables.guided[j] >= 0:
-                work.acceleration[j] = work.guide[tables.guided[j]]
+            if tables.prescribed[j] >= 0:
+                work.acceleration[j] = work.guide[tables.prescribed[j]]
     for j in range(width):
         rate[j] = v[j]
         rate[width + j] = work.acceleration[j]

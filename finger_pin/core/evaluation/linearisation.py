@@ -40,9 +40,9 @@ def _turning_tips(tables: Tables, work: Work, linear: Linear) -> None:
 def _load_slopes(tables: Tables, work: Work, linear: Linear) -> None:
     """Fill the derivatives of all loads by the sum of earlier forces, and by the posture that turns the pins' links."""
     axes = work.spatial[AXIS]
-    for k in range(tables.pins.size):
-        body = tables.pins[k]
-        if not (tables.loaded or tables.touching) or body < 0:
+    for k in range(tables.joint_pin.size):
+        body = tables.joint_pin[k]
+        if not (tables.has_tip_force or tables.contact_rows) or body < 0:
             # `evaluate` has left the sum itself here.
             linear.load_slope[k] = np.sign(work.pull[k, 0])
             continue
@@ -54,9 +54,9 @@ def _load_slopes(tables: Tables, work: Work, linear: Linear) -> None:
         # pull = -S e + F, so -S e turns as pull - F does.
         x, y, z = pull[0], pull[1], pull[2]
         for t in range(tables.tip_body.size):
-            x -= tables.carried[t, body] * tables.tip_force[t, 0]
-            y -= tables.carried[t, body] * tables.tip_force[t, 1]
-            z -= tables.carried[t, body] * tables.tip_force[t, 2]
+            x -= tables.supported_by[t, body] * tables.tip_force[t, 0]
+            y -= tables.supported_by[t, body] * tables.tip_force[t, 1]
+            z -= tables.supported_by[t, body] * tables.tip_force[t, 2]
         for index in range(work.paths.closed_count[0]):
             c = work.paths.closed[index]
             passing = passes(tables.paths, c, body)
@@ -66,10 +66,10 @@ def _load_slopes(tables: Tables, work: Work, linear: Linear) -> None:
         linear.load_by_time[k] = 0.0
         for t in range(tables.tip_body.size):
             for r in range(3):
-                linear.load_by_time[k] += tables.carried[t, body] * work.force_rate[t, r] * pull[r] / size
+                linear.load_by_time[k] += tables.supported_by[t, body] * work.force_rate[t, r] * pull[r] / size
         for j in range(tables.parents.size):
             linear.load_by_position[k, j] = 0.0
-        j = tables.carriers[body]
+        j = tables.parent_links[body]
         while j >= 0:
             a = axes[j]
             linear.load_by_position[k, j] = (
@@ -98,16 +98,16 @@ def linearise(address: int, time: float) -> int:
             linear.by_velocity[j, i] = work.square[BY_VELOCITY, j, i]
     if control.palm.harmonics.shape[0] > 0:
         call_at(model.bias_rate, address, time)
-    if tables.loaded:
+    if tables.has_tip_force:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)
     if control.palm.harmonics.shape[0] == 0:
         signal_derivatives(control.guide, time, 3, work.guide_rate)
-    if tables.loaded:
+    if tables.has_tip_force:
         tip_forces(control, time, 1, work.force_rate)
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        if begin >= tables.touching:
+        if begin >= tables.contact_rows:
             call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
             continue
         for index in range(work.paths.active_pair_count[0]):

@@ -119,7 +119,7 @@ def _turn_pushes(tables: Tables, work: Work, k: int, by_position: Vector) -> Non
     size = max(work.rows[LOAD, k], 1e-100)
     for index in range(own.closed_count[0]):
         e = own.closed[index]
-        share = passes(paths, e, tables.pins[k]) / size
+        share = passes(paths, e, tables.joint_pin[k]) / size
         if share == 0.0:
             continue
         for s in range(paths.start[e], paths.start[e + 1]):
@@ -135,7 +135,7 @@ def linearise_paths(address: int, _time: float) -> int:
     model = unpack(address, MODEL)
     tables, work, linear = model.tables, model.work, model.linear
     velocity = model.state[work.torque.size : 2 * work.torque.size]
-    paths, own, closed, touching = tables.paths, work.paths, COLUMNS * work.paths.closed_count[0], tables.touching
+    paths, own, closed, touching = tables.paths, work.paths, COLUMNS * work.paths.closed_count[0], tables.contact_rows
     for index in range(own.closed_count[0]):
         _slopes_of_piece(paths, own.closed[index], work)
     for e in range(touching // COLUMNS, paths.columns.size):
@@ -169,9 +169,9 @@ def linearise_paths(address: int, _time: float) -> int:
             linear.arm[a], linear.measure[a] = work.arm[a], work.gradient[a]
             linear.turning[a] = gather[tables.arm_at[a]]
             gather[tables.arm_at[a]] = 0.0
-    if tables.touching:
-        for k in range(tables.pins.size):
-            if tables.pins[k] >= 0:
+    if tables.contact_rows:
+        for k in range(tables.joint_pin.size):
+            if tables.joint_pin[k] >= 0:
                 _turn_pushes(tables, work, k, linear.load_by_position[k])
         partition(tables, work, linear.blocks, linear.gain)
     return 1

@@ -36,7 +36,7 @@ def _frame(paths: Paths, e: int, work: Work) -> None:
     """Place a piece's frame and its points, and express its points in the frame."""
     own = work.paths
     rotation, origin, ends = own.frame[e], own.origin[e], own.ends[e]
-    body = paths.carriers[e, 2]
+    body = paths.bodies[e, 2]
     if body >= 0:
         above = work.rotation[body]
         for r in range(3):
@@ -49,7 +49,7 @@ def _frame(paths: Paths, e: int, work: Work) -> None:
                     rotation[r, c] += above[r, i] * paths.rotation[e, i, c]
     # Of a gap there is no side point.
     for p in range(3 if paths.columns[e] == 1 else 2):
-        body = paths.carriers[e, p + p // 2]
+        body = paths.bodies[e, p + p // 2]
         for r in range(3):
             ends[3 * p + r] = paths.points[e, 3 * p + r]
         if body >= 0:
@@ -146,7 +146,7 @@ def look(address: int, piece: float) -> int:
 @njit_always_inline
 def measure_paths(tables: Tables, work: Work) -> None:
     """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if active."""
-    paths, own, first = tables.paths, work.paths, tables.touching
+    paths, own, first = tables.paths, work.paths, tables.contact_rows
     closed = 0
     for index in range(own.active_pair_count[0]):
         e = own.active_pairs[index]
@@ -209,7 +209,7 @@ def push(tables: Tables, work: Work) -> None:
 @njit_inline
 def passes(paths: Paths, e: int, body: int) -> float:
     """Return the count of passages of a contact's force, less its reaction, through the pin of a body."""
-    first, second = paths.carriers[e, 0], paths.carriers[e, 2]
+    first, second = paths.bodies[e, 0], paths.bodies[e, 2]
     beyond = 0.0
     if first >= 0 and (first == body or paths.carries[body, first]):
         beyond += 1.0

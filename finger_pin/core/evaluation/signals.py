@@ -103,7 +103,7 @@ def book(tables: Tables, work: Work, totals: Vector) -> None:
         totals[c] = 0.0
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        if begin < tables.touching:
+        if begin < tables.contact_rows:
             for index in range(work.paths.active_pair_count[0]):
                 k = tables.paths.row[work.paths.active_pairs[index]]
                 if begin <= k < end:
@@ -167,7 +167,7 @@ def exert_alone(model: Model, address: int, time: float) -> None:
     """Fill the rows' forces and rates under known inputs, without accelerations."""
     tables, width = model.tables, model.work.torque.size
     # Only some rows need to know where bodies are.
-    if tables.loaded or tables.paths.columns.size > 0:
+    if tables.has_tip_force or tables.paths.columns.size > 0:
         move(tables, model.state[:width], model.state[width : 2 * width], model.work)
     call_at(model.exert, address, time)
 
@@ -183,7 +183,7 @@ def _keep(many: States, model: Model, m: int) -> None:
         for c in range(rows.shape[0]):
             for k in range(rows.shape[2]):
                 rows[c, many.first + m, k] = work.rows[many.column + c, k]
-    if many.touches.shape[0] > 0 and tables.touching:
+    if many.touches.shape[0] > 0 and tables.contact_rows:
         _touch(tables.paths, work, many.touches[m])
     if many.booked.shape[0] > 0:
         for j in range(many.torques.shape[1]):
@@ -202,7 +202,7 @@ def book_moved(model: Model, address: int, moving: bool, totals: Vector) -> None
         totals[last] = work.base_power[0]
     if work.guide.size > 0:
         for j in range(width):
-            if model.tables.guided[j] >= 0:
+            if model.tables.prescribed[j] >= 0:
                 totals[last] -= work.torque[j] * model.state[width + j]
 
 
@@ -213,7 +213,7 @@ def evaluate_many(address: int, _time: float) -> int:
     model = unpack(many.model, MODEL)
     tables, work, before = model.tables, model.work, model.rate
     # Signals have the gaps of all contacts; for powers alone those far apart are culled from state to state.
-    culling = tables.touching > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
+    culling = tables.contact_rows > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
     activate_all_pairs(tables, work)
     for m in range(many.states.shape[0]):
         _set(many, model, m)

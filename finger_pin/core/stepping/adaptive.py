@@ -74,7 +74,7 @@ def try_counted(integration: Integration, model: Model, h: float) -> int:
         return outcome
     memory.jacobians[0] += fresh
     memory.factorisations[0] += 1
-    memory.evaluations[0] += count if fresh or tables.loaded or tables.touching > 0 else count - 1
+    memory.evaluations[0] += count if fresh or tables.has_tip_force or tables.contact_rows > 0 else count - 1
     # What follows a kink follows from this try alone.
     memory.fresh[0], memory.max_next_step_size[0] = 0.0, np.inf
     return outcome
@@ -131,7 +131,7 @@ def accept_step(args: Any, integration: Integration, model: Model, time: float) 
     """Move to the end of an accepted step, and store the step if there is a record."""
     x, attitude, tables, taken = integration.x, integration.attitude, model.tables, args.taken[0]
     first = 2 * model.linear.mass.shape[0]
-    if tables.touching and update_culling(tables, model.work.rows, model.work.paths, model.state[first:]):
+    if tables.contact_rows and update_culling(tables, model.work.rows, model.work.paths, model.state[first:]):
         list_active_pairs(tables, model.work.paths)
         _still(integration, model, first)
     copy(model.state, x)
@@ -154,7 +154,7 @@ def accept_step(args: Any, integration: Integration, model: Model, time: float) 
 def _still(integration: Integration, model: Model, first: int) -> None:
     """Clear the rates and errors of the states of culled contacts."""
     tables = model.tables
-    for row in range(0, tables.touching, 3):
+    for row in range(0, tables.contact_rows, 3):
         if model.work.paths.culled[row]:
             for m in range(row + 1, row + 3):
                 c = first + tables.state[m]
@@ -196,7 +196,7 @@ def advance(address: int, end: float) -> int:
             continue
         memory.outcome[0], memory.touch_share[0] = outcome, NOTHING
         call_at(integration.cut, args.integration, h)
-        if memory.retry_share[0] == 1.0 and model.tables.touching:
+        if memory.retry_share[0] == 1.0 and model.tables.contact_rows:
             call_at(integration.detect_missed_contacts, args.integration, h)
         kept, part, touch = memory.retry_share[0], memory.taken_share[0], memory.touch_share[0]
         if touch == MISSED_BY_CULLING:

@@ -38,7 +38,7 @@ def propagate_error(address: int, h: float) -> int:
     model, memory = unpack(integration.model, MODEL), integration.memory
     global_error, k, width = integration.global_error, integration.k, model.linear.mass.shape[0]
     part, turned, last = memory.taken_share[0], memory.left_share[0] < 1.0, k.shape[0] - 1
-    again = memory.rejected[0] > 0.0 and model.tables.touching > 0
+    again = memory.rejected[0] > 0.0 and model.tables.contact_rows > 0
     if turned or memory.outcome[0] == at.LEFT_BRANCH or again:
         # The two methods may err alike.
         defect(integration, model, memory.time[0], h, part)

@@ -66,7 +66,7 @@ class IslandMotion:
             attitudes=record.attitudes,
             dense=record.dense,
             charts=tables.charts,
-            width=len(tables.guided),
+            width=len(tables.prescribed),
             before=np.zeros_like(self.start),
             times=times,
             found=np.empty((kept, len(self.start))),

@@ -111,7 +111,7 @@ class IslandIntegrator:
         # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
         self.work = build_work(tables, laws, len(control.tension))
         self.model = BoundModel(tables, control, self.work)
-        of_objects, led = object_coordinates(tables), tables.guided[: len(tables.parents)] < 0
+        of_objects, led = object_coordinates(tables), tables.prescribed[: len(tables.parents)] < 0
         self._bound = core.Integration(
             model=self.model.address,
             tableau=tableau,
@@ -130,7 +130,7 @@ class IslandIntegrator:
             joints=np.flatnonzero(~of_objects & led & estimate_error),
             objects=np.flatnonzero(of_objects & led & estimate_error),
             cut=cut_step.address,
-            detect_missed_contacts=find_missed_contacts.address if tables.touching else 0,
+            detect_missed_contacts=find_missed_contacts.address if tables.contact_rows else 0,
             propagate_error=propagate_error.address if estimate_error else 0,
         )
         self._block = pack(self._bound, core.INTEGRATION)
@@ -221,7 +221,7 @@ class IslandIntegrator:
         return IslandIntegrator(
             self.island,
             self.laws,
-            self.tables._replace(loaded=loaded),
+            self.tables._replace(has_tip_force=loaded),
             self.control,
             pack.x,
             pack.attitude,

@@ -106,19 +106,19 @@ class Selection:
         subset: Its places by axis; None where it is the whole.
         groups: Its groups of rows, as in the tables.
         of_groups: Numbers of these groups among all.
-        touching: Number of rows of contacts.
+        contact_rows: Number of rows of contacts.
     """
 
     island: Island
     subset: Subset | None
     groups: Indices
     of_groups: Indices
-    touching: int
+    contact_rows: int
 
     @classmethod
     def of(cls, tables: Tables, island: Island) -> Selection:
         """Return the part that an island has of tables."""
-        rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.guided)
+        rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.prescribed)
         bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
         counts = np.array([np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups], dtype=np.int64)
         present = np.flatnonzero(counts)
@@ -132,7 +132,7 @@ class Selection:
         part.keep("row", rows, len(tables.state))
         part.keep("group", present, len(tables.groups))
         part.keep("state", island.states, len(tables.state_row))
-        part.keep("fed", np.flatnonzero(np.isin(tables.fed_row, rows)), len(tables.fed_row))
+        part.keep("input row", np.flatnonzero(np.isin(tables.input_rows, rows)), len(tables.input_rows))
         part.keep("channel", island.channels, 1 + max(tables.channel.max(initial=-1), island.channels.max(initial=-1)))
         for entries in ("arm", "bend", "term"):
             part.keep_entries(tables, entries)
@@ -149,7 +149,7 @@ class Selection:
         if part is None:
             return tables
         own = part.of(tables)
-        return own._replace(groups=self.groups, touching=self.touching, paths=part.of(tables.paths))
+        return own._replace(groups=self.groups, contact_rows=self.contact_rows, paths=part.of(tables.paths))
 
     def control(self, control: InputTable) -> InputTable:
         """Return the inputs of the island."""
@@ -171,7 +171,7 @@ def selections(tables: Tables, control: InputTable) -> list[Selection]:
     """Return the part of every island, found once for each wiring."""
     islands = find_islands(tables, control)
     if len(islands) == 1:
-        return [Selection(islands[0], None, tables.groups, np.arange(len(tables.groups)), tables.touching)]
+        return [Selection(islands[0], None, tables.groups, np.arange(len(tables.groups)), tables.contact_rows)]
     return [Selection.of(tables, island) for island in islands]
 
 

@@ -56,7 +56,7 @@ def _keep(tables: Tables, work: Work, state: Vector, booked: Any, out: Vector) -
     for i in range(count):
         out[i] = booked[booked.size - count + i]
     out[count] = 0.0
-    if tables.loaded:
+    if tables.has_tip_force:
         for j in range(tables.parents.size):
             out[count] += work.external[j] * state[width + j]
 
@@ -80,14 +80,14 @@ def power_many(address: int, _time: float) -> int:
             call_at(model.evaluate, asked.model, time)
         else:
             # Contacts far apart are culled from state to state; what is left in ``rate`` is the state before.
-            if tables.touching > 0 and k > 0:
+            if tables.contact_rows > 0 and k > 0:
                 activate_since(tables, work, _attitude(b, last), _attitude(b, step), model.rate, state)
             inputs(model.control, time, state[:width], state[width : 2 * width], work.command)
             exert_alone(model, asked.model, time)
         book(tables, work, asked.booked)
         if moving:
             book_moved(model, asked.model, True, asked.booked)
-        elif tables.touching > 0:
+        elif tables.contact_rows > 0:
             cull_distant(tables, work, state, model.rate)
         _keep(tables, work, state, asked.booked, asked.powers[k])
     return 1

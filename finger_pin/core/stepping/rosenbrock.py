@@ -198,7 +198,7 @@ def try_step(integration: Integration, model: Model, time: float, h: float, fres
             if frozen:
                 freeze_branch(tables, rows, kinks, frozen)
         # For a second try too: what pins and tips feel there is read from the memory of the evaluation.
-        if i > 0 or fresh or tables.loaded or tables.touching > 0:
+        if i > 0 or fresh or tables.has_tip_force or tables.contact_rows > 0:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
             if fresh:
@@ -208,7 +208,7 @@ def try_step(integration: Integration, model: Model, time: float, h: float, fres
                         return SENSELESS
                 if not frozen:
                     freeze_branch(tables, rows, kinks, frozen)
-                if tables.touching:
+                if tables.contact_rows:
                     record_start_gaps(tables, model.work.paths)
                 call_at(model.linearise, integration.model, time)
             if call_at(model.condense, integration.model, g) == 0:

@@ -87,7 +87,7 @@ def _part_before_reversal(integration: Integration, model: Model, h: float) -> f
     memory, part = integration.memory, before_reversal(integration, model, h)
     if part < 1.0:
         cut(integration.x, model.state, integration.dense, part)
-        if model.tables.touching:
+        if model.tables.contact_rows:
             # Gaps are looked for from those at its end.
             memory.evaluations[0] += 1
             call_at(model.evaluate, integration.model, memory.time[0] + part * h)

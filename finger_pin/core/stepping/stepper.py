@@ -87,7 +87,7 @@ class Stepper:
             inputs, pushed, at = copied(each.control(control)), forces[each.island.tips], self._places(each.island)
             # An island that nothing pushes computes as it does alone.
             loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
-            own = copied(each.tables(tables)._replace(tip_force=pushed, loaded=loaded))
+            own = copied(each.tables(tables)._replace(tip_force=pushed, has_tip_force=loaded))
             begun = inputs, start[at], attitude[free], tableau, float(rtol), tolerances[at], memory
             followed = [laws[group] for group in each.of_groups]
             self.parts.append(IslandIntegrator(each.island, followed, own, *begun, estimate_error))
@@ -229,7 +229,7 @@ class Stepper:
         forces = np.broadcast_to(force, (len(self.mechanism.body.tips), 3))
         for index, part in enumerate(self.parts):
             part.tables.tip_force[:] = forces[part.island.tips]
-            if np.any(part.tables.tip_force) and not part.tables.loaded:
+            if np.any(part.tables.tip_force) and not part.tables.has_tip_force:
                 self.parts[index] = part.with_loads(True)
 
     def advance(self, end: float) -> int:
@@ -257,14 +257,14 @@ class Stepper:
     def state_snapshot(self) -> Snapshot:
         """Snapshot of all that later steps depend on; a copy."""
         return [
-            (part.tables.loaded, part.drives, part.knots, tuple(each.copy() for each in part.state_snapshot))
+            (part.tables.has_tip_force, part.drives, part.knots, tuple(each.copy() for each in part.state_snapshot))
             for part in self.parts
         ]
 
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a snapshot of this stepper or of one with the same arguments."""
         for index, (loaded, drives, knots, arrays) in enumerate(snapshot):
-            if loaded != self.parts[index].tables.loaded:
+            if loaded != self.parts[index].tables.has_tip_force:
                 self.parts[index] = self.parts[index].with_loads(loaded)
             part = self.parts[index]
             part.drives, part.knots = drives, knots
