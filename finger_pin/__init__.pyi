@@ -19,6 +19,7 @@ from .exceptions import IntegrationError as IntegrationError
 from .exchange.from_mujoco import from_mujoco as from_mujoco
 from .exchange.mjcf import to_mjcf as to_mjcf
 from .identification.identify import identify as identify
+from .identification.prediction import predict as predict
 from .identification.propose import propose as propose
 from .laws.law import Law as Law
 from .mechanism.finger import Finger as Finger

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from finger_pin.cancellation import CancelToken
 from finger_pin.description.loading import ScenarioLike, load_bench
@@ -18,14 +17,13 @@ from finger_pin.exceptions import InputError
 from finger_pin.identification.checkpoint import Checkpoint, digest
 from finger_pin.identification.comparison import other_laws
 from finger_pin.identification.estimate import LOSSES, fit
-from finger_pin.identification.motions import RecordedMotion, windows
+from finger_pin.identification.models import build_problem
 from finger_pin.identification.pipeline import FitPipeline, Progress, starting_points
-from finger_pin.identification.problem import Problem, RecordingModel, Stopped
-from finger_pin.identification.recordings import RecordedSignal, Recording, read_recording, unit_of
+from finger_pin.identification.prediction import check_predictable, predictions
+from finger_pin.identification.problem import Problem, Stopped
+from finger_pin.identification.recordings import read_recording
 from finger_pin.identification.results import results, write_results
-from finger_pin.identification.steady_data import SteadyReadings
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
-from finger_pin.mechanism.finger import Finger
 from finger_pin.studies.fingerprint import finger_digest
 from finger_pin.typing import Array
 
@@ -78,7 +76,8 @@ def identify(
     Returns:
         Along ``parameter``: ``estimate``, ``lower`` and ``upper`` at 95 %, infinite where open, ``determined``,
         ``units``, ``correlation``, profiles; along ``signal`` noise and correlation; along ``sample`` what was measured
-        and the residuals; along ``law`` what `compare` found. Attribute ``undetermined``: what the recordings leave
+        and the residuals; along ``law`` what `compare` found; along ``prediction`` and ``predicted`` what `predict`
+        returns of what is held out. Attribute ``undetermined``: what the recordings leave
         open, in words.
 
     Raises:
@@ -95,58 +94,21 @@ def identify(
     scenario = with_finger(scenario, own)
     taken = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
     problem = build_problem(scenario, settings, taken, own)
-    other_laws(problem, settings)  # Before any work: an entry that is wrong in them is refused now.
+    held_out = [each for each in taken if each.settings.held_out is not False]
+    # Before any work: an entry that is wrong in them is refused now.
+    other_laws(problem, settings)
+    check_predictable(scenario, held_out, own)
     problem.stop = CancelToken(stop)
     asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
     with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
         work = FitPipeline(problem, ledger, loss, progress)
         result = _work(problem, settings, starting_points(problem, starts, seed), starts, work)
+        result.attrs["custom_finger"] = int(own is not None)
+        result.update(predictions(result, scenario, held_out, taken, own))
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
         if output is not None:
             write_results(result, Path(output), bench, problem)
     return result
-
-
-def build_problem(
-    scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording], finger: Finger | None = None
-) -> Problem:
-    """Return the problem whose objective is to be minimised.
-
-    Raises:
-        InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
-    """
-    models: list[RecordingModel] = []
-    signals: list[RecordedSignal] = []
-    for recording in taken:
-        if recording.settings.kind == "steady":
-            models.append(SteadyReadings(recording, scenario))
-            parts = [np.arange(len(recording.speed))]
-        else:
-            parts = list(windows(recording))
-            models += [RecordedMotion(recording, scenario, rows, k, finger) for k, rows in enumerate(parts)]
-        signals += [
-            _signal(recording, name, values, rows) for rows in parts for name, values in recording.outputs.items()
-        ]
-    low, high = np.array(list(settings.parameters.values()), dtype=float).T
-    count = sum(len(signal.measured) for signal in signals)
-    if count <= len(low):
-        raise InputError("identify.recordings", f"have {count} readings for {len(low)} parameters: more are needed")
-    return Problem(scenario, tuple(settings.parameters), low, high, models, signals, {})
-
-
-def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.intp]) -> RecordedSignal:
-    later = recording.time[rows] - recording.time[rows[0]] >= recording.settings.settle
-    there = np.flatnonzero(np.isfinite(values[rows]) & (later | (recording.settings.kind == "steady")))
-    at = rows[there]
-    steady = recording.settings.kind == "steady"
-    loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
-    load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
-    instant = np.arange(len(values), dtype=float) if steady else recording.time
-    given = np.stack([*recording.inputs.values(), recording.speed, recording.time], axis=1)
-    alike = np.unique(given[at], axis=0, return_inverse=True)[1].ravel()
-    return RecordedSignal(
-        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], alike, ordered=not steady
-    )
 
 
 def _work(

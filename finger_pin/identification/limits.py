@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.exceptions import InputError
+from finger_pin.identification.scenario_parameters import ScenarioPart, bare, entry_of
 from finger_pin.typing import Array
 
 # How near to the edge, over the way to a corner; of how many numbers all corners are tried.
@@ -22,27 +23,30 @@ class Limits:
     """Bounds of numbers, and the scenarios that they make.
 
     Attributes:
-        family: The scenarios.
+        parts: The scenarios, of one recording each.
+        keys: Of the numbers, in the scenarios.
         low: Least values, shape (p,).
         high: Greatest values, shape (p,).
     """
 
-    family: ParametrisedScenario
+    parts: Sequence[ScenarioPart]
+    keys: Sequence[str]
     low: Array
     high: Array
 
     @classmethod
-    def checked(cls, family: ParametrisedScenario, low: Array, high: Array) -> Limits:
+    def checked(cls, parts: Sequence[ScenarioPart], parameters: Sequence[str], low: Array, high: Array) -> Limits:
         """Return limits; refuse a bound outside its own range, and all of them if no values within them go together.
 
         Raises:
             InputError: Naming the key, its bound and what is wrong with it.
         """
-        self = cls(family, low, high)
-        keys, middle = family.keys, 0.5 * (self.low + self.high)
+        self = cls(parts, [bare(key) for key in parameters], low, high)
+        keys, middle = self.keys, 0.5 * (self.low + self.high)
         anywhere = any(self.refusal(each) is None for each in self._corners(middle, np.ones(len(keys), dtype=bool)))
         for k, key in enumerate(keys):
-            alone = ParametrisedScenario(self.family.scenario, (key,))
+            part = next(each for each in parts if k in each.places)
+            alone = ParametrisedScenario(part.family.scenario, (key,))
             for bound in (self.low[k], self.high[k]):
                 try:
                     alone.with_values([float(bound)])
@@ -54,13 +58,14 @@ class Limits:
                     between = len(found) > 1 or any(each and each[0] in keys and each[0] != key for each in found)
                     if not (between and anywhere):
                         allowed = error.allowed if error.entry == key else f"with it {error.entry} {error.allowed}"
-                        raise InputError(f"identify.parameters.{key}", allowed, float(bound)) from None
+                        raise InputError(entry_of(parameters[k]), allowed, float(bound)) from None
         return self
 
     def refusal(self, values: Array) -> tuple[str, str] | None:
         """Return the entry that does not go with the others, and what it must be; None if all are allowed."""
         try:
-            self.family.with_values(values.tolist())
+            for part in self.parts:
+                part.at(values)
         except InputError as error:
             return error.entry, error.allowed
         return None

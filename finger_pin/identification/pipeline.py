@@ -18,6 +18,7 @@ from finger_pin.identification.comparison import LawComparison, compare_laws
 from finger_pin.identification.estimate import Fit, best_of, fit
 from finger_pin.identification.intervals import ProfileBound, covariance, profile
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
+from finger_pin.identification.scenario_parameters import entry_of
 from finger_pin.typing import Array
 
 # Directions that samples tell so much more surely than means over cycles do, and how many of them are looked along.
@@ -215,13 +216,13 @@ def _check_felt(problem: Problem, fits: Sequence[Fit], places: Sequence[Array]) 
     known = (each.slopes or problem.slopes(each.z) for each in fits)
     for by_signal in itertools.chain(known, map(problem.slopes, places)):
         for signal, slopes in zip(problem.signals, by_signal, strict=True):
-            size = max(float(np.max(np.abs(signal.measured))), 1e-300)
+            size = max(float(np.max(np.abs(signal.measured), initial=0.0)), 1e-300)
             low, high = problem.box
             felt |= np.any(np.abs(slopes) * (high - low) > 1e-9 * size, axis=0)
         if felt.all():
             return
     key = problem.keys[int(np.flatnonzero(~felt)[0])]
-    raise InputError(f"identify.parameters.{key}", "no output of any recording feels it; leave it out")
+    raise InputError(entry_of(key), "no output of any recording feels it; leave it out")
 
 
 def beside(problem: Problem, z: Array) -> list[Array]:

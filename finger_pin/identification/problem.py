@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,12 @@ from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.limits import Limits
-from finger_pin.identification.recordings import RecordedSignal
+from finger_pin.identification.recordings import RecordedSignal, Recording
+from finger_pin.identification.scenario_parameters import ScenarioPart, check_apart, is_of_scenario, owner
 from finger_pin.typing import Array
 
 # Errors of what is computed finely and roughly, of those asked for; means of every output that roughly count.
 _FINER, _ROUGHER, _MEANS = 0.1, 10.0, 40
-#: What may be found of an output itself, besides the scenario's numbers.
-OF_OUTPUTS = ("offset", "scale", "delay")
 
 
 @dataclass(frozen=True)
@@ -40,6 +39,10 @@ At = Callable[[Array], tuple[Scenario, dict[str, float]]]
 
 class RecordingModel(Protocol):
     """Recording, or a part of one, compared with a scenario."""
+
+    @property
+    def recording(self) -> Recording:
+        """The recording."""
 
     @property
     def scenario(self) -> Scenario:
@@ -109,23 +112,28 @@ class Problem:
         self.low = np.append(self.low, [own.low for own in further])
         self.high = np.append(self.high, [own.high for own in further])
         outputs = {f"{s.recording}.{s.name}" for s in self.signals}
-        self._numbers = np.array([k for k, key in enumerate(self.keys) if not key.startswith("recordings.")], dtype=int)
-        for key in self.keys[: self.asked]:
-            name, _, what = key.removeprefix("recordings.").rpartition(".")
-            if key.startswith("recordings.") and not (name in outputs and what in OF_OUTPUTS):
-                allowed = f"must be recordings.NAME.variable.label and .{', .'.join(OF_OUTPUTS)}; there are"
-                raise InputError(f"identify.parameters.{key}", f"{allowed} {', '.join(sorted(outputs))}")
+        self._numbers = np.array(
+            [k for k, key in enumerate(self.keys[: self.asked]) if is_of_scenario(key, outputs)], dtype=int
+        )
         keys = tuple(self.keys[k] for k in self._numbers)
 
-        def family(scenario: Scenario) -> ParametrisedScenario:
+        def part(model: RecordingModel) -> ScenarioPart:
+            scenario = model.scenario
+            check_apart(model.recording.name, model.recording.settings, [*keys, *self.held])
             if self.held:
                 scenario = ParametrisedScenario(scenario, tuple(self.held)).with_values(list(self.held.values()))
-            return ParametrisedScenario(scenario, keys)
+            return ScenarioPart.from_keys(scenario, model.recording.name, keys)
 
-        self._families = [family(model.scenario) for model in self.models]
+        self._parts = [part(model) for model in self.models]
         self.logarithmic = self.low > 0.0
-        self._limits = Limits.checked(self._families[0], self.low[self._numbers], self.high[self._numbers])
-        known = dict(zip(keys, self._families[0].values, strict=True)) | {own.key: own.start for own in further}
+        # Of recordings that are alike in what limits parameters one is enough.
+        by_recording = {model.recording.name: k for k, model in reversed(list(enumerate(self.models)))}
+        own = {m.recording.name for m in self.models if m.recording.settings.values} | {*filter(None, map(owner, keys))}
+        parts = [self._parts[k] for k in sorted({0, *(by_recording[name] for name in own)})]
+        self._limits = Limits.checked(parts, keys, self.low[self._numbers], self.high[self._numbers])
+        known: dict[str, Any] = {own.key: own.start for own in further}
+        for each in reversed(parts):
+            known |= {keys[k]: value for k, value in zip(each.places, each.family.values, strict=True)}
         neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
         middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
         own_values = [known.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
@@ -260,14 +268,16 @@ class Problem:
         self.best = min(self.best, twin.best, key=lambda each: each[0])
 
     def _places(self) -> list[At]:
-        def of(family: ParametrisedScenario) -> At:
+        """Return the scenario at given values, and the numbers of recordings themselves, for every model."""
+        others = sorted({*range(len(self.keys))} - {*self._numbers.tolist()})
+
+        def of(part: ScenarioPart) -> At:
             def at(values: Array) -> tuple[Scenario, dict[str, float]]:
-                numbers = {key: float(v) for key, v in zip(self.keys, values, strict=True) if key[:11] == "recordings."}
-                return family.with_values(values[self._numbers].tolist()), numbers
+                return part.at(values[self._numbers]), {self.keys[k]: float(values[k]) for k in others}
 
             return at
 
-        return [of(family) for family in self._families]
+        return [of(part) for part in self._parts]
 
     def subset(self, kept: Sequence[NDArray[np.bool_]]) -> Problem:
         """Return the problem with some of the samples of every signal."""

@@ -14,6 +14,7 @@ import xarray as xr
 
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.parametrised_scenario import ParametrisedScenario, split
+from finger_pin.description.recordings.bench import OF_RECORDINGS
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
 from finger_pin.identification.comparison import LawComparison
@@ -21,6 +22,7 @@ from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import LEVEL, ProfileBound, free_directions
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.identification.recordings import RecordedSignal
+from finger_pin.identification.scenario_parameters import bare, owner
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.keys import describe
 from finger_pin.typing import Array
@@ -59,6 +61,7 @@ def results(
     alike = sum(each < least + LEVEL for each in met)
     attrs = {
         "scenario": problem.scenario.name,
+        "scenario_toml": to_toml(problem.scenario),
         "undetermined": [words for words, _ in free],
         "searches": len(fits),
         "searches_alike": alike,
@@ -130,11 +133,10 @@ def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Profi
 
 
 def _units(problem: Problem, key: str) -> str:
-    if not key.startswith("recordings."):
-        return describe(key)["units"]
-    name, _, what = key.removeprefix("recordings.").rpartition(".")
-    unit = next((s.unit for s in problem.signals if f"{s.recording}.{s.name}" == name), "1")
-    return {"offset": unit, "delay": "s"}.get(what, "1")
+    unit = {f"{OF_RECORDINGS}{s.recording}.{s.name}": s.unit for s in problem.signals}.get(key.rpartition(".")[0])
+    if unit is None:
+        return describe(bare(key))["units"]
+    return {"offset": unit, "delay": "s"}.get(key.rpartition(".")[2], "1")
 
 
 def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
@@ -159,7 +161,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
         "signal_units": ("signal", [signals[k].unit for k in first]),
         "signal_steady": ("signal", [not signals[k].ordered for k in first]),
         "noise": ("signal", best.noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
-        "replicate_noise": ("signal", [_replicates(signals[k]) for k in first], {"long_name": "rms of equal readings"}),
+        "replicate_noise": ("signal", [replicates(signals[k]) for k in first], {"long_name": "rms of equal readings"}),
         "signal_samples": ("signal", np.bincount(whole["signal_index"], minlength=len(first))),
         "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
@@ -167,7 +169,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
     }
 
 
-def _replicates(signal: RecordedSignal) -> float:
+def replicates(signal: RecordedSignal) -> float:
     """Return the scatter of repeated readings about their mean, rms."""
     groups = signal.alike
     if signal.ordered or groups.max() + 1 == len(groups):
@@ -205,10 +207,10 @@ def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, probl
     ):
         plain, index = split(key)
         ends = f"{_end(low)} to {_end(high)}{'' if unit == '1' else f' {unit}'}"
-        if not key.startswith("recordings."):
+        if owner(key) is None:
             numbers[key] = value
         if not extended or key not in numbers:
-            lines.append(f"# {key} = {value:.6g}, {ends}, from {recordings}")
+            lines.append(f"# {key} = {value:.6g}, {ends}, from {owner(key) or recordings}")
             continue
         where = "" if index is None else f"number [{index}], "
         lines.append(f"{plain} = {_toml(problem, key, value)} # {where}{ends}, from {recordings}")

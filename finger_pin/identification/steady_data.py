@@ -1,4 +1,4 @@
-"""Steady readings: the closed forms of a scenario's tendons and servos for every row."""
+"""Steady readings: closed forms of a scenario's tendons and servos, or the posture at rest, for every row."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.problem import At, NuisanceParameter, own_number
 from finger_pin.identification.recordings import Recording
+from finger_pin.identification.settled import settled_posture
+from finger_pin.mechanism.coerce import fitted
+from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
 # Change of a number that slopes are taken by, of its size or its range.
 _CHANGE = 1e-5
-_OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current")
+_POSTURE = "joint_position"
+_OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current", _POSTURE)
 
 
 class SteadyReadings:
@@ -28,14 +32,15 @@ class SteadyReadings:
         own: Nothing is to be found for them alone.
     """
 
-    def __init__(self, recording: Recording, scenario: Scenario) -> None:
-        """Find the inputs.
+    def __init__(self, recording: Recording, scenario: Scenario, replacing: Finger | None = None) -> None:
+        """Find the inputs; a finger may replace the one that the scenario describes.
 
         Raises:
-            InputError: If one names nothing that the scenario has, if the tension of a tendon is missing, or if all of
-                one are negative.
+            InputError: If one names nothing that the scenario has, if the tension of a tendon is missing, if all of
+                one are negative, or if no one direction of sliding tells where joints come to rest.
         """
         self.recording, self.scenario, finger = recording, scenario, scenario.finger
+        self._replacing = replacing
         self.own: tuple[NuisanceParameter, ...] = ()
         self._entry = f"identify.recordings.{recording.name}"
         rows = len(recording.speed)
@@ -58,19 +63,29 @@ class SteadyReadings:
             else:
                 allowed = "a steady state is given tendon_command, spool_tension and joint_position"
                 raise InputError(f"{self._entry}.inputs.{name}", allowed)
-        places = {"motor_current": list(finger.actuators)}
+        places = {"motor_current": list(finger.actuators), _POSTURE: joints}
         self._outputs = []
         for name in recording.outputs:
             variable, _, label = name.partition(".")
             if variable not in _OUTPUTS:
                 raise InputError(f"{self._entry}.outputs.{name}", f"a steady state has {', '.join(_OUTPUTS)}")
-            self._outputs.append((variable, self._place(f"outputs.{name}", label, places.get(variable, tendons))))
+            place = self._place(f"outputs.{name}", label, places.get(variable, tendons))
+            self._outputs.append((variable, place))
+            if variable == _POSTURE:
+                recorded = recording.outputs[name]
+                self._position[:, place] = np.where(np.isfinite(recorded), recorded, self._position[:, place])
+        self._settles = any(variable == _POSTURE for variable, _ in self._outputs)
+        if self._settles:
+            self._check_direction()
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
-        held = self.recording.settings.at_rest
-        found = steady_state(scenario.finger, self.load, self.recording.speed, self._position, held)
+        settings = self.recording.settings
+        position = self._settled(scenario) if self._settles else self._position
+        held = settings.at_rest or self._settles
+        found = steady_state(scenario.finger, self.load, self.recording.speed, position, held)
         by_name = {"tendon_tension": found.tension, "tendon_friction": found.friction, "motor_current": found.current}
+        by_name[_POSTURE] = position
         name = self.recording.name
         return [
             own_number(own, name, output, "scale", 1.0) * by_name[variable][:, place]
@@ -80,23 +95,61 @@ class SteadyReadings:
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of the outputs by the values, shape (m, p) each; by differences."""
-        columns = []
+        columns, here = [], at(values)
+        computed = self.compute(*here)
+
+        def end(k: int, change: float) -> tuple[float, list[Array]]:
+            moved = values.copy()
+            moved[k] += change
+            try:
+                there = at(moved)
+                # What is of another recording changes nothing.
+                return moved[k], computed if there == here else self.compute(*there)
+            except InputError:
+                # At the edge of what is allowed there is one side only.
+                return values[k], computed
+
         for k, size in enumerate(_CHANGE * sizes):
-            ends = []
-            for change in (size, -size):
-                moved = values.copy()
-                moved[k] += change
-                try:
-                    ends.append((moved[k], self.compute(*at(moved))))
-                except InputError:
-                    # At the edge of what is allowed there is one side only.
-                    ends.append((values[k], self.compute(*at(values))))
+            ends = [end(k, change) for change in (size, -size)]
             (right, up), (left, down) = ends
             columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
     def tune(self, factor: float) -> None:
         """Do nothing: a closed form has no errors."""
+
+    def _finger(self, scenario: Scenario) -> Finger:
+        if self._replacing is not None:
+            return fitted(self._replacing, self.scenario, scenario)
+        return Finger(scenario.finger, objects=scenario.environment.objects)
+
+    def _settled(self, scenario: Scenario) -> Array:
+        """Return the posture at rest of every row nearest to what was read, shape (m, n), rad."""
+        finger, force = self._finger(scenario), np.array(scenario.environment.fingertip_force)
+        speeds = [None] * len(self.load) if self.recording.settings.speed is None else self.recording.speed.tolist()
+        rows = zip(self.load, speeds, self._position, strict=True)
+        return np.array([settled_posture(finger, load, speed, near, force) for load, speed, near in rows])
+
+    def _check_direction(self) -> None:
+        """Refuse joints that are both given and read, and a direction that does not tell what friction holds.
+
+        Of many postures at rest, a direction of sliding tells one where a single tendon rubs and the joints do not.
+        """
+        given = next((name for name in self.recording.inputs if name.startswith(_POSTURE)), None)
+        if given is not None:
+            raise InputError(f"{self._entry}.inputs.{given}", "is an output too: a posture is given or compared")
+        finger = self._finger(self.scenario)
+        pins = finger.joint_friction
+        joints_rub = bool(np.any(pins.bearing & ((pins.kinetic > 0.0) | (pins.static > 0.0) | (pins.drag > 0.0))))
+        tendons_rub = bool(np.any((finger.tendons.surface > 0.0) | (finger.tendons.drag > 0.0)))
+        several = tendons_rub and len(finger.tendons.surface) > 1
+        if self.recording.settings.speed is not None and (joints_rub or several):
+            rubbing = "joints rub" if joints_rub else "several tendons rub"
+            allowed = (
+                f"does not tell where the finger rests, as its {rubbing}: leave speed out for postures without "
+                f"friction (shaken, or the mean of drawn in and let out), or set that friction to 0"
+            )
+            raise InputError(f"{self._entry}.speed", allowed)
 
     def _place(self, where: str, label: str, names: Sequence[str]) -> int:
         if label not in names:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from finger_pin.files import write_text
 from finger_pin.views.document import document, image
-from finger_pin.views.plots.identification import plot_identification, plot_profiles
+from finger_pin.views.plots.identification import plot_identification, plot_predictions, plot_profiles, short_name
 
 
 def summarize_identification(result: xr.Dataset) -> str:
@@ -26,7 +26,8 @@ def summarize_identification(result: xr.Dataset) -> str:
     width = max(len(row[0]) for row in rows)
     doubt = [] if _borne_out(result) else [_agreement(result), ""]
     lines = [f"  {a.ljust(width)}{b.rjust(13)}{c.rjust(13)}{d.rjust(13)}  {e}".rstrip() for a, b, c, d, e in rows]
-    return "\n".join([*doubt, *lines, "", *_words(result)])
+    predicted = _predictions(result)
+    return "\n".join([*predicted, *([""] if predicted else []), *doubt, *lines, "", *_words(result)])
 
 
 def write_report(result: xr.Dataset, path: str | Path) -> Path:
@@ -42,6 +43,9 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
         ("What the recordings leave open", "".join(f"<p>{escape(line)}</p>" for line in _words(result))),
         ("How well every signal is met", _met(result) + image(plot_identification(result), "Signals")),
     ]
+    predicted = "".join(f"<p>{escape(line)}</p>" for line in _predictions(result))
+    if predicted:
+        sections.insert(0, ("What was predicted", predicted + image(plot_predictions(result), "Predictions")))
     if "law" in result.dims:
         sections.append(("Which law", _laws(result)))
     if result.sizes["parameter"] > 1:
@@ -74,6 +78,20 @@ def _signals(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
         (str(name), f"{noise:.3g}", str(count), f"{share * count:.0f}", str(unit))
         for name, noise, count, share, unit in zip(*(result[each].values for each in columns), strict=True)
     ]
+
+
+def _predictions(result: xr.Dataset) -> list[str]:
+    """Return a sentence on every signal that was held out."""
+    if "prediction" not in result.dims:
+        return []
+    columns = ("rms", "bias", "within", "scatter", "samples", "units")
+    rows = zip(result["prediction"].values, *(result[f"prediction_{each}"].values for each in columns), strict=True)
+    found = []
+    for name, rms, bias, within, scatter, count, unit in rows:
+        share = "" if math.isnan(within) else f", {within:.0%} of {count} samples within the 95 % band"
+        repeated = "" if math.isnan(scatter) else f"; repeats scatter by {scatter:.3g}"
+        found.append(f"Held out: {name} is predicted to {rms:.3g} {unit} rms, bias {bias:.3g}{share}{repeated}.")
+    return found
 
 
 def _end(value: float) -> str:
@@ -166,4 +184,4 @@ def _correlations(result: xr.Dataset) -> str:
     names = [str(each) for each in result["parameter"].values]
     values = result["correlation"].values
     rows = [(name, *(f"{value:.2f}" for value in row)) for name, row in zip(names, values, strict=True)]
-    return _table(["", *(".".join(name.split(".")[-2:]) for name in names)], rows)
+    return _table(["", *map(short_name, names)], rows)

@@ -9,11 +9,12 @@ import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.recordings.bench import RecordingSettings
-from finger_pin.identification.identify import build_problem
 from finger_pin.identification.limits import Limits
+from finger_pin.identification.models import build_problem
 from finger_pin.identification.motions import windows
 from finger_pin.identification.problem import minus_twice_likelihood
 from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.scenario_parameters import ScenarioPart
 from finger_pin.laws.spring import JOINT_SPRING
 
 COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"
@@ -263,7 +264,7 @@ def test_an_offset_and_a_delay_of_an_output_are_found():
     result = fp.identify("canal", parameters=parameters, recordings=recordings, **given)
     np.testing.assert_allclose(result.estimate, [0.15, 0.2], rtol=0.05)
     assert result.units.values.tolist() == ["1", "N"]
-    with pytest.raises(fp.InputError, match="must be recordings"):
+    with pytest.raises(fp.InputError, match="must be a key of the scenario, or variable"):
         wrong = {**parameters, f"{key}.gain": (0.1, 2.0)}
         fp.identify("canal", parameters=wrong, recordings=recordings, **given)
 
@@ -341,7 +342,8 @@ def test_coulomb_and_stiction_of_joints_are_found_together_though_their_bounds_o
 
 def test_values_that_do_not_go_together_are_brought_to_where_they_do_and_those_that_are_held_stay():
     family = ParametrisedScenario(fp.load_scenario("fig6"), (JOINT_COULOMB, JOINT_STICTION))
-    limits = Limits.checked(family, np.array([1e-4, 1e-4]), np.array([1e-3, 2e-3]))
+    part = ScenarioPart(family, np.arange(2))
+    limits = Limits.checked([part], family.keys, np.array([1e-4, 1e-4]), np.array([1e-3, 2e-3]))
     for given, free, nearest in [
         ((3e-4, 5e-4), (True, True), (3e-4, 5e-4)),
         ((9e-4, 5e-4), (True, False), (5e-4, 5e-4)),

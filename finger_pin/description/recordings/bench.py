@@ -5,9 +5,22 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
+
+#: What a parameter of one recording begins with, before its name.
+OF_RECORDINGS = "recordings."
+Bounds = dict[str, Annotated[tuple[float, float], vector(2)]]
+
+
+def _held_out(value: Any) -> bool | tuple[float, float]:
+    if isinstance(value, bool):
+        return value
+    numbers = isinstance(value, list | tuple) and len(value) == 2 and {*map(type, value)} <= {int, float}
+    if not numbers or not 0.0 <= value[0] < value[1] < math.inf:
+        raise problem("", "must be true, or the first and the last second of a part, such as [2.0, 3.0]", value)
+    return float(value[0]), float(value[1])
 
 
 class Column(Description):
@@ -46,7 +59,9 @@ class RecordingSettings(Description):
     inputs: dict[str, Column] = Field({}, description="Columns that feed the model, by variable.label.")
     outputs: dict[str, Column] = Field(min_length=1, description="Columns that it is compared with, by variable.label.")
     speed: Column | float | None = Field(
-        None, description="Steady: of sliding, m/s, positive as the tendon is drawn in; a number or a column."
+        None,
+        description="Steady: of sliding, m/s, positive as the tendon is drawn in; a number or a column. Left out, "
+        "postures (joint_position) are those without friction.",
     )
     at_rest: bool = Field(False, strict=True, description="Steady: read at rest, after having slid at that speed.")
     time: Column | None = Field(None, description="Motion: the column of times.")
@@ -63,18 +78,33 @@ class RecordingSettings(Description):
         0.0, unit="s", source="chosen", doc="Motion: run before what is compared, as bristles begin relaxed."
     )
 
+    values: dict[str, Any] = Field({}, description="By dotted key of the scenario, what holds for this one alone.")
+    parameters: Bounds = Field({}, description="As identify.parameters, what is found for this one alone.")
+
+    held_out: Annotated[bool | tuple[float, float], BeforeValidator(_held_out)] = Field(
+        False, description="Whether it, or what lies between two times in s from its start, is predicted, not fitted."
+    )
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.held_out is True and self.parameters:
+            raise problem("parameters", "are for a recording that is fitted, and this one is held out")
+        _check_ordered(self.parameters)
+        for key, value in self.values.items():
+            if isinstance(value, dict):
+                raise problem(f"values.{key}", "must be one value, not a table: write its dotted key in quotes")
         for group in ("inputs", "outputs"):
             for name in getattr(self, group):
                 if not all(name.partition(".")[::2]):
                     raise problem(f"{group}.{name}", "must be variable.label, such as tendon_tension.T1")
         if self.kind == "steady":
-            if self.speed is None:
+            if self.speed is None and not all(name.startswith("joint_position.") for name in self.outputs):
                 raise problem("speed", "is missing: of sliding, m/s, positive where the tendon is drawn in")
             for name in ("time", "window"):
                 if getattr(self, name) is not None:
                     raise problem(name, "is for motions only")
+            if isinstance(self.held_out, tuple):
+                raise problem("held_out", "must be true or false: only a motion has parts", list(self.held_out))
             if isinstance(self.speed, float) and (not math.isfinite(self.speed) or self.speed == 0.0):
                 raise problem("speed", "must be finite and not zero: friction has the sign of sliding", self.speed)
         else:
@@ -88,17 +118,37 @@ class RecordingSettings(Description):
 class IdentifySettings(Description):
     """The table ``[identify]`` of a scenario: the numbers to be found, the recordings, and rival laws."""
 
-    parameters: dict[str, Annotated[tuple[float, float], vector(2)]] = Field(
-        min_length=1, description="By dotted key of the scenario, the least and the greatest value."
-    )
+    parameters: Bounds = Field({}, description="By dotted key of the scenario, the least and the greatest value.")
     recordings: dict[Name, RecordingSettings] = Field(min_length=1, description="What was recorded, by name.")
     compare: dict[str, dict[str, Any]] = Field(
         {}, description="Other laws, by name: keys with a number that is held, or with bounds."
     )
 
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """The bounds of all that is found, by key; what is of one recording begins with its name."""
+        own = {
+            f"{OF_RECORDINGS}{name}.{key}": each
+            for name, recording in self.recordings.items()
+            for key, each in recording.parameters.items()
+        }
+        return self.parameters | own
+
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        for key, (low, high) in self.parameters.items():
-            if low >= high:
-                raise problem(f"parameters.{key}", "the least value must be below the greatest", [low, high])
+        _check_ordered(self.parameters)
+        if not self.bounds:
+            raise problem("parameters", "is missing: by dotted key of the scenario, the least and the greatest value")
+        if all(recording.held_out is True for recording in self.recordings.values()):
+            raise problem("recordings", "are all held out: none is left to be fitted")
+        for name, recording in self.recordings.items():
+            for key in recording.parameters:
+                if f"{OF_RECORDINGS}{name}.{key}" in self.parameters:
+                    raise problem(f"recordings.{name}.parameters.{key}", "stands in identify.parameters too")
         return self
+
+
+def _check_ordered(bounds: Bounds) -> None:
+    for key, (low, high) in bounds.items():
+        if low >= high:
+            raise problem(f"parameters.{key}", "the least value must be below the greatest", [low, high])

@@ -51,6 +51,42 @@ def plot_identification(result: xr.Dataset) -> Figure:
     return figure
 
 
+@styled
+def plot_predictions(result: xr.Dataset) -> Figure:
+    """Draw what was measured over what was predicted of every signal that was held out, with the band of 95 %.
+
+    Args:
+        result: Dataset of `identify` or `predict`.
+    """
+    names = result["prediction"].values
+    figure = new_figure(8.6, 2.6 * len(names) + 0.3, "constrained")
+    panels = figure.subplots(len(names), 1, squeeze=False).ravel()
+    for k, axes in enumerate(panels):
+        of_signal = result["predicted_index"].values == k
+        instant, load, measured, value, band = (
+            result[f"predicted_{name}"].values[of_signal]
+            for name in ("instant", "applied", "measured", "value", "band")
+        )
+        steady = bool(result["prediction_steady"].values[k])
+        by_load = steady and bool(np.isfinite(load).all())
+        over = load if by_load else instant
+        order = np.argsort(over, kind="stable")
+        over, measured, value, band = (each[order] for each in (over, measured, value, band))
+        if steady:
+            axes.errorbar(over, value, band, fmt="_", color=VERMILLION, label="predicted, 95 %")
+            axes.plot(over, measured, "o", color=BLUE, markersize=3.5, alpha=0.6, label="measured")
+        else:
+            axes.fill_between(over, value - band, value + band, color=VERMILLION, alpha=0.2, linewidth=0.0)
+            trace(axes, over, measured, color=BLUE, label="measured")
+            trace(axes, over, value, color=VERMILLION, label="predicted, 95 %", linewidth=1.0)
+        unit = str(result["prediction_units"].values[k])
+        rms = f"rms {result['prediction_rms'].values[k]:.3g} {unit}"
+        label = "load (N)" if by_load else "reading" if steady else "time (s)"
+        axes.set(title=f"{names[k]}, held out, {rms}", xlabel=label, ylabel=f"({unit})" if unit else "")
+    panels[0].legend(loc="best")
+    return figure
+
+
 def _computed(axes: Axes, over: Array, computed: Array) -> None:
     """Draw the computed values of steady readings: a curve, or marks for several at one load, as to and fro."""
     _, place = np.unique(over, return_inverse=True)
@@ -97,7 +133,12 @@ def _profile(axes: Axes, one: xr.Dataset) -> None:
             axes.axvline(end, color=GREY, linewidth=0.8)
     axes.plot([estimate], [0.0], "o", color=VERMILLION, markersize=5.0)
     unit = str(one["units"].values)
-    key = str(one["parameter"].values)
-    axes.set_title(".".join(key.split(".")[-2:]), color=BLACK)
+    axes.set_title(short_name(str(one["parameter"].values)), color=BLACK)
     axes.locator_params(axis="x", nbins=3)
     axes.set(xlabel="" if unit == "1" else f"({unit})", ylim=(-0.3, max(8.0, 1.2 * _LEVEL)))
+
+
+def short_name(key: str) -> str:
+    """Return the end of a parameter's key, after the name of its recording if it is of one."""
+    parts = key.split(".")
+    return f"{parts[1]}: {'.'.join(parts[-2:])}" if parts[0] == "recordings" else ".".join(parts[-2:])

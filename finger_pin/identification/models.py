@@ -1,0 +1,90 @@
+"""Models of recordings, and the problem of those that are to be fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.recordings.bench import IdentifySettings
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.identification.motions import RecordedMotion, windows
+from finger_pin.identification.problem import Problem, RecordingModel
+from finger_pin.identification.recordings import RecordedSignal, Recording, unit_of
+from finger_pin.identification.scenario_parameters import with_own_values
+from finger_pin.identification.steady_data import SteadyReadings
+from finger_pin.mechanism.coerce import fitted
+from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
+
+
+def build_problem(
+    scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording], finger: Finger | None = None
+) -> Problem:
+    """Return the problem whose objective is to be minimised.
+
+    Raises:
+        InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
+    """
+    models, signals = recording_models(scenario, taken, finger, [~held_out_rows(each) for each in taken])
+    bounds = settings.bounds
+    low, high = np.array(list(bounds.values()), dtype=float).T
+    count = sum(len(signal.measured) for signal in signals)
+    if count <= len(low):
+        raise InputError("identify.recordings", f"have {count} readings for {len(low)} parameters: more are needed")
+    return Problem(scenario, tuple(bounds), low, high, models, signals, {})
+
+
+def held_out_rows(recording: Recording) -> NDArray[np.bool_]:
+    """Return which rows of a recording are not fitted, shape (m,)."""
+    part, time = recording.settings.held_out, recording.time
+    return np.full(len(time), part) if isinstance(part, bool) else (time >= part[0]) & (time <= part[1])
+
+
+def recording_models(
+    scenario: Scenario, taken: Sequence[Recording], finger: Finger | None, wanted: Sequence[NDArray[np.bool_]]
+) -> tuple[list[RecordingModel], list[RecordedSignal]]:
+    """Return the models of recordings, one for each window that has wanted rows, and all of their outputs.
+
+    Raises:
+        InputError: If an input or output names nothing of the scenario.
+    """
+    models: list[RecordingModel] = []
+    signals: list[RecordedSignal] = []
+    for recording, rows_wanted in zip(taken, wanted, strict=True):
+        steady = recording.settings.kind == "steady"
+        pieces = [np.arange(len(recording.time))] if steady else windows(recording)
+        parts = [(k, rows) for k, rows in enumerate(pieces) if rows_wanted[rows].any()]
+        if not parts:
+            continue
+        own = with_own_values(scenario, recording.name, recording.settings)
+        replacing = None if finger is None else fitted(finger, scenario, own)
+        if steady:
+            models.append(SteadyReadings(recording, own, replacing))
+        else:
+            models += [RecordedMotion(recording, own, rows, k, replacing) for k, rows in parts]
+        signals += [
+            _signal(recording, name, values, rows, rows_wanted)
+            for _, rows in parts
+            for name, values in recording.outputs.items()
+        ]
+    return models, signals
+
+
+def _signal(
+    recording: Recording, name: str, values: Array, rows: NDArray[np.intp], wanted: NDArray[np.bool_]
+) -> RecordedSignal:
+    later = recording.time[rows] - recording.time[rows[0]] >= recording.settings.settle
+    there = np.flatnonzero(np.isfinite(values[rows]) & wanted[rows] & (later | (recording.settings.kind == "steady")))
+    at = rows[there]
+    steady = recording.settings.kind == "steady"
+    loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
+    load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
+    instant = np.arange(len(values), dtype=float) if steady else recording.time
+    given = np.stack([*recording.inputs.values(), recording.speed, recording.time], axis=1)
+    alike = np.unique(given[at], axis=0, return_inverse=True)[1].ravel()
+    return RecordedSignal(
+        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], alike, ordered=not steady
+    )

@@ -1,0 +1,236 @@
+"""Predictions: recordings that were not fitted, compared with what an identification says of them."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.description.loading import read_scenario
+from finger_pin.description.recordings.bench import RecordingSettings
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import validate
+from finger_pin.exceptions import InputError
+from finger_pin.identification.models import held_out_rows, recording_models
+from finger_pin.identification.problem import Problem
+from finger_pin.identification.recordings import Recording, read_recording
+from finger_pin.identification.results import replicates
+from finger_pin.identification.scenario_parameters import bare, owner
+from finger_pin.mechanism.coerce import FingerLike, resolve_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
+
+# Half a 95 % band, in deviations.
+_BAND = 1.96
+_NAMES = {
+    "rms": "rms of measured less predicted, in the unit of the signal",
+    "bias": "mean of measured less predicted, in the unit of the signal",
+    "within": "share of samples within the band",
+    "scatter": "rms of repeated readings or runs about their mean, in the unit of the signal",
+    "samples": "number of samples",
+    "units": "units of the signal",
+    "steady": "whether readings, not a motion",
+}
+
+
+def predict(
+    result: xr.Dataset,
+    recordings: Mapping[str, Mapping[str, Any]],
+    *,
+    data: Mapping[str, Mapping[str, Any]] | None = None,
+    finger: FingerLike | None = None,
+) -> xr.Dataset:
+    """Compare recordings with what an identification predicts of them; nothing is fitted.
+
+    The band is that of 95 %: the noise of fitted signals of the same name, and what the covariance of the parameters
+    does to the prediction.
+
+    Args:
+        result: Dataset of `identify`, as returned or as `load` reads it.
+        recordings: By name, entries as for `identify`; with ``held_out`` a part of one. What was found for one
+            recording alone counts where the name is that of this recording.
+        data: By name of a recording, columns by name, in place of its file.
+        finger: That which `identify` was given, if it was given one.
+
+    Returns:
+        Along ``prediction``, the signals: ``prediction_rms``, ``prediction_bias`` (measured less predicted),
+        ``prediction_within``, the share of samples in the band, ``prediction_scatter`` of equal readings of a table or
+        of runs with equal inputs, not a number without any; along ``predicted``, the samples: ``predicted_measured``,
+        ``predicted_value`` and ``predicted_band``, half its width.
+
+    Raises:
+        InputError: If a recording is wrong, or asks for a parameter that was not found.
+    """
+    if result.attrs.get("custom_finger") and finger is None:
+        raise InputError("finger", "is missing: this identification was given a finger that its scenario does not have")
+    scenario = read_scenario(tomllib.loads(result.attrs["scenario_toml"]))
+    taken = []
+    for name, each in recordings.items():
+        given = {**each, "held_out": each.get("held_out") or True}
+        settings = validate(RecordingSettings, given, ("identify", "recordings", name))
+        taken.append(read_recording(name, settings, (data or {}).get(name)))
+    own = resolve_finger(finger, scenario)
+    check_predictable(scenario, taken, own)
+    return predictions(result, scenario, taken, taken, own)
+
+
+def check_predictable(scenario: Scenario, taken: Sequence[Recording], finger: Finger | None) -> None:
+    """Compute what is held out of recordings once, under the scenario as it is, before any work.
+
+    Raises:
+        InputError: If an entry of one is wrong.
+    """
+    for recording in taken:
+        models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
+        if not any(len(signal.measured) for signal in signals):
+            entry = f"identify.recordings.{recording.name}.held_out"
+            raise InputError(entry, "has no samples", recording.settings.held_out)
+        problem = Problem(scenario, (), np.zeros(0), np.zeros(0), models, signals, {})
+        problem.residuals(problem.start)
+
+
+def predictions(
+    result: xr.Dataset,
+    scenario: Scenario,
+    taken: Sequence[Recording],
+    known: Sequence[Recording],
+    finger: Finger | None,
+) -> xr.Dataset:
+    """Return the Dataset of `predict` of what is held out of recordings; empty without any.
+
+    Args:
+        result: Dataset of `identify`.
+        scenario: Whose numbers were found.
+        taken: Recordings to predict.
+        known: Recordings among which those with equal inputs are repeated runs.
+        finger: Replaces the one that the scenario describes.
+    """
+    signals: list[dict[str, Any]] = []
+    for recording in taken:
+        problem, z, spread = _problem(result, scenario, recording, finger)
+        computed = zip(problem.signals, problem.residuals(z), problem.slopes(z), strict=True)
+        found: dict[str, list[Array]] = {}
+        for signal, residual, slopes in computed:
+            deviation = np.sqrt(
+                _noise(result, recording.name, signal.name) ** 2 + np.sum(slopes @ spread * slopes, axis=1)
+            )
+            value = np.where(np.isfinite(residual), signal.measured - residual, np.nan)
+            rows = np.stack([signal.instant, signal.load, signal.measured, value, _BAND * deviation])
+            found.setdefault(signal.name, []).append(rows)
+        for name, pieces in found.items():
+            first = next(each for each in problem.signals if each.name == name)
+            scatter = _repeats(recording, name, known) if first.ordered else replicates(first)
+            rows = np.concatenate(pieces, axis=1)
+            signals.append(
+                {"name": f"{recording.name}.{name}", "unit": first.unit, "steady": not first.ordered}
+                | {"rows": rows, "scatter": scatter}
+            )
+    return _dataset(signals) if signals else xr.Dataset()
+
+
+def _problem(
+    result: xr.Dataset, scenario: Scenario, recording: Recording, finger: Finger | None
+) -> tuple[Problem, Array, Array]:
+    """Return the problem of what is held out of a recording, the place that was found, and its covariance."""
+    models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
+
+    def acts(key: str) -> bool:
+        name = bare(key).rpartition(".")[0]
+        of_scenario = bare(key).partition(".")[0] in Scenario.model_fields
+        return owner(key) is None or (owner(key) == recording.name and (of_scenario or name in recording.outputs))
+
+    kept = [k for k, key in enumerate(result["parameter"].values) if acts(str(key))]
+    estimate, upper, low, high = (
+        result[name].values[kept].astype(float) for name in ("estimate", "linear_upper", "least", "greatest")
+    )
+    keys = tuple(str(result["parameter"].values[k]) for k in kept)
+    problem = Problem(scenario, keys, low, high, models, signals, {})
+    # Starts that would be found are those that were recorded.
+    count, z = len(kept), problem.start.copy()
+    z[:count] = problem.to_search(np.append(estimate, problem.values(z)[count:]))[:count]
+    ends = problem.to_search(np.append(upper, problem.values(z)[count:]))[:count]
+    spread = np.zeros((len(z), len(z)))
+    correlation = result["correlation"].values[np.ix_(kept, kept)]
+    spread[:count, :count] = np.outer(ends - z[:count], ends - z[:count]) / _BAND**2 * correlation
+    # An identification that was stopped early knows no covariance: noise alone makes the band.
+    return problem, z, np.nan_to_num(spread, nan=0.0)
+
+
+def _noise(result: xr.Dataset, recording: str, name: str) -> float:
+    """Return the noise of a fitted signal: that of the same recording, else the rms of those of the same name."""
+    noise = {str(key): float(each) for key, each in zip(result["signal"].values, result["noise"].values, strict=True)}
+    own = noise.get(f"{recording}.{name}")
+    alike = [each for key, each in noise.items() if key.partition(".")[2] == name]
+    if own is not None:
+        return own
+    return math.sqrt(sum(each**2 for each in alike) / len(alike)) if alike else math.nan
+
+
+def _repeats(recording: Recording, name: str, known: Sequence[Recording]) -> float:
+    """Return the rms of an output about its mean over motions with equal inputs; not a number of one alone."""
+
+    def repeats(other: Recording) -> bool:
+        same = other.inputs.keys() == recording.inputs.keys() and name in other.outputs
+        settings = (other.settings.values, other.settings.start) == (
+            recording.settings.values,
+            recording.settings.start,
+        )
+        return (
+            same
+            and settings
+            and all(
+                np.array_equal(a, b)
+                for a, b in (
+                    (other.time, recording.time),
+                    *((other.inputs[k], recording.inputs[k]) for k in other.inputs),
+                )
+            )
+        )
+
+    runs = np.array([each.outputs[name] for each in known if repeats(each)])
+    there = np.isfinite(runs).all(axis=0) & held_out_rows(recording)
+    if len(runs) < 2 or not there.any():
+        return math.nan
+    return float(np.sqrt(np.mean(np.var(runs[:, there], axis=0, ddof=1))))
+
+
+def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+    """Return the Dataset of predictions."""
+    found: dict[str, list[Any]] = {name: [] for name in _NAMES}
+    for each in signals:
+        _, _, measured, value, band = each["rows"]
+        off = measured - value
+        of_signal = {
+            "rms": float(np.sqrt(np.mean(off**2))),
+            "bias": float(np.mean(off)),
+            # A run that fails is within no band; without noise there is no band.
+            "within": float(np.mean(np.abs(off) <= band)) if np.isfinite(band).all() else math.nan,
+            "scatter": each["scatter"],
+            "samples": len(off),
+            "units": each["unit"],
+            "steady": each["steady"],
+        }
+        for name, values in found.items():
+            values.append(of_signal[name])
+    index = np.repeat(np.arange(len(signals)), found["samples"])
+    rows = np.concatenate([each["rows"] for each in signals], axis=1)
+    names = {
+        "instant": "time, s; number of a steady reading",
+        "applied": "what pulls, N",
+        "measured": "measured, in the unit of the signal",
+        "value": "predicted, in the unit of the signal",
+        "band": "half the width of the 95 % band about it",
+    }
+    return xr.Dataset(
+        {f"prediction_{name}": ("prediction", values, {"long_name": _NAMES[name]}) for name, values in found.items()}
+        | {"predicted_index": ("predicted", index, {"long_name": "which prediction"})}
+        | {
+            f"predicted_{name}": ("predicted", values, {"long_name": names[name]})
+            for name, values in zip(names, rows, strict=True)
+        },
+        {"prediction": [each["name"] for each in signals]},
+    )

@@ -1,0 +1,132 @@
+"""Parameters that are keys of a scenario: those that all recordings share, and those of one recording alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.parametrised_scenario import ParametrisedScenario, split
+from finger_pin.description.recordings.bench import OF_RECORDINGS, RecordingSettings
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
+
+#: What may be found of an output itself, besides the scenario's numbers.
+OF_OUTPUTS = ("offset", "scale", "delay")
+
+
+@dataclass(frozen=True, eq=False)
+class ScenarioPart:
+    """Scenarios of one recording, by the parameters that act on it.
+
+    Attributes:
+        family: The scenarios.
+        places: Which of the parameters that are keys of a scenario, shape (k,).
+    """
+
+    family: ParametrisedScenario
+    places: NDArray[np.intp]
+
+    def at(self, values: Array) -> Scenario:
+        """Return the scenario at values of all parameters that are keys of a scenario.
+
+        Raises:
+            InputError: Naming the entry that is wrong.
+        """
+        return self.family.with_values(values[self.places].tolist())
+
+    @classmethod
+    def from_keys(cls, scenario: Scenario, recording: str, keys: Sequence[str]) -> ScenarioPart:
+        """Return the scenarios of a recording, by those of the keys that are shared or its own.
+
+        Raises:
+            InputError: If the scenario has no such key.
+        """
+        places = [k for k, key in enumerate(keys) if owner(key) in (None, recording)]
+        for key in (keys[k] for k in places if owner(keys[k])):
+            try:
+                ParametrisedScenario(scenario, (bare(key),))
+            except InputError as error:
+                named = "" if error.entry == bare(key) else f"{error.entry}: "
+                raise InputError(entry_of(key), f"{named}{error.allowed}") from None
+        return cls(ParametrisedScenario(scenario, [bare(keys[k]) for k in places]), np.array(places, dtype=np.intp))
+
+
+def owner(key: str) -> str | None:
+    """Return the recording that a parameter is of; None if all share it."""
+    return key.split(".")[1] if key.startswith(OF_RECORDINGS) else None
+
+
+def bare(key: str) -> str:
+    """Return the key of a parameter in its recording's scenario."""
+    return key.split(".", 2)[2] if key.startswith(OF_RECORDINGS) else key
+
+
+def entry_of(key: str) -> str:
+    """Return the entry of a bench that a parameter stands at."""
+    own = owner(key)
+    return f"identify.parameters.{key}" if own is None else f"identify.recordings.{own}.parameters.{bare(key)}"
+
+
+def is_of_scenario(key: str, outputs: Iterable[str]) -> bool:
+    """Return whether a parameter is a key of a scenario, not an offset, scale or delay of an output.
+
+    Args:
+        key: Dotted key.
+        outputs: Names of all outputs, with their recordings.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    own = owner(key)
+    name, _, what = key.removeprefix(OF_RECORDINGS).rpartition(".")
+    known = sorted(outputs)
+    if own is None or (what in OF_OUTPUTS and name in known):
+        return own is None
+    if any(each.startswith(f"{own}.") for each in known) and bare(key).partition(".")[0] in Scenario.model_fields:
+        return True
+    allowed = f"must be a key of the scenario, or variable.label and .{', '.join(OF_OUTPUTS)}; there are"
+    raise InputError(entry_of(key), f"{allowed} {', '.join(known)}")
+
+
+def check_apart(recording: str, settings: RecordingSettings, keys: Sequence[str]) -> None:
+    """Refuse an entry of one recording that would hide, or be hidden by, a parameter that all recordings share.
+
+    Raises:
+        InputError: Naming the recording's entry.
+    """
+    shared = [key for key in keys if owner(key) is None]
+    own = [bare(key) for key in keys if owner(key) == recording]
+    for group, names in (("values", settings.values), ("parameters", own)):
+        for key in names:
+            hidden = next((each for each in shared if _overlap(key, each)), None)
+            if hidden is not None:
+                allowed = f"is found or held for all recordings as {hidden}; leave out one of them"
+                raise InputError(f"identify.recordings.{recording}.{group}.{key}", allowed)
+
+
+def with_own_values(scenario: Scenario, recording: str, settings: RecordingSettings) -> Scenario:
+    """Return the scenario of a recording, with the values that hold for it alone.
+
+    Raises:
+        InputError: Naming the recording's entry.
+    """
+    for key, value in settings.values.items():
+        try:
+            scenario = ParametrisedScenario(scenario, (key,)).with_values([value])
+        except InputError as error:
+            named = "" if error.entry == key else f"{error.entry}: "
+            raise InputError(
+                f"identify.recordings.{recording}.values.{key}", f"{named}{error.allowed}", value
+            ) from None
+    return scenario
+
+
+def _overlap(one: str, other: str) -> bool:
+    """Return whether two keys, with stars or indices, are of the same entry, or one of a table that has the other."""
+    (a, first), (b, second) = split(one), split(other)
+    same = all(x == y or "*" in (x, y) for x, y in zip(a.split("."), b.split("."), strict=False))
+    return same and (first is None or second is None or first == second)

@@ -1,0 +1,92 @@
+"""Settled postures: where a finger comes to rest under given tensions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from finger_pin.analysis.equilibrium import equilibrium
+from finger_pin.analysis.steady import steady_state
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
+
+# Change of an angle, rad, for differences; steps of Newton's method; the largest one of the last that is none.
+_CHANGE, _STEPS, _ARRIVED = 1e-6, 20, 1e-11
+# The longest step, rad, which leads past no other posture at rest.
+_LONGEST = 0.3
+# Angles' size of the masses of passive tendons, m.
+_OF_MASSES = 1e-3
+
+
+def settled_posture(finger: Finger, load: Array, speed: float | None, near: Array, force: Array) -> Array:
+    """Return the stable posture at rest near another, shape (n,), rad; not numbers if there is none.
+
+    Newton's method is tried first; the descent of `equilibrium` is some five times slower, and finds it from anywhere.
+
+    Args:
+        finger: With ideal sources of tension.
+        load: Tensions at the entrances of the canals, shape (a,), N.
+        speed: Of the tendons as they came to rest, m/s, positive as they were drawn in: their friction has its sign.
+            None: there is no friction any more.
+        near: Shape (n,), rad.
+        force: At the fingertip, shape (3,), N.
+
+    Raises:
+        InputError: If the finger is none that tensions alone bring to rest.
+    """
+    layout, joints = finger.layout, len(near)
+    if not np.any((finger.tendons.surface > 0.0) | (finger.tendons.drag > 0.0)):
+        speed = None
+    state = layout.unpack(finger.rest_state(near))
+    size = np.append(np.ones(joints), np.full(len(state.passive_position), _OF_MASSES))
+
+    def delivered(position: Array) -> Array:
+        if speed is None:
+            return load
+        found: Array = steady_state(finger, load[None], np.array([speed]), position[None], True).tension[0]
+        return found
+
+    def acceleration(y: Array) -> Array:
+        x = finger.rest_state((size * y)[:joints])
+        state = layout.unpack(x)
+        state.passive_position[:] = (size * y)[joints:]
+        rates = layout.unpack(finger.rhs(0.0, x, finger.packed_inputs(delivered(state.position)), force))
+        return np.asarray(np.append(rates.velocity, rates.passive_velocity) / size)
+
+    found = _newton(acceleration, np.append(state.position, state.passive_position) / size)
+    position = near if found is None else found[:joints]
+    for _ in range(_STEPS * _STEPS):
+        try:
+            rest = equilibrium(finger, delivered(position), position=position, fingertip_force=force).position
+        except InputError as error:
+            if error.entry == "inputs":
+                return np.full(joints, np.nan)
+            raise
+        # With friction the tension that is delivered belongs to the posture that it leads to.
+        if found is not None or speed is None or float(np.max(np.abs(rest - position))) < 1e-9:
+            return rest
+        position = rest
+    return np.full(joints, np.nan)
+
+
+def _newton(acceleration: Callable[[Array], Array], start: Array) -> Array | None:
+    """Return the stable zero of accelerations that Newton's method finds from a start; None if it finds none."""
+    y, slopes, before = start, np.zeros((0, 0)), 0.0
+    for _ in range(_STEPS):
+        here = acceleration(y)
+        if not before:
+            shifts = _CHANGE * np.eye(len(y))
+            slopes = np.transpose([acceleration(y + e) - acceleration(y - e) for e in shifts]) / (2.0 * _CHANGE)
+        try:
+            move = -np.linalg.solve(slopes, here)
+        except np.linalg.LinAlgError:
+            return None
+        length = float(np.max(np.abs(move)))
+        y = y + move * min(1.0, _LONGEST / max(length, 1e-300))
+        if length < _ARRIVED:
+            return y if bool(np.all(np.linalg.eigvals(slopes).real < 0.0)) else None
+        # Slopes serve on where a step is a tenth of the one before.
+        before = length if not before or length < 0.1 * before else 0.0
+    return None

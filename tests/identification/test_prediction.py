@@ -1,0 +1,122 @@
+"""Predictions of what was held out, against closed forms, and clear refusals."""
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.views.report import summarize_identification, write_report
+
+COULOMB = "finger.tendon_friction.coulomb"
+TURN, TRUE = np.pi / 2.0, 0.15
+
+
+def table(seed, loads, repeats=4, noise=0.05):
+    """Readings by the capstan law, with noise."""
+    load = np.repeat(loads, repeats)
+    exact = load * np.exp(-TRUE * TURN)
+    return {"in": load, "out": exact + np.random.default_rng(seed).normal(0.0, noise, load.size)}
+
+
+def steady(**more):
+    columns = {"inputs": {"tendon_command.T1": "in"}, "outputs": {"tendon_tension.T1": "out"}}
+    return {"kind": "steady", "speed": 0.05, **columns, **more}
+
+
+def ramp(seed, noise=0.02):
+    """The tension behind a canal whose tendon is drawn in evenly, in closed form but for its bristles' lag."""
+    time = np.arange(0.0, 1.01, 0.02)
+    pull = 3.0 + 4.0 * time
+    out = pull * np.exp(-TRUE * TURN) + np.random.default_rng(seed).normal(0.0, noise, time.size)
+    return {"t": time, "in": pull, "out": out}
+
+
+def motion(**more):
+    columns = {"inputs": {"tendon_command.T1": "in"}, "outputs": {"tendon_tension.T1": "out"}}
+    return {"time": "t", "settle": 0.3, **columns, **more}
+
+
+def found(recordings, data, **more):
+    given = {"parameters": {COULOMB: (0.01, 1.0)}, "starts": 1, **more}
+    return fp.identify("canal", recordings=recordings, data=data, **given)
+
+
+def test_readings_that_are_held_out_are_predicted_with_a_band_by_noise_and_covariance(tmp_path):
+    data = {"light": table(1, [2.0, 3.0, 4.0]), "heavy": table(2, [10.0, 12.0, 15.0], repeats=40)}
+    result = found({"light": steady(), "heavy": steady(held_out=True)}, data, output=tmp_path)
+    fitted, other = data["light"], data["heavy"]
+    # A line through the origin: share = exp(-mu phi), its variance noise^2 / sum(load^2).
+    share = fitted["in"] @ fitted["out"] / (fitted["in"] @ fitted["in"])
+    np.testing.assert_allclose(result.estimate, [-np.log(share) / TURN], rtol=1e-5)
+    noise = np.sqrt(np.mean((fitted["out"] - share * fitted["in"]) ** 2))
+    off = other["out"] - share * other["in"]
+    band = 1.96 * noise * np.sqrt(1.0 + other["in"] ** 2 / (fitted["in"] @ fitted["in"]))
+    means = other["out"].reshape(3, 40)
+    scatter = np.sqrt(np.sum((means - means.mean(axis=1, keepdims=True)) ** 2) / 117)
+    expected = {"rms": np.sqrt(np.mean(off**2)), "bias": off.mean(), "within": np.mean(np.abs(off) <= band)}
+    for name, value in {**expected, "scatter": scatter, "samples": 120}.items():
+        assert float(result[f"prediction_{name}"][0]) == pytest.approx(value, rel=1e-4), name
+    np.testing.assert_allclose(result.predicted_band, band, rtol=1e-3)
+    assert result.signal.values.tolist() == ["light.tendon_tension.T1"]
+    told = summarize_identification(result)
+    assert told.startswith("Held out: heavy.tendon_tension.T1 is predicted to ") and "repeats scatter by" in told
+    page = write_report(result, tmp_path / "page.html").read_text("utf-8")
+    assert page.index("What was predicted") < page.index("What was found")
+    again = fp.predict(fp.load(tmp_path / "identification.nc"), {"heavy": steady()}, data=data)
+    np.testing.assert_allclose(again.predicted_value, result.predicted_value, rtol=1e-12)
+    np.testing.assert_allclose(again.predicted_band, result.predicted_band, rtol=1e-12)
+
+
+def test_a_part_of_a_motion_is_held_out_and_runs_with_equal_inputs_are_repeats():
+    data = {"first": ramp(3), "second": ramp(4)}
+    recordings = {"first": motion(held_out=[0.6, 0.8]), "second": motion()}
+    result = found(recordings, data)
+    apart = (data["first"]["t"] >= 0.6 - 1e-12) & (data["first"]["t"] <= 0.8 + 1e-12)
+    assert np.sum(apart) == result.sizes["predicted"] == 11
+    later = np.sum(data["first"]["t"] >= 0.3 - 1e-12)
+    assert result.signal_samples.values.tolist() == [later - 11, later]
+    np.testing.assert_array_equal(result.predicted_measured, data["first"]["out"][apart])
+    # By the capstan law, but for bristles that lag by some mN.
+    share = np.exp(-float(result.estimate[0]) * TURN)
+    np.testing.assert_allclose(result.predicted_value, data["first"]["in"][apart] * share, atol=0.01)
+    difference = (data["first"]["out"] - data["second"]["out"])[apart]
+    # Two runs: the variance at a sample is half the square of their difference.
+    scatter = np.sqrt(np.mean(difference**2 / 2.0))
+    assert float(result.prediction_scatter[0]) == pytest.approx(scatter, rel=1e-9)
+    alone = fp.predict(result, {"first": motion(held_out=[0.6, 0.8])}, data=data)
+    np.testing.assert_allclose(alone.predicted_value, result.predicted_value, rtol=1e-12)
+    assert np.isnan(alone.prediction_scatter[0])
+
+
+def test_what_was_found_for_one_recording_counts_where_that_is_predicted():
+    """The zero of the load cell is that of the first day alone: 0.5 N there, none for another name."""
+    first = table(5, [3.0, 6.0, 9.0])
+    first["out"] = first["out"] + 0.5
+    own = steady(parameters={"tendon_tension.T1.offset": (-1.0, 1.0)})
+    result = found({"day": own, "other": steady()}, {"day": first, "other": table(6, [3.0, 6.0, 9.0])})
+    later = {"in": np.array([4.0, 8.0]), "out": np.array([4.0, 8.0])}
+    by_name = [fp.predict(result, {name: steady()}, data={name: later}).predicted_value for name in ("day", "new")]
+    np.testing.assert_allclose(by_name[0] - by_name[1], float(result.estimate[1]), rtol=1e-9)
+    assert float(result.estimate[1]) == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("held", "said"),
+    [
+        (steady(held_out="yes"), 'identify.recordings.b.held_out = "yes": must be true, or the first and the last'),
+        (steady(held_out=[0.0, 1.0]), "only a motion has parts"),
+        (motion(held_out=[2.0, 1.0]), "must be true, or the first and the last second"),
+        (motion(held_out=[5.0, 6.0]), "identify.recordings.b.held_out = [5.0, 6.0]: has no samples"),
+        (steady(held_out=True, parameters={COULOMB: (0.1, 1.0)}), "and this one is held out"),
+        (motion(held_out=True, outputs={"joint_position.wheel": "out"}), "there is no wheel; there are drum"),
+    ],
+)
+def test_what_cannot_be_held_out_is_refused_in_one_line_before_any_work(held, said):
+    data = {"a": table(1, [2.0, 3.0]), "b": ramp(1)}
+    with pytest.raises(fp.InputError) as refused:
+        found({"a": steady(), "b": held}, data, progress=lambda *_: pytest.fail("work has begun"))
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_recordings_of_which_none_is_fitted_are_refused():
+    with pytest.raises(fp.InputError, match="are all held out"):
+        found({"a": steady(held_out=True)}, {"a": table(1, [2.0, 3.0])})

@@ -1,0 +1,92 @@
+"""Settled postures as readings: springs and canal friction from tables of pulls and angles, against closed forms."""
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.identification.settled import settled_posture
+
+THREE = """
+[finger]
+name = "three"
+gravity = [0.0, 0.0, 0.0]
+joints.mcp = { range = [0.0, 1.6], spring = { stiffness = 0.5 }, link = { length = 0.05, width = 0.01, mass = 0.015 } }
+joints.pip = { range = [0.0, 1.6], spring = { stiffness = 0.5 }, link = { length = 0.03, width = 0.01, mass = 0.008 } }
+joints.dip = { range = [0.0, 1.6], spring = { stiffness = 0.5 }, link = { length = 0.02, width = 0.01, mass = 0.004 } }
+tendons.flexor.crossings = { mcp = { radius = 0.010 }, pip = { radius = 0.008 }, dip = { radius = 0.006 } }
+[controller]
+kind = "tensions"
+minimum_tension = 0.0
+"""
+RADIUS = {"mcp": 0.010, "pip": 0.008, "dip": 0.006}
+SPRING = {"mcp": 0.30, "pip": 0.20, "dip": 0.10}
+STIFFNESS, COULOMB, TURN = "finger.joints.drum.spring.stiffness", "finger.tendon_friction.coulomb", np.pi / 2.0
+
+
+def drum(**more):
+    """A recording of the drum of the canal."""
+    columns = {"inputs": {"tendon_command.T1": "in"}, "outputs": {"joint_position.drum": "q"}}
+    return {"settled": {"kind": "steady", "speed": {"column": "way", "scale": 0.01}, **columns, **more}}
+
+
+def test_springs_come_from_settled_postures_as_linear_regression_has_them(tmp_path):
+    """Joints whose friction is that of the defaults, shaken: k q = r T, with angles left out here and there."""
+    (tmp_path / "three.toml").write_text(THREE)
+    pull = np.repeat([3.0, 6.0, 9.0, 12.0], 2)
+    noise = np.random.default_rng(8).normal(0.0, 2e-3, (3, pull.size))
+    data = {name: RADIUS[name] * pull / SPRING[name] + e for name, e in zip(RADIUS, noise, strict=True)}
+    data["pip"][3] = np.nan
+    columns = {
+        "inputs": {"tendon_command.flexor": "pull"},
+        "outputs": {f"joint_position.{name}": {"column": name, "unit": "deg"} for name in RADIUS},
+    }
+    result = fp.identify(
+        str(tmp_path / "three.toml"),
+        parameters={f"finger.joints.{name}.spring.stiffness": (0.05, 1.0) for name in RADIUS},
+        recordings={"settled": {"kind": "steady", **columns}},
+        data={"settled": {"pull": pull, **{name: np.degrees(each) for name, each in data.items()}}},
+        starts=1,
+    )
+    seen = {name: np.isfinite(each) for name, each in data.items()}
+    expected = [
+        RADIUS[name] * pull[seen[name]] @ pull[seen[name]] / (pull[seen[name]] @ data[name][seen[name]])
+        for name in RADIUS
+    ]
+    np.testing.assert_allclose(result.estimate, expected, rtol=1e-4)
+    assert np.all((result.lower.values < [*SPRING.values()]) & ([*SPRING.values()] < result.upper.values))
+
+
+def test_drawn_in_and_let_out_tell_the_spring_and_the_friction_of_the_canal():
+    """The drum rests at k q = r T exp(-mu phi) after drawing in and r T exp(mu phi) after letting out, written out."""
+    pull, way = np.tile([2.0, 4.0, 6.0], 2), np.repeat([1.0, -1.0], 3)
+    exact = 0.02 * pull * np.exp(-0.15 * way * TURN) / 0.3
+    data = {"in": pull, "way": way, "q": exact + np.random.default_rng(4).normal(0.0, 1e-3, 6)}
+    parameters = {STIFFNESS: (0.1, 1.0), COULOMB: (0.01, 1.0)}
+    result = fp.identify("canal", parameters=parameters, recordings=drum(), data={"settled": data}, starts=1)
+    np.testing.assert_allclose(result.estimate, [0.3, 0.15], rtol=0.01)
+    assert np.all((result.lower.values < [0.3, 0.15]) & (result.upper.values > [0.3, 0.15]))
+
+
+@pytest.mark.parametrize("speed", [None, 0.01, -0.01])
+@pytest.mark.parametrize("near", [0.1, 1.2])
+def test_a_posture_at_rest_is_found_from_near_and_far(speed, near):
+    finger = fp.Finger(fp.load_scenario("canal", {COULOMB: 0.15}).finger)
+    found = settled_posture(finger, np.array([4.0]), speed, np.array([near]), np.zeros(3))
+    assert found == pytest.approx([0.02 * 4.0 * np.exp(-0.15 * TURN * np.sign(speed or 0.0)) / 0.2], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "overrides", "said"),
+    [
+        ({"inputs": {"tendon_command.T1": "in", "joint_position.drum": "q"}}, {}, "joint_position.drum: is an output"),
+        ({}, {"finger.joint_friction.stiction": 1e-4}, "settled.speed: does not tell where the finger rests"),
+        ({"speed": None, "outputs": {"tendon_tension.T1": "q"}}, {}, "settled.speed: is missing"),
+        ({"outputs": {"joint_position.wheel": "q"}}, {}, "there is no wheel; there are drum"),
+    ],
+)
+def test_postures_whose_friction_is_not_told_are_refused_in_one_line(change, overrides, said):
+    data = {"settled": {"in": [2.0, 4.0], "way": [1.0, -1.0], "q": [0.1, 0.4]}}
+    given = {"parameters": {STIFFNESS: (0.1, 1.0)}, "recordings": drum(**change), "data": data}
+    with pytest.raises(fp.InputError) as refused:
+        fp.identify("canal", **given, overrides=overrides)
+    assert said in str(refused.value) and "\n" not in str(refused.value)
