@@ -15,6 +15,7 @@ from finger_pin.laws.muscle import active_work
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.tendons import SOURCES_WITH_END, WINCHES
 from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
 from finger_pin.typing import Array
 
@@ -61,8 +62,9 @@ def equilibrium(
     posture, in short steps of Newton's method, so that it is stable.
 
     Args:
-        finger: One finger with ideal sources of tension, or a tree, whose actuators may have a lag.
-        inputs: Tensions f^a, N, then inputs of a tree's actuators, shape (u,), or by name.
+        finger: One finger with ideal sources of tension or winches, or a tree, whose actuators may have a lag.
+        inputs: Tensions f^a, N, or of winches what is wound in, m, then inputs of a tree's actuators, shape (u,), or by
+            name.
         position: theta to begin at, shape (n,), rad; by default the angles of the ranges nearest to zero.
         fingertip_force: F, shape (3,), N, base frame.
 
@@ -74,7 +76,8 @@ def equilibrium(
     _refuse_restless(finger)
     layout, actuated = finger.layout, finger.routing.actuated
     command = finger.packed_inputs(inputs)
-    if np.any(command[:actuated] < 0.0):
+    tense = ~finger.routing.winched
+    if np.any(command[:actuated][tense] < 0.0):
         raise InputError("inputs", "a tension must not be negative", command.tolist())
     pushed = np.array(finite_vector("fingertip_force", fingertip_force, 3))
     joints = len(finger.routing.joints)
@@ -105,7 +108,7 @@ def equilibrium(
         found = finger.evaluate(placed(scale * y), command, pushed)
         stored, _ = found.mechanism.account()
         raised = finger.motion(theta, np.zeros(joints)).potential_energy
-        given = found.tendons.entering[:actuated] @ finger.excursion(theta)
+        given = (tense * found.tendons.entering[:actuated]) @ finger.excursion(theta)
         given += pushed @ finger.rigid_body.tip_position(theta) + _given_by_actuators(found)
         return float(sum(stored.values()) + raised - given)
 
@@ -135,7 +138,7 @@ def equilibrium(
 def _refuse_restless(finger: Finger) -> None:
     """Refuse a finger that is no single one, or has parts whose rest inputs alone do not say."""
     description, tables = finger.description, finger.mechanism.rows
-    driven = any(table.pulls and table.group != "tension_sources" for table in tables)
+    driven = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
     own = any(table.states for table in finger.constructor_args[1])
     if description.hand is not None or driven or finger.layout.names_of("object_pose") or own:
         raise InputError("finger", "must be one finger with ideal sources of tension, without free objects")
@@ -147,7 +150,7 @@ def _refuse_restless(finger: Finger) -> None:
 def _given_by_actuators(found: FingerSignals) -> float:
     """Return the work of a tree's actuators along their lengths, J: the integral of a force that limits cut."""
     total = 0.0
-    for group in (STATELESS, STATEFUL):
+    for group in (STATELESS, STATEFUL, WINCHES):
         if group not in found.mechanism.rows:
             continue
         rows = found.mechanism.rows[group]

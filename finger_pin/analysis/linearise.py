@@ -178,7 +178,9 @@ def _output_names(finger: Finger, count: int) -> list[str]:
 
 
 def _input_names(finger: Finger) -> list[str]:
-    names = [f"tendon_command.{tendon}" for tendon in finger.routing.tendons[: finger.routing.actuated]]
+    routing = finger.routing
+    kinds = np.where(routing.winched, "tendon_winding", "tendon_command")
+    names = [f"{kind}.{tendon}" for kind, tendon in zip(kinds, routing.tendons, strict=False)]
     for motor, channel in zip(finger.actuators.names, finger.actuators.channels, strict=True):
         if channel in finger.actuators.voltages:
             names[channel] = f"motor_voltage.{motor}"

@@ -113,6 +113,9 @@ class ClosedLoop:
         ):
             if own != tuple(described):
                 raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(own))
+        for name, winched in zip(finger.routing.tendons, finger.routing.winched, strict=False):
+            if winched != (scenario.finger.tendons[name].winch is not None):
+                raise InputError(f"finger.tendons.{name}.winch", "must be that of the scenario's finger")
         alone = len(acting) == 1
         loop = cls(
             finger=finger,

@@ -27,7 +27,8 @@ class ControlSignals:
 
     Attributes:
         torque: tau^d, shape (..., n), N m.
-        tension: f_hat, shape (..., t), N: commands of the actuated tendons, then the planned passive tensions.
+        tension: f_hat, shape (..., t), N: commands of the actuated tendons, of winches the length that they wind in, m,
+            then the planned passive tensions.
         torque_deficit: Part of tau^d beyond the tension limits, shape (..., n), N m; None without limits.
         inputs: Of the actuators of a tree, shape (..., k); None without any.
     """

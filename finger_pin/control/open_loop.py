@@ -1,4 +1,4 @@
-"""Tensions over time, in open loop."""
+"""Tensions over time, and lengths that winches wind in, in open loop."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.core.inputs import InputTable, core_signal, scheduled_control
+from finger_pin.description.effects import wound_tendons
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import ForceSignal, InputSignal, SignalSettings
@@ -24,12 +25,12 @@ from finger_pin.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class OpenLoopTensions(LoopController):
-    """f^a over time.
+    """f^a over time, or of winches the length that they wind in.
 
-    The torque that goes with it is what it would exert free of friction; passive tensions are planned to be zero.
+    The torque that goes with it is what tensions would exert free of friction; passive ones are planned to be zero.
 
     Attributes:
-        signal: A signal for each of the a actuated tendons, N, then for each actuator of a tree.
+        signal: A signal for each of the a actuated tendons, N, of winches m, then for each actuator of a tree.
         routing: The routing.
     """
 
@@ -38,8 +39,14 @@ class OpenLoopTensions(LoopController):
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> OpenLoopTensions:
-        """Read ``controller.tensions`` and ``inputs``; what has none holds the keyframe's, else the minimum or 0."""
-        given = scenario.controller.tensions or {}
+        """Read ``controller.tensions``, ``tendon_winding`` and ``inputs``.
+
+        What has none holds the keyframe's, else the minimum or 0; of what is wound no tension is planned.
+        """
+        given: dict[str, SignalSettings] = dict.fromkeys(wound_tendons(scenario, scenario.controller), _constant(0.0))
+        given |= scenario.controller.tensions or {}
+        winched = dict(zip(routing.tendons, routing.winched, strict=False))
+        given |= {name: each for name, each in (scenario.controller.tendon_winding or {}).items() if winched[name]}
         held = scenario.keyframe.inputs if scenario.keyframe else {}
         least = expand(scenario.controller.minimum_tension, len(routing.tendons))
         settings: list[SignalSettings] = [
@@ -56,7 +63,7 @@ class OpenLoopTensions(LoopController):
     def from_samples(
         cls, samples: tuple[ArrayLike, ArrayLike], scenario: Scenario, routing: Routing
     ) -> OpenLoopTensions:
-        """Return the tensions through samples: times, shape (m,), s, and tensions, shape (m, a), N.
+        """Return the tensions through samples: times, shape (m,), s, and tensions, shape (m, a), N, of winches m.
 
         Inputs of a tree's actuators follow in further columns.
 
@@ -65,7 +72,7 @@ class OpenLoopTensions(LoopController):
         """
         columns = (*routing.tendons[: routing.actuated], *_actuators(scenario))
         signal = Signal.from_samples("controller", samples, columns, scenario.simulation.rtol)
-        least = float(np.min(np.asarray(samples[1])[:, : routing.actuated], initial=0.0))
+        least = float(np.min(np.asarray(samples[1])[:, : routing.actuated][:, ~routing.winched], initial=0.0))
         if least < 0.0:
             raise InputError("controller", "tensions must not be negative: a tendon only pulls", least)
         return cls(signal.later(scenario.simulation.start_time), routing)
@@ -76,10 +83,11 @@ class OpenLoopTensions(LoopController):
         """Return the tensions at one time, or at times of shape (m,)."""
         # Rounding may take what is at zero below it.
         given, actuated = self.signal.at(time)[0], self.routing.actuated
-        pulled = np.maximum(given[..., :actuated], 0.0)
+        winched = self.routing.winched
+        pulled = np.where(winched, given[..., :actuated], np.maximum(given[..., :actuated], 0.0))
         planned = np.zeros((*pulled.shape[:-1], self.routing.passive))
         return ControlSignals(
-            pulled @ self.routing.actuated_coupling,
+            np.where(winched, 0.0, pulled) @ self.routing.actuated_coupling,
             np.concatenate([pulled, planned], axis=-1),
             inputs=given[..., actuated:],
         )

@@ -4,11 +4,13 @@
 
 f^d are the tensions that the controller plans for the reference itself: what keeps tendons taut, and what compensates
 gravity or friction if it does. What the finger really needs beyond them has to come from angles that err.
+A motor whose spool angle or wound cord is given follows that in place of theta_m^d.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -18,6 +20,8 @@ from numpy.typing import NDArray
 from finger_pin.control.interface import Controller, ControlSignals
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.description.actuators import Actuator
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, ReferenceSignals
@@ -76,7 +80,13 @@ class PositionDrives:
     """
 
     def __init__(
-        self, finger: Finger, controller: Controller, reference: Reference, duration: float, start_time: float = 0.0
+        self,
+        finger: Finger,
+        controller: Controller,
+        reference: Reference,
+        duration: float,
+        start_time: float = 0.0,
+        wound: Mapping[int, tuple[Signal, float]] = {},
     ) -> None:
         """Work out the goals of a motion.
 
@@ -86,6 +96,7 @@ class PositionDrives:
             reference: The desired motion.
             duration: Of the motion, s.
             start_time: Of the motion, s.
+            wound: From `wound_spools`.
 
         Raises:
             InputError: If a goal is beyond what its encoder can be told, or drives differ in their period.
@@ -93,12 +104,17 @@ class PositionDrives:
         period = loop_period(finger)
         self._controller, actuators = controller, finger.actuators
         self._positioned = np.isin(np.arange(finger.routing.actuated), actuators.positioned)
+        given = actuators.tendons[np.any(actuators.spools[:, list(wound)] != 0.0, axis=1)]
+        self._wound = np.isin(np.arange(len(finger.routing.tendons)), given)
         self.channels = actuators.voltages
         times: Array = period * np.arange(math.ceil(duration / period) + 1.0)
         wanted = reference.at(times)
         planned = controller.command(times, wanted, wanted.position, wanted.velocity).tension
         drawn = finger.excursion(wanted.position)
-        goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated], drawn)[:, actuators.holds]
+        goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated], drawn)
+        for motor, (signal, radius) in wound.items():
+            goals[:, motor] = signal.later(start_time).at(times)[0][:, 0] / radius
+        goals = goals[:, actuators.holds]
         for (name, actuator), goal in zip(_positioned(finger), goals.T, strict=True):
             encoder = actuator.motor.encoder
             least, most = float(goal.min()), float(goal.max())
@@ -110,6 +126,8 @@ class PositionDrives:
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return the commands with the tensions of the goals in place of those of the errors."""
         plan = self._controller.command(time, reference, reference.position, reference.velocity)
+        if self._wound.any():
+            plan = replace(plan, tension=np.where(self._wound, 0.0, plan.tension))
         if self._positioned.all():
             return plan
         chosen = np.append(self._positioned, np.zeros(plan.tension.shape[-1] - len(self._positioned), dtype=bool))
@@ -120,13 +138,28 @@ class PositionDrives:
 
         From when it is let go a motor has `OPEN_CIRCUIT`.
         """
-        index = np.floor(np.asarray(time) / self.compiled.period * (1.0 + 1e-12)).astype(int)
-        held: Array = self.compiled.voltages[np.clip(index, 0, len(self.compiled.voltages) - 1)]
-        return held
+        return self.compiled.held(self.compiled.voltages, time)
 
 
 def _positioned(finger: Finger) -> list[tuple[str, Actuator]]:
     return [each for each in finger.description.actuators.items() if each[1].drive == "position"]
+
+
+def wound_spools(scenario: Scenario, finger: Finger) -> dict[int, tuple[Signal, float]]:
+    """Return what is wound in by motors in position drive, by their number: rad, or m and the radius of the spool."""
+    actuators, found = finger.actuators, {}
+    cords = [finger.routing.tendons[k] for k in actuators.tendons]
+    for part in scenario.parts().values():
+        given: dict[str, SignalSettings] = {**(part.controller.spool_angle or {})}
+        for name, settings in given.items():
+            found[actuators.names.index(name)] = settings, 1.0
+        for name, length in (part.controller.tendon_winding or {}).items():
+            if name in cords:
+                radii = actuators.spools[cords.index(name)]
+                motor = int(np.argmax(radii != 0.0))
+                found[motor] = length, float(radii[motor])
+    tolerance = scenario.simulation.rtol
+    return {motor: (Signal.from_settings([each], tolerance), radius) for motor, (each, radius) in found.items()}
 
 
 def loop_period(finger: Finger) -> float:

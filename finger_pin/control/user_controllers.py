@@ -7,6 +7,7 @@ refused at the first call. One that comes later ends the simulation there, and w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,8 @@ from numpy.typing import ArrayLike
 from finger_pin.control.build import build_controller
 from finger_pin.control.interface import Controller, ControlSignals, LoopController
 from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.recordings.series import Series
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
@@ -24,6 +27,8 @@ from finger_pin.typing import Array
 
 #: Times, shape (m,), s, and values, one row for each.
 Samples = tuple[ArrayLike, ArrayLike]
+#: Times, and columns by name.
+Columns = tuple[ArrayLike, Mapping[str, ArrayLike]]
 
 # Rounding, N.
 _LEAST = -1e-6
@@ -86,7 +91,8 @@ class UserReference:
 class UserController(LoopController):
     """Custom controller.
 
-    It returns `ControlSignals`, or only the tensions: of all tendons, or of the actuated ones.
+    It returns `ControlSignals`, or only the tensions: of all tendons, or of the actuated ones. The number of a winch is
+    the length that it winds in, m.
 
     Attributes:
         controller: Asked for one time at a time: time, s, `ReferenceSignals`, theta and theta', shape (n,).
@@ -162,7 +168,8 @@ class UserController(LoopController):
             names = ", ".join(routing.tendons)
             allowed = f"command() must return {sizes} tensions ({names}) for one time, not shape {tension.shape}"
             raise InputError("controller", allowed)
-        torque = _numbers(getattr(found, "torque", tension[: routing.actuated] @ routing.actuated_coupling))
+        pulled = np.where(routing.winched, 0.0, tension[: routing.actuated])
+        torque = _numbers(getattr(found, "torque", pulled @ routing.actuated_coupling))
         if torque.shape != (len(routing.joints),):
             allowed = f"command() must return {len(routing.joints)} torques for one time, not shape {torque.shape}"
             raise InputError("controller", allowed)
@@ -171,8 +178,10 @@ class UserController(LoopController):
         return ControlSignals(torque, tension, getattr(found, "torque_deficit", None))
 
     def _check(self, found: ControlSignals, finite: bool) -> None:
-        for name, tension in zip(self._routing.tendons, found.tension, strict=True):
-            if tension < _LEAST or (finite and not np.isfinite(tension)):
+        routing = self._routing
+        for k, (name, tension) in enumerate(zip(routing.tendons, found.tension, strict=True)):
+            pushes = tension < _LEAST and not (k < routing.actuated and routing.winched[k])
+            if pushes or (finite and not np.isfinite(tension)):
                 allowed = f"tensions must be finite and not negative, that of {name} is not; clip it at 0 or above"
                 raise InputError("controller", allowed, float(tension))
 
@@ -182,6 +191,25 @@ def _numbers(value: object) -> Array:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         return np.full((), np.nan)
+
+
+def with_columns(
+    scenario: Scenario, controller: Controller | Samples | Columns | None
+) -> tuple[Scenario, Controller | Samples | None]:
+    """Return a scenario with samples given by name, times and columns, and the controller that is left, if any.
+
+    Columns have the names of ``controller.file``: tendons, ``spool_angle.NAME`` and ``tendon_winding.NAME``.
+    """
+    if not (isinstance(controller, tuple | list) and len(controller) == 2 and isinstance(controller[1], Mapping)):
+        return scenario, controller
+    times, overrides = controller[0], dict[str, Any]()
+    for name, values in controller[1].items():
+        wound = name.startswith(("spool_angle.", "tendon_winding."))
+        samples = {"kind": "samples", "times": Series(_numbers(times)), "values": Series(_numbers(values))}
+        overrides[f"controller.{name}" if wound else f"controller.tensions.{name}"] = samples
+        if not wound:
+            overrides["controller.kind"] = "tensions"
+    return load_scenario(scenario, overrides), None
 
 
 def choose_controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> LoopController:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -280,15 +279,6 @@ def check_actuators(actuators: dict[str, Actuator], actuated: tuple[str, ...], p
             if tendon in owner:
                 raise problem(entry, f"{tendon} has two sources: {owner[tendon]} pulls it already; leave one out")
             owner[tendon] = name
-
-
-def check_sources(actuators: dict[str, Actuator], tensions: Iterable[str]) -> None:
-    """Raise the error of a tendon that is given tensions while a motor holds its spool."""
-    for tendon in tensions:
-        for name, actuator in actuators.items():
-            if tendon in actuator.tendons and actuator.drive == "position":
-                allowed = f"has two sources: finger.actuators.{name} holds the angle of its spool; leave one out"
-                raise problem(f"controller.tensions.{tendon}", allowed)
 
 
 def check_currents(actuators: dict[str, Actuator], tension: dict[str, float]) -> None:

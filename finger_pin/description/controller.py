@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, field_serializer, field_validator
 
 from finger_pin.description.by_finger import dump_set_fields, flatten, unflatten
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.signals import ForceSignal, InputSignal, of_axes
+from finger_pin.description.signals import ForceSignal, InputSignal, SpoolAngle, WoundLength, of_axes
 from finger_pin.description.validation import (
     Description,
     FullName,
@@ -23,6 +23,7 @@ from finger_pin.description.validation import (
     reals,
     suggestion,
 )
+from finger_pin.description.winding import BY_SOURCE, check_winding
 
 Share = Annotated[float, real(0.0, 2.0)]
 
@@ -100,9 +101,10 @@ class ControllerSettings(Description):
     """The paper's controller (19)-(22), with the compensations and limits that a table or entry asks for.
 
     With ``kind = "tensions"`` the tensions are given over time instead. That is also the default where nothing is said
-    of a closed loop (no gain or other entry of it, and no reference) and there is no other way: tensions are given, a
-    tree has actuators, or tensions cannot hold the finger at every posture, but its joints have springs. In a file,
-    ``file`` then names a CSV file: its columns are ``time`` and actuated tendons, and become samples of ``tensions``.
+    of a closed loop (no gain or other entry of it, and no reference) and there is no other way: tensions or windings
+    are given, a tree has actuators, or tensions cannot hold the finger at every posture, but its joints have springs.
+    In a file, ``file`` then names a CSV file: its columns are ``time`` and actuated tendons, and become samples of
+    ``tensions``; those called ``spool_angle.NAME`` and ``tendon_winding.NAME`` become samples of these.
 
     In a hand it is the controller of every finger, with what the finger's table in ``fingers`` has on top; only
     ``sampling`` is the same for all.
@@ -118,6 +120,12 @@ class ControllerSettings(Description):
     )
     tensions: dict[FullName, ForceSignal] | None = Field(
         None, description="By actuated tendon; one without a signal is held at its minimum tension."
+    )
+    spool_angle: dict[FullName, SpoolAngle] | None = Field(
+        None, description="By motor in position drive: the goal of its loop in place of the reference's."
+    )
+    tendon_winding: dict[FullName, WoundLength] | None = Field(
+        None, description="By tendon: what its motor in position drive winds in, or, without a motor, an ideal winch."
     )
     inputs: dict[Name, InputSignal] | None = Field(
         None, description="By actuator of a tree; one without a signal has zero input."
@@ -149,8 +157,8 @@ class ControllerSettings(Description):
 
     fingers: dict[Name, ControllerSettings] | None = Field(None, description="By finger, entries that differ there.")
 
-    _flat = field_validator("tensions", mode="before")(flatten)
-    _nested = field_serializer("tensions", mode="wrap")(unflatten)
+    _flat = field_validator(*BY_SOURCE, mode="before")(flatten)
+    _nested = field_serializer(*BY_SOURCE, mode="wrap")(unflatten)
     _sparse = field_serializer("fingers")(dump_set_fields)
 
     @property
@@ -172,6 +180,7 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
         entry = "controller.passive_tension_loop"
         raise problem(entry, "works from sample to sample: set controller.sampling.period too")
     _check_tensions(settings, finger)
+    check_winding(finger, settings.spool_angle or (), settings.tendon_winding or (), settings.kind)
     joints, tendons = tuple(finger.joints), tuple(finger.tendons)
     of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")
     sizes: list[tuple[str, Numbers | None, tuple[tuple[str, ...], str]]] = [
@@ -209,7 +218,7 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
     actuators = tuple(finger.tree.actuators) if finger.tree else ()
     for name in settings.inputs or {}:
         if name not in actuators:
-            hint = suggestion(name, actuators)
+            hint = f"; give controller.spool_angle.{name}" if name in finger.actuators else suggestion(name, actuators)
             allowed = f"no such actuator; there are {', '.join(actuators) or 'none'}{hint}"
             raise problem(f"controller.inputs.{name}", allowed)
     if settings.kind == "proportional":
@@ -222,7 +231,7 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
         if name in finger.passive_names:
             raise problem(entry, f"is a passive tendon, which has no actuator; actuated are {', '.join(names)}")
         if name not in names:
-            hint = suggestion(name, names)
+            hint = f"; give controller.spool_angle.{name}" if name in finger.actuators else suggestion(name, names)
             raise problem(entry, f"no such tendon; actuated are {', '.join(names)}{hint}")
         if signal.lowest < 0.0:
             raise problem(entry, f"a tendon only pulls: the tension must stay at or above 0 N, not {signal.lowest:g} N")

@@ -31,6 +31,16 @@ class Rule(NamedTuple):
 _OPEN = 'has no effect with controller.kind = "tensions"'
 
 
+def wound_tendons(scenario: Any, controller: Any) -> set[str]:
+    """Return the names of the tendons whose wound length is given, by their own or by the angle of their spool."""
+    angles = controller.spool_angle or {}
+    given = {*(controller.tendon_winding or {})}
+    for name, each in scenario.finger.actuators.items():
+        if name in angles or given.intersection(each.tendons):
+            given.update(each.tendons)
+    return given | {name for name, each in scenario.finger.tendons.items() if each.winch}
+
+
 def _paths(finger: Any) -> tuple[str, ...]:
     """Return the names of the tree's tendons whose paths those that are pulled take."""
     return tuple(tendon.along for tendon in finger.tendons.values() if tendon.along)
@@ -163,9 +173,10 @@ OF_SCENARIO = (
         "controller",
         ("minimum_tension",),
         lambda scenario, controller: (
-            controller.kind == "proportional" or {*scenario.finger.actuated_names} - {*(controller.tensions or {})}
+            controller.kind == "proportional"
+            or {*scenario.finger.actuated_names} - {*(controller.tensions or {}), *wound_tendons(scenario, controller)}
         ),
-        "has no effect where controller.tensions has every tendon",
+        "has no effect where controller.tensions has every tendon, or a winding does",
     ),
     Rule(
         "controller",

@@ -134,6 +134,17 @@ class Crossing(Description):
     )
 
 
+class Winch(Description):
+    """An ideal winch: it winds the cord in by w, whatever that takes, T = max(0, K (w - l) - D l')."""
+
+    stiffness: Annotated[float, real(0.0, 1e9, above=True)] = quantity(
+        2e4, unit="N/m", source="a braid of E A = 6000 N over 0.3 m", doc="K, of the cord from the winch to the finger."
+    )
+    damping: Annotated[float, real(0.0, 1e6)] = quantity(
+        10.0, unit="N s/m", source="estimate: that of elastic tendons", doc="D, on the speed of the cord in its canal."
+    )
+
+
 class Tendon(Description):
     """A tendon: the joints that it crosses, in order from its actuator or proximal anchor."""
 
@@ -146,8 +157,12 @@ class Tendon(Description):
     crossings: dict[Name, Crossing] = Field({}, description="By joint, in order along the tendon.")
     along: Name | None = Field(None, description="In place of crossings: the tendon of the tree whose path it takes.")
     maximum_tension: Annotated[float, real(0.0, _MOST_TENSION, above=True)] | None = quantity(
-        None, unit="N", source="design", doc="The most that its ideal source pulls with; without end if left out."
+        None,
+        unit="N",
+        source="design",
+        doc="The most that its ideal source or winch pulls with; without end if left out.",
     )
+    winch: Winch | None = Field(None, description="An ideal winch, which `controller.tendon_winding` turns.")
     mass_after: int | None = Field(
         None,
         ge=0,
@@ -157,8 +172,9 @@ class Tendon(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if self.kind == "passive" and self.maximum_tension is not None:
-            raise problem("maximum_tension", "is for actuated tendons only", self.maximum_tension)
+        for name in ("maximum_tension", "winch"):
+            if self.kind == "passive" and getattr(self, name) is not None:
+                raise problem(name, "is for actuated tendons only", self.maximum_tension)
         if self.kind == "actuated" and self.mass_after is not None:
             raise problem("mass_after", "is for passive tendons only", self.mass_after)
         if self.mass_after is not None and self.mass_after > len(self.crossings):

@@ -24,6 +24,8 @@ _SIGNAL_FILES = (
     ("controller", "file", "tensions", "N"),
     ("environment", "fingertip_force_file", "fingertip_force_signal", "N"),
 )
+# Tables that a column of the controller's file may name, and their units.
+_WINDINGS = {"spool_angle": "rad", "tendon_winding": "m"}
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
 _KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
 
@@ -206,8 +208,12 @@ def resolve_signals(table: Table, folder: Path) -> None:
     for section, key, target, unit in _SIGNAL_FILES:
         settings = table.get(section)
         if isinstance(settings, dict) and key in settings:
-            samples = read_signals(f"{section}.{key}", settings.pop(key), folder, unit)
-            settings[target] = {**as_table(settings.get(target)), **samples}
+            apart = _WINDINGS if section == "controller" else {}
+            samples = read_signals(f"{section}.{key}", settings.pop(key), folder, unit, apart)
+            for name, each in samples.items():
+                before, _, own = name.partition(".")
+                chosen, known = (before, own) if own and before in apart else (target, name)
+                settings[chosen] = {**as_table(settings.get(chosen)), known: each}
     _share_times(table)
 
 

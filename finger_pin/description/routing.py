@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
@@ -40,6 +41,7 @@ class Routing:
         curvature_offset: phi_off, shape (t,), rad.
         loads: Shape (n, s), one where a strand loads a joint, equation (17).
         fingers: Of every finger the indices of its joints and of its tendons; of one finger all.
+        winched: Which actuated tendons an ideal winch winds: their input is a length, m; shape (a,).
     """
 
     joints: tuple[str, ...]
@@ -51,6 +53,7 @@ class Routing:
     curvature_offset: Array
     loads: Array
     fingers: tuple[tuple[Indices, Indices], ...]
+    winched: NDArray[np.bool_]
 
     @classmethod
     @memoised(_parts)
@@ -92,6 +95,9 @@ class Routing:
             ),
             loads=np.array(loads).reshape(-1, len(joints)).T,
             fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
+            winched=np.array(
+                [description.tendons[name].winch is not None for name in description.actuated_names], bool
+            ),
         )
 
     @property

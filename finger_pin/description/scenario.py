@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.actuators import check_currents, check_sources
+from finger_pin.description.actuators import check_currents
 from finger_pin.description.by_finger import dump_set_fields, error_of_finger, flatten, of_finger, unflatten
 from finger_pin.description.caching import memoised
 from finger_pin.description.controller import ControllerSettings, check_controller
@@ -32,6 +32,7 @@ from finger_pin.description.simulation_settings import InitialSettings, Simulati
 from finger_pin.description.tautness import Tautness
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.description.validation import Description, FullName, Name, expand, problem, quantity, suggestion, vector
+from finger_pin.description.winding import BY_SOURCE, check_sources, hand_with_winches, with_winches
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
@@ -116,9 +117,17 @@ class Scenario(Description):
         if self.hand is not None:
             if self.finger is not None:
                 raise problem("finger", "leave it out: the hand has fingers of its own")
+            own, wound = self.controller.fingers or {}, self.controller.tendon_winding or {}
+            by_finger = {
+                name: [*wound, *((own[name].tendon_winding if name in own else None) or ())]
+                for name in self.hand.fingers
+            }
+            object.__setattr__(self, "hand", hand_with_winches(self.hand, by_finger))
             object.__setattr__(self, "finger", self.hand.joined())
         if self.finger is None:
             raise problem("finger", "is missing: a finger, or a hand")
+        if self.hand is None and self.controller.tendon_winding:
+            object.__setattr__(self, "finger", with_winches(self.finger, tuple(self.controller.tendon_winding)))
         tree, objects = self.finger.tree, self.environment.objects
         if tree is not None and tree.objects:
             environment = self.environment.updated(objects={**tree.objects, **(objects or {})})
@@ -149,7 +158,9 @@ class Scenario(Description):
     def _is_open(self) -> bool:
         """Return whether a finger is given tensions, or can be driven by them in open loop alone."""
         finger, tree = self.finger, self.finger.tree
-        if self.controller.tensions or (tree is not None and (tree.actuators or not finger.tendons)):
+        given = any(getattr(self.controller, table) for table in BY_SOURCE)
+        wound = given or any(tendon.winch for tendon in finger.tendons.values())
+        if wound or (tree is not None and (tree.actuators or not finger.tendons)):
             return True
         routing, springs = Routing.from_description(finger), any(joint.spring for joint in finger.joints.values())
         routed = any(tendon.along for tendon in finger.tendons.values())
@@ -218,11 +229,12 @@ class Scenario(Description):
             return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
 
         controller, given = of_finger(self.controller, name), (self.controller.fingers or {}).get(name)
-        if controller.tensions is not None:
-            # In a finger's own table its name may be left out.
-            tensions = (given.tensions if given else None) or {}
-            named = {f"{name}.{key.removeprefix(f'{name}.')}": each for key, each in tensions.items()}
-            controller = controller.updated(tensions=own(self.controller.tensions or {}) | named)
+        for table in BY_SOURCE:
+            if getattr(controller, table) is not None:
+                # In a finger's own table its name may be left out.
+                signals = (getattr(given, table) if given else None) or {}
+                named = {f"{name}.{key.removeprefix(f'{name}.')}": each for key, each in signals.items()}
+                controller = controller.updated(**{table: own(getattr(self.controller, table) or {}) | named})
         simulation, initial = self.simulation, self.simulation.initial
         if initial is not None:
             start = {"position": own(initial.position), "velocity": own(initial.velocity)}
@@ -248,14 +260,22 @@ class Scenario(Description):
         initial = self.simulation.initial or InitialSettings()
         keyframes = tuple(self.finger.tree.keyframes) if self.finger.tree else ()
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
-        pulled = dict.fromkeys(key.partition(".")[0] for key in (self.controller.tensions or {}) if self.hand)
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
             "reference.joints": (self.reference.joints, "joint", joints),
             "simulation.initial.position": (initial.position, "joint", joints),
             "simulation.initial.velocity": (initial.velocity, "joint", joints),
             "simulation.initial.keyframe": ([initial.keyframe] if initial.keyframe else (), "keyframe", keyframes),
             "controller.fingers": (self.controller.fingers or (), "finger", fingers),
-            "controller.tensions": (pulled, "finger", fingers),
+            **{
+                f"controller.{table}": (
+                    dict.fromkeys(
+                        key.partition(".")[0] for key in (getattr(self.controller, table) or {}) if self.hand
+                    ),
+                    "finger",
+                    fingers,
+                )
+                for table in BY_SOURCE
+            },
             "environment.fingers": (self.environment.fingers or (), "finger", fingers),
         }
         for name, settings in (self.controller.fingers or {}).items():
@@ -282,7 +302,7 @@ class Scenario(Description):
         routed = any(tendon.along for tendon in self.finger.tendons.values())
         if self.controller.kind == "proportional" and not closure.holds and not routed:
             self._check_taut(routing, str(closure))
-        check_sources(self.finger.actuators, self.controller.tensions or {})
+        check_sources(self.finger, self.controller.tensions or {})
         rest = expand(self.controller.minimum_tension, len(routing.tendons))
         if self.controller.kind == "proportional" and closure.holds:
             rest = closure.tension * np.max(rest / closure.tension)

@@ -26,6 +26,8 @@ _NEEDED: dict[str, tuple[str, ...]] = {
 }
 _ANGLE = real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)
 _FORCE = real(-_MOST_FORCE, _MOST_FORCE)
+_MOST_TURN, _MOST_WOUND, _MILLIMETRES = 1e6, 1.0, " m (is it in millimetres?)"
+_TURN, _WOUND = real(-_MOST_TURN, _MOST_TURN), real(-_MOST_WOUND, _MOST_WOUND, hint=_MILLIMETRES)
 
 
 class SignalSettings(Description):
@@ -117,6 +119,28 @@ class InputSignal(SignalSettings):
     height: Annotated[float, _FORCE] | None = quantity(None, unit="1", source="chosen", doc="Of the step or ramp.")
     values: Annotated[tuple[float, ...] | Series, series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
         None, unit="1", source="chosen", doc="At the points or samples."
+    )
+
+
+class SpoolAngle(SignalSettings):
+    """Angle of the spool of a motor in position drive."""
+
+    offset: Annotated[float, _TURN] = quantity(0.0, unit="rad", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _TURN] = quantity(0.0, unit="rad", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _TURN] | None = quantity(None, unit="rad", source="chosen", doc="Of the step or ramp.")
+    values: Annotated[tuple[float, ...] | Series, series(-_MOST_TURN, _MOST_TURN)] | None = quantity(
+        None, unit="rad", source="chosen", doc="At the points or samples."
+    )
+
+
+class WoundLength(SignalSettings):
+    """Length of a tendon that is wound in, from where it is just taut with all joints at zero."""
+
+    offset: Annotated[float, _WOUND] = quantity(0.0, unit="m", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _WOUND] = quantity(0.0, unit="m", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _WOUND] | None = quantity(None, unit="m", source="chosen", doc="Of the step or ramp.")
+    values: Annotated[tuple[float, ...] | Series, series(-_MOST_WOUND, _MOST_WOUND, _MILLIMETRES)] | None = quantity(
+        None, unit="m", source="chosen", doc="At the points or samples."
     )
 
 

@@ -212,7 +212,7 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
         raise InputError(entry, context["allowed"], context["value"].content) from None
     if found["type"] == "extra_forbidden":
         names = sorted(_fields(model, location[:-1]))
-        near = nearest(location[-1], names)
+        near = _MEANT.get(location[-1], "") if _MEANT.get(location[-1]) in names else nearest(location[-1], names)
         hint = f"; did you mean {'.'.join([*prefix, *location[:-1], near])}?" if near else ""
         raise InputError(entry, f"unknown key; allowed here: {', '.join(names)}{hint}") from None
     if found["type"] == "missing":
@@ -224,6 +224,11 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
     raise InputError(entry, _MESSAGES.get(found["type"], message[:1].lower() + message[1:]), value) from None
 
 
+# What people call keys whose names are not near.
+_MEANT = {"motor_position": "spool_angle", "motor_angle": "spool_angle", "winding": "tendon_winding"} | {
+    "windings": "tendon_winding",
+    "tendon_length": "tendon_winding",
+}
 _MESSAGES = {
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",

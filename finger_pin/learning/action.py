@@ -1,4 +1,4 @@
-"""Actions of a policy: tensions that are held, or goals of motors in position drive."""
+"""Actions of a policy: tensions that are held, lengths that winches wind, or goals of motors in position drive."""
 
 from __future__ import annotations
 
@@ -58,12 +58,19 @@ class Action(LoopController):
             if holds.any():
                 names = [name for name, held in zip(finger.actuators.names, holds, strict=True) if held]
                 raise InputError("action", f'"tension" is not for motors in position drive: {", ".join(names)}')
+            if finger.routing.winched.any():
+                raise InputError("action", '"tension" is not for winches; "tendon_winding" is')
             self.low, self.high = _inputs(finger)
             self.names = finger.input_names
             self._goals: Callable[[Array], Array] = np.array
+        elif kind == "tendon_winding" and finger.routing.winched.all() and finger.routing.actuated:
+            self.low, self.high = _inputs(finger)
+            self.names = finger.input_names
+            self._goals = np.array
         else:
             if len(finger.actuators.positioned) != finger.mechanism.channels:
-                raise InputError("action", f'"{kind}" needs motors in position drive at all tendons')
+                winches = ", or winches" if kind == "tendon_winding" else ""
+                raise InputError("action", f'"{kind}" needs motors in position drive{winches} at all tendons')
             radius = finger.actuators.radius
             if kind == "joint_position":
                 free = np.delete(np.arange(len(finger.routing.joints)), coupling.followers)
@@ -72,7 +79,7 @@ class Action(LoopController):
                 self.names = tuple(finger.routing.joints[k] for k in free)
             else:
                 self.names = finger.actuators.names
-                scale = radius if kind == "tendon_length" else np.ones(len(radius))
+                scale = radius if kind == "tendon_winding" else np.ones(len(radius))
                 self._goals = partial(_over, scale)
                 self.low, self.high = (each * scale for each in _reach(finger))
             rows = math.ceil(duration / loop_period(finger)) + 1
@@ -153,9 +160,7 @@ class Action(LoopController):
     def voltages(self, time: Array | float) -> Array:
         """Return the voltages held at one time, or at times (m,), by motor, V."""
         assert self._drives is not None
-        index = np.floor(np.asarray(time) / self._drives.period * (1.0 + 1e-12)).astype(int)
-        held: Array = self._drives.voltages[np.clip(index, 0, len(self._drives.voltages) - 1)]
-        return held
+        return self._drives.held(self._drives.voltages, time)
 
     def _places(self, time: Array | float) -> Array:
         return np.maximum(np.searchsorted(self._begins, np.asarray(time) * (1.0 + 1e-12), side="right") - 1, 0)
@@ -174,21 +179,25 @@ class Action(LoopController):
             raise InputError("limits", f"must be a pair of numbers, or of {len(self.low)} each", limits) from None
         if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
             raise InputError("limits", "must be finite, the least below the largest", [low.tolist(), high.tolist()])
-        pulling = slice(None, self._finger.routing.actuated)
+        pulling = np.flatnonzero(~self._finger.routing.winched)
         if self._drives is None and (low[pulling] < 0.0).any():
             raise InputError("limits", "tensions must not be negative: a tendon cannot push", low.tolist())
         return low, high
 
 
 def _inputs(finger: Finger) -> tuple[Array, Array]:
-    """Return least and largest inputs: tensions, and what the actuators of a tree take.
+    """Return least and largest inputs: tensions or, of winches, lengths, and what the actuators of a tree take.
 
     Raises:
         InputError: If an actuator's input has no range, and it holds no joint whose range would say.
     """
-    description = finger.description
+    description, winched = finger.description, finger.routing.winched
+    drawn = finger.excursion(_corners(finger)).T if winched.any() else np.zeros((len(winched), 1))
     ends = [
-        (0.0, each.maximum_tension or _STRONGEST) for each in description.tendons.values() if each.kind == "actuated"
+        (0.0, each.maximum_tension or _STRONGEST)
+        if each.winch is None
+        else (own.min(), own.max() + (each.maximum_tension or _STRONGEST) / each.winch.stiffness)
+        for each, own in zip(description.tendons.values(), drawn, strict=False)
     ]
     for name, each in (description.tree.actuators if description.tree is not None else {}).items():
         reach = each.reach(description.joints[each.joint].range if each.joint else None)
@@ -214,10 +223,15 @@ def _spools(finger: Finger, coupling: PassiveCoupling, free: NDArray[np.int64], 
     return finger.actuators.angle(position, tension, finger.excursion(position))
 
 
+def _corners(finger: Finger) -> Array:
+    """Return the postures at the corners of the joints' ranges, shape (2^n, n), rad."""
+    limiter = finger.stroke_limiter
+    return np.array(np.meshgrid(*zip(limiter.lower, limiter.upper, strict=True))).reshape(len(limiter.lower), -1).T
+
+
 def _reach(finger: Finger) -> tuple[Array, Array]:
     """Return the least and the largest spool angles that postures need, and some stretch, shape (m,), rad."""
-    limiter, actuators = finger.stroke_limiter, finger.actuators
-    corners = np.array(np.meshgrid(*zip(limiter.lower, limiter.upper, strict=True))).reshape(len(limiter.lower), -1).T
+    actuators, corners = finger.actuators, _corners(finger)
     drawn = finger.excursion(corners)
     taut = actuators.angle(corners, None, drawn)
     stretched = actuators.angle(corners, np.full(drawn.shape, _STRONGEST), drawn)

@@ -53,10 +53,11 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                     are observed or privileged, of what ``draw`` returned, and of ``action``, each with the worlds in
                     front, shape (worlds, ...). One of a single world's signals is given to `per_world` first.
                 action: ``"tension"``, N, and of an imported hand the inputs of its actuators, each within its range;
-                    ``"motor_position"``, the goal of motors in position drive, rad; or
-                    ``"tendon_length"``, the length that their spools have drawn in, of several tendons the first,
-                    m; or ``"joint_position"``, goals of the joints that no passive tendon drives, rad, for which
-                    drives turn the spools as the scenario's own finger needs it, whatever numbers are drawn.
+                    ``"spool_angle"``, the goal of motors in position drive, rad; or
+                    ``"tendon_winding"``, the length that their spools have drawn in, of several tendons the first,
+                    or ideal winches, m; or ``"joint_position"``, goals of the joints that no passive tendon drives,
+                    rad, for which drives turn the spools as the scenario's own finger needs it, whatever numbers are
+                    drawn.
                 limits: Least and largest action; by default 0 to 20 N or a source's most, what inputs' ranges allow,
                     or what the joints' ranges need.
                 observation: Names of variables of the result; or for each a `Sensor`, and under names of their own

@@ -22,7 +22,8 @@ Signals = Mapping[str, Array]
 #: A function of them, for all worlds at once.
 Function = Callable[[Signals], ArrayLike]
 #: Ways in which a policy acts.
-ACTIONS = ("tension", "motor_position", "tendon_length", "joint_position")
+ACTIONS = ("tension", "spool_angle", "tendon_winding", "joint_position")
+_BEFORE = {"motor_position": "spool_angle", "tendon_length": "tendon_winding"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,7 @@ class Task:
 
     def __post_init__(self) -> None:
         """Check the entries that do not depend on the scenario."""
+        object.__setattr__(self, "action", _BEFORE.get(self.action, self.action))
         if self.action not in ACTIONS:
             raise InputError("action", f"must be one of {', '.join(ACTIONS)}", self.action)
         for name in ("reward", "done", "draw"):

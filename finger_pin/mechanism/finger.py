@@ -223,9 +223,11 @@ class Finger:
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs u: the actuated tendons, then the actuators of a tree."""
-        tree = self.description.tree
-        return (*self.routing.tendons[: self.routing.actuated], *(tree.actuators if tree is not None else ()))
+        """Names of the inputs u: the actuated tendons, of winches what is wound, then the actuators of a tree."""
+        tree, routing = self.description.tree, self.routing
+        names = zip(routing.tendons, routing.winched, strict=False)
+        pulled = (f"tendon_winding.{name}" if winched else name for name, winched in names)
+        return (*pulled, *(tree.actuators if tree is not None else ()))
 
     def packed_inputs(self, given: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
         """Return inputs u, shape (u,), from a sequence or from a table by name, 0 if left out.
@@ -252,7 +254,8 @@ class Finger:
 
         Args:
             x: Packed state, shape (size,) or (m, size).
-            inputs: u, shape (a,) or (m, a): tensions f^a, N; of a motor in position drive its voltage, V.
+            inputs: u, shape (a,) or (m, a): tensions f^a, N; of a motor in position drive its voltage, V; of an ideal
+                winch the length that is wound in, m.
             fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
                 default.
             base: Motion of a hand's palm, the numbers of `base_motion`, shape (27,) or (m, 27); at rest by default.

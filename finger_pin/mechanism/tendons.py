@@ -30,6 +30,9 @@ LOSSES = (
 )
 SLACK = Energy("slack", "tensions cut at zero")
 BRISTLES = Energy("tendon_bristles", "tendon bristles")
+#: Tables of sources of tension that are rows: those with an end, and ideal winches.
+SOURCES_WITH_END, WINCHES = "tension_sources", "winches"
+_WOUND = Energy("winches", "winches, through their cords")
 _HALVES = ("proximal", "distal")
 # What the law calls otherwise.
 _NAMES = {"ratio": "stiction_ratio"}
@@ -149,17 +152,25 @@ class Tendons:
         return tuple(f"{name}.{half}" for name, share in held if share for half in _HALVES)
 
     def sources(self, description: FingerDescription, width: int) -> list[Rows]:
-        """Return the table of ideal sources whose tension has an end, none without any."""
-        most = {name: each.maximum_tension for name, each in description.tendons.items()}
-        places = np.array([k for k, name in enumerate(self.routing.tendons) if most[name] is not None], dtype=np.int64)
-        if not places.size:
-            return []
-        names = tuple(self.routing.tendons[k] for k in places)
-        ends = np.array([most[name] for name in names], dtype=float)
-        arm, none = np.zeros((len(places), width)), np.zeros(len(places))
-        arm[:, : len(self.routing.joints)] = self.routing.coupling[places]
-        numbers = np.array([none + 1.0, none, none, none, none, ends, none, ends])
-        return [Rows("tension_sources", ACTUATOR, names, numbers, arm, channels=places, powers=(SOURCES,), pulls=names)]
+        """Return the tables of ideal sources whose tension has an end, and of ideal winches, none without any."""
+        plain, winches = {}, {}
+        for k, name in enumerate(self.routing.tendons):
+            tendon, most = description.tendons[name], description.tendons[name].maximum_tension
+            if tendon.winch is not None:
+                # T = max(0, K (w - l) - D l'), as a position actuator of MuJoCo that only pulls.
+                stiff, end = tendon.winch.stiffness, np.inf if most is None else most
+                winches[k] = [stiff, 0.0, -stiff, -tendon.winch.damping, -np.inf, np.inf, 0.0, end]
+            elif most is not None:
+                plain[k] = [1.0, 0.0, 0.0, 0.0, 0.0, most, 0.0, most]
+        found = []
+        for group, numbers, supplied in ((SOURCES_WITH_END, plain, SOURCES), (WINCHES, winches, _WOUND)):
+            if not numbers:
+                continue
+            places, arm = np.array(list(numbers), dtype=np.int64), np.zeros((len(numbers), width))
+            arm[:, : len(self.routing.joints)] = self.routing.coupling[places]
+            law, pulls = np.array(list(numbers.values())).T, tuple(self.routing.tendons[k] for k in places)
+            found.append(Rows(group, ACTUATOR, pulls, law, arm, channels=places, powers=(supplied,), pulls=pulls))
+        return found
 
     def pulled(self, drives: Sequence[Rows]) -> dict[str, Array]:
         """Return the weights with which drives and halves' hysteresis pull the s strands, by table, shape (s, k)."""

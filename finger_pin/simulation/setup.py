@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled_control
 from finger_pin.control.interface import LoopController
-from finger_pin.control.position_drive import PositionDrives
+from finger_pin.control.position_drive import PositionDrives, wound_spools
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.stepping.integrator import integrate_compiled
@@ -106,7 +106,8 @@ class Setup:
         sampled = None if sampling is None else SampledController(loop, sampling)
         if positioned:
             duration, start = scenario.simulation.duration, scenario.simulation.start_time
-            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, start)
+            wound = wound_spools(scenario, loop.finger)
+            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, start, wound)
             loop = replace(loop, drives=drives)
         if sampled is not None:
             loop = replace(loop, controller=sampled)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import Controller
-from finger_pin.control.user_controllers import Samples
+from finger_pin.control.user_controllers import Columns, Samples, with_columns
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
@@ -23,7 +23,7 @@ from finger_pin.simulation.running import interruptible, run
 def simulate(
     scenario: ScenarioLike,
     *,
-    controller: Controller | Samples | None = None,
+    controller: Controller | Samples | Columns | None = None,
     reference: Reference | Samples | None = None,
     fingertip_force: Samples | None = None,
     finger: FingerLike | None = None,
@@ -44,7 +44,9 @@ def simulate(
     Args:
         scenario: The scenario to simulate, its name, or the path of a file.
         controller: Replaces the scenario's controller: an object with ``command``, asked for one time at a time, or
-            tensions in open loop, as times, shape (m,), s, and tensions of the actuated tendons, shape (m, a), N.
+            tensions in open loop, as times, shape (m,), s, and tensions of the actuated tendons, shape (m, a), N; or
+            times and columns by name, each of shape (m,): ``{"spool_angle.M1": angles}``, rad,
+            ``{"tendon_winding.T1": lengths}``, m, and tensions by tendon.
         reference: Replaces the scenario's reference: an object with ``at``, asked for one time at a time, or times,
             shape (m,), s, and angles, shape (m, k), rad, of the k joints that no passive tendon drives; the others
             follow (20). Between samples the motion is a monotone cubic.
@@ -81,13 +83,13 @@ def simulate(
             where the core does not integrate in one piece. `check_convergence` compares two runs.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
-    scenario = load_scenario(scenario)
+    scenario, controls = with_columns(load_scenario(scenario), controller)
     given = resolve_finger(finger, scenario)
-    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, given)
+    loop = ClosedLoop.from_scenario(scenario, controls, reference, fingertip_force, given)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
         if loop.palm is not None and loop.start is not None:
             loop.palm.put(loop.finger, loop.start)
-    own = own_parts(controller, reference, fingertip_force, initial, given)
+    own = own_parts(controls, reference, fingertip_force, initial, given)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
     return interruptible(lambda asked: run(scenario, loop, own, control_period, progress, observe, asked), stop)

@@ -97,7 +97,7 @@ class Simulator:
         self._fresh = self._stepper.state_snapshot
         self._compiled = CompiledFinger(finger)
         # Which of the inputs are tensions.
-        self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
+        self._pulling = np.setdiff1d(np.flatnonzero(~finger.routing.winched), finger.actuators.voltages)
 
     def _at(self, position: Array) -> Array:
         """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
@@ -191,7 +191,8 @@ class Simulator:
         """Advance by a time under constant tensions; return the state then.
 
         Args:
-            inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon.
+            inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon;
+                of an ideal winch the length that is wound in, m.
                 Inputs of a tree's actuators follow.
             dt: s.
             fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.

@@ -39,7 +39,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     tip = ("time", "axis") if len(loop.finger.rigid_body.tips) == 1 else ("time", "finger", "axis")
     table |= {
         "fingertip_position": Quantity(tip, lambda of: of.motion.tip, "m", "fingertip position", "1"),
-        "tendon_command": Quantity(_TENDON, lambda of: of.control.tension, "N", "commanded or planned tension", "21b"),
+        "tendon_command": Quantity(_TENDON, _tension, "N", "commanded or planned tension", "21b"),
         "tendon_tension": Quantity(
             _TENDON,
             lambda of: of.loop.finger.routing.tendon_tension(of.finger.tendons.strands),
@@ -73,10 +73,54 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     }
     if loop.finger.layout.names_of("joint_stiction"):
         table["joint_stiction"] = _of_state("joint_stiction")
-    table |= _of_wraps(loop) | _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _measured(loop) | _more(loop)
+    table |= (
+        _of_wraps(loop)
+        | _of_windings(loop)
+        | _of_palm(loop)
+        | _of_motors(loop)
+        | _of_passive(loop)
+        | _measured(loop)
+        | _more(loop)
+    )
     for name, each in table.items():
         if frame := _frame(name, each):
             table[name] = each._replace(frame=frame)
+    return table
+
+
+def _tension(of: SampledTrajectory) -> Array:
+    routing, command = of.loop.finger.routing, of.control.tension
+    # A winch is commanded a length.
+    return np.where(np.append(routing.winched, np.zeros(routing.passive, dtype=bool)), 0.0, command)
+
+
+def _of_windings(loop: ClosedLoop) -> dict[str, Quantity]:
+    """Return what is commanded to spools in position drive and to winches; elsewhere it is not a number."""
+    routing, actuators = loop.finger.routing, loop.finger.actuators
+
+    def angle(of: SampledTrajectory) -> Array:
+        found = np.full((len(of.times), len(actuators.names)), np.nan)
+        if of.loop.drives is not None and of.loop.drives.compiled is not None:
+            found[:, actuators.holds] = of.loop.drives.compiled.held(of.loop.drives.compiled.goals, of.times)
+        return found
+
+    def length(of: SampledTrajectory) -> Array:
+        found = np.full((len(of.times), len(routing.tendons)), np.nan)
+        winched = np.flatnonzero(routing.winched)
+        found[:, winched] = of.control.tension[:, winched]
+        for row, tendon in enumerate(actuators.tendons):
+            motor = int(np.argmax(actuators.spools[row] != 0.0))
+            found[:, tendon] = actuators.spools[row, motor] * angle(of)[:, motor]
+        return found
+
+    text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
+    table = {}
+    if actuators.names or routing.winched.any():
+        table["spool_tension"] = Quantity(_TENDON, lambda of: of.finger.tendons.entering, "N", text)
+    if actuators.holds.any() and (loop.drives is None or loop.drives.compiled is not None):
+        table["spool_angle"] = Quantity(_MOTOR, angle, "rad", "commanded angle of a spool in position drive")
+    if "spool_angle" in table or routing.winched.any():
+        table["tendon_winding"] = Quantity(_TENDON, length, "m", "commanded length of cord that is wound in")
     return table
 
 
@@ -173,7 +217,6 @@ def _of_motors(loop: ClosedLoop) -> dict[str, Quantity]:
     def driven(of: SampledTrajectory, name: str) -> Array:
         return np.asarray(getattr(of.finger.motors, name))
 
-    text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
     loose = ("spool_position", "spool_velocity") if loop.finger.actuators.loose_names else ()
     table = {name: _of_state(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction", *loose)}
     table |= {
@@ -186,7 +229,7 @@ def _of_motors(loop: ClosedLoop) -> dict[str, Quantity]:
             ("gearbox_load", "load", "N m", "torque that the gears carry", ""),
         )
     }
-    return table | {"spool_tension": Quantity(_TENDON, lambda of: of.finger.tendons.entering, "N", text)}
+    return table
 
 
 def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:

@@ -9,7 +9,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.position_drive import PositionDrives
+from finger_pin.control.position_drive import PositionDrives, wound_spools
 from finger_pin.description.loading import list_scenarios, read_scenario, to_toml
 from finger_pin.exceptions import InputError
 
@@ -45,6 +45,7 @@ HAND = """
 """
 
 
+_SINE = ("amplitude", "frequency", "phase")
 _WAVE = {"offset": 0.05, "amplitude": 0.2, "frequency": 20.0, "phase": 0.3}
 
 
@@ -61,7 +62,8 @@ def imported():
 
 # `pour` is `hand` with more of the objects of `grasp`, and takes as long as all others together.
 SCENARIOS = {name: partial(fp.load_scenario, name) for name in list_scenarios() if name != "pour"} | {
-    "imported": imported
+    "imported": imported,
+    "wound": partial(fp.load_scenario, "wound", {f"controller.spool_angle.servo.{key}": 0.3 for key in _SINE}),
 }
 
 
@@ -120,7 +122,11 @@ class Acts:
         yield np.array([loop.finger.layout == self.layout])
         yield from (loop.initial_state(), loop.knots(1e-6), scenario.sample_times())
         if np.any(loop.finger.actuators.holds):
-            drives = PositionDrives(loop.finger, loop.controller, loop.reference, scenario.simulation.duration).compiled
+            wound, settings = wound_spools(scenario, loop.finger), scenario.simulation
+            made = PositionDrives(
+                loop.finger, loop.controller, loop.reference, settings.duration, settings.start_time, wound
+            )
+            drives = made.compiled
             yield from (
                 np.asarray(getattr(drives, name)) for name in ("goals", "gains", "period", "resolution", "supply")
             )

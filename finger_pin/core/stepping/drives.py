@@ -19,6 +19,7 @@ from finger_pin.core.jit import (
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.rosenbrock import ADVANCE_ARGS, DONE, FULL, INTEGRATION
 from finger_pin.laws.motor import OPEN_CIRCUIT
+from finger_pin.typing import Array
 
 
 class Drives(NamedTuple):
@@ -53,6 +54,12 @@ class Drives(NamedTuple):
     integral: Vector
     last: Vector
     voltages: Matrix
+
+    def held(self, values: Array, time: Array | float) -> Array:
+        """Return values of samples, shape (k, m), held at one time, or at times; an instant belongs to its sample."""
+        index = np.floor(np.asarray(time) / self.period * (1.0 + 1e-12)).astype(int)
+        found: Array = values[np.clip(index, 0, len(values) - 1)]
+        return found
 
 
 class AdvanceDrivenArgs(NamedTuple):

@@ -154,7 +154,7 @@ class Table:
         yield from file.columns.items() or [each for each in named if each[1].column != apart]
 
 
-def read_signals(entry: str, given: Any, folder: Path, si: str) -> dict[str, dict[str, Any]]:
+def read_signals(entry: str, given: Any, folder: Path, si: str, units: Mapping[str, str]) -> dict[str, dict[str, Any]]:
     """Return the columns of a CSV file as samples of signals, by name.
 
     Args:
@@ -162,6 +162,7 @@ def read_signals(entry: str, given: Any, folder: Path, si: str) -> dict[str, dic
         given: Its path, or a table of `SignalFile`.
         folder: That a relative path starts from.
         si: Unit of the signals.
+        units: Of those whose name begins with one of these and a dot.
 
     Raises:
         InputError: If the file cannot be read, or a column is not of numbers, or times do not increase.
@@ -177,7 +178,8 @@ def read_signals(entry: str, given: Any, folder: Path, si: str) -> dict[str, dic
     for name, column in signals:
         if name in found:
             raise InputError(entry, "two columns are of the same signal", name)
-        values = Series(table.column(f"columns.{name}", column, si))
+        unit = units.get(name.partition(".")[0], si) if "." in name else si
+        values = Series(table.column(f"columns.{name}", column, unit))
         # A column that lags behind its quantity is of earlier times.
         at = Series(times - column.delay) if column.delay else shared
         found[name] = {"kind": "samples", "times": at, "values": values}

@@ -1,3 +1,4 @@
+from .bends import plot_bends as plot_bends
 from .comparing import compare as compare
 from .contact import plot_contact as plot_contact
 from .convergence import plot_convergence as plot_convergence

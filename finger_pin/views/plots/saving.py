@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
+from finger_pin.views.plots.bends import plot_bends
 from finger_pin.views.plots.contact import plot_contact
 from finger_pin.views.plots.convergence import plot_convergence
 from finger_pin.views.plots.energy import plot_energy
@@ -38,6 +39,8 @@ def figures_of(result: xr.Dataset) -> dict[str, Callable[..., Figure]]:
         figures["contact"] = plot_contact
     if "motor_current" in result:
         figures["servo"] = plot_servo
+    if "wrap_tension" in result:
+        figures["bends"] = plot_bends
     return figures
 
 

@@ -1,0 +1,103 @@
+"""Winding as a command: which tendons an ideal winch winds, and which entries fit motors and tendons."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.parameters import Tendon, Winch
+from finger_pin.description.validation import problem, suggestion
+
+#: Tables of a controller by motor or tendon, which stand for open loop.
+BY_SOURCE = ("tensions", "spool_angle", "tendon_winding")
+
+
+@memoised(lambda finger, tendons: (finger, *tendons))
+def with_winches(finger: FingerDescription, tendons: Sequence[str]) -> FingerDescription:
+    """Return a finger with an ideal winch at those of some tendons that have neither a winch nor a motor.
+
+    Tendons of a tree that nothing drives are among them.
+    """
+    driven = {tendon for each in finger.actuators.values() for tendon in each.tendons}
+    paths, taken = {}, {*finger.tendons, *(each.along for each in finger.tendons.values())}
+    if finger.tree is not None:
+        paths = finger.tree.tendons
+        taken |= {each.tendon for each in finger.tree.actuators.values()}
+    added = {name: Tendon(along=name, winch=Winch()) for name in paths if name in tendons and name not in taken}
+    added |= {
+        name: tendon.updated(winch=Winch())
+        for name, tendon in finger.tendons.items()
+        if name in tendons and name not in driven and tendon.kind == "actuated" and tendon.winch is None
+    }
+    return finger.updated(tendons={**finger.tendons, **added}) if added else finger
+
+
+def hand_with_winches(hand: HandSettings, tendons: Mapping[str, Collection[str]]) -> HandSettings:
+    """Return a hand with ideal winches at some tendons, by finger, that no motor pulls."""
+    fingers = {}
+    for name, placed in hand.fingers.items():
+        wound = tuple(each.removeprefix(f"{name}.") for each in tendons[name])
+        finger = with_winches(placed.finger, wound)
+        fingers[name] = placed if finger is placed.finger else placed.updated(finger=finger)
+    changed = any(fingers[name] is not placed for name, placed in hand.fingers.items())
+    return hand.updated(fingers=fingers) if changed else hand
+
+
+def check_winding(finger: FingerDescription, angles: Collection[str], lengths: Collection[str], kind: str) -> None:
+    """Raise the error of a winding, by motor or tendon, that does not fit the finger, another one or the controller."""
+    motors, names = finger.actuators, finger.actuated_names
+    winder = {tendon: motor for motor, each in motors.items() for tendon in each.tendons}
+    for name in angles:
+        entry = f"controller.spool_angle.{name}"
+        _check_name(entry, name, "motor", tuple(motors), f"controller.tendon_winding.{name}" if name in names else "")
+        _check_drive(entry, name, finger)
+    wound: dict[str, str] = {motor: f"controller.spool_angle.{motor}" for motor in angles}
+    for name in lengths:
+        entry = f"controller.tendon_winding.{name}"
+        instead = f"controller.spool_angle.{name}" if name in motors else ""
+        for servo, each in (finger.tree.actuators if finger.tree is not None else {}).items():
+            if each.tendon == name:
+                instead = f"the input of its actuator, controller.inputs.{servo}"
+        _check_name(entry, name, "actuated tendon", names, instead)
+        if name in winder:
+            motor = winder[name]
+            _check_drive(entry, motor, finger)
+            if motor in wound:
+                raise problem(entry, f"has two sources: {wound[motor]} turns the same spool; leave one out")
+            wound[motor] = entry
+    winched = [name for name, tendon in finger.tendons.items() if tendon.winch is not None]
+    for name in winched:
+        if name in winder:
+            allowed = f"is for tendons without a motor: finger.actuators.{winder[name]} pulls it"
+            raise problem(f"finger.tendons.{name}.winch", allowed)
+    if winched and kind == "proportional":
+        allowed = f'must be "tensions": ideal winches wind {", ".join(winched)} in open loop'
+        raise problem("controller.kind", allowed, kind)
+
+
+def check_sources(finger: FingerDescription, tensions: Iterable[str]) -> None:
+    """Raise the error of a tendon that is given tensions while a motor or a winch holds its length."""
+    holding = {
+        tendon: (f"finger.actuators.{name} holds the angle of its spool", f"controller.spool_angle.{name} (rad) or ")
+        for name, each in finger.actuators.items()
+        if each.drive == "position"
+        for tendon in each.tendons
+    }
+    winched = {name: ("a winch holds its length", "") for name, each in finger.tendons.items() if each.winch}
+    for tendon in tensions:
+        if tendon in (by := holding | winched):
+            held, angle = by[tendon]
+            allowed = f"has two sources: {held}; wind it by {angle}controller.tendon_winding.{tendon} (m)"
+            raise problem(f"controller.tensions.{tendon}", allowed)
+
+
+def _check_name(entry: str, name: str, what: str, known: tuple[str, ...], instead: str) -> None:
+    if name not in known:
+        hint = f"; give {instead}" if instead else suggestion(name, known)
+        raise problem(entry, f"no such {what}; there are {', '.join(known) or 'none'}{hint}")
+
+
+def _check_drive(entry: str, motor: str, finger: FingerDescription) -> None:
+    if finger.actuators[motor].drive != "position":
+        raise problem(entry, f'finger.actuators.{motor} must have drive = "position" to be wound by an angle')
