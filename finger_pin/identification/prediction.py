@@ -63,7 +63,7 @@ def predict(
         ``predicted_value`` and ``predicted_band``, half its width.
 
     Raises:
-        InputError: If a recording is wrong, or asks for a parameter that was not found.
+        InputError: If a recording is wrong, or a finger is missing that `identify` was given.
     """
     if result.attrs.get("custom_finger") and finger is None:
         raise InputError("finger", "is missing: this identification was given a finger that its scenario does not have")

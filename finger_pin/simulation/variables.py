@@ -95,17 +95,17 @@ def _tension(of: SampledTrajectory) -> Array:
 
 
 def _of_windings(loop: ClosedLoop) -> dict[str, Quantity]:
-    """Return what is commanded to spools in position drive and to winches; elsewhere it is not a number."""
+    """Return what is commanded to spools in position drive and to winches; zero elsewhere."""
     routing, actuators = loop.finger.routing, loop.finger.actuators
 
     def angle(of: SampledTrajectory) -> Array:
-        found = np.full((len(of.times), len(actuators.names)), np.nan)
+        found = np.zeros((len(of.times), len(actuators.names)))
         if of.loop.drives is not None and of.loop.drives.compiled is not None:
             found[:, actuators.holds] = of.loop.drives.compiled.held(of.loop.drives.compiled.goals, of.times)
         return found
 
     def length(of: SampledTrajectory) -> Array:
-        found = np.full((len(of.times), len(routing.tendons)), np.nan)
+        found = np.zeros((len(of.times), len(routing.tendons)))
         winched = np.flatnonzero(routing.winched)
         found[:, winched] = of.control.tension[:, winched]
         for row, tendon in enumerate(actuators.tendons):
@@ -118,9 +118,9 @@ def _of_windings(loop: ClosedLoop) -> dict[str, Quantity]:
     if actuators.names or routing.winched.any():
         table["spool_tension"] = Quantity(_TENDON, lambda of: of.finger.tendons.entering, "N", text)
     if actuators.holds.any() and (loop.drives is None or loop.drives.compiled is not None):
-        table["spool_angle"] = Quantity(_MOTOR, angle, "rad", "commanded angle of a spool in position drive")
+        table["spool_angle"] = Quantity(_MOTOR, angle, "rad", "commanded angle of a spool in position drive, else 0")
     if "spool_angle" in table or routing.winched.any():
-        table["tendon_winding"] = Quantity(_TENDON, length, "m", "commanded length of cord that is wound in")
+        table["tendon_winding"] = Quantity(_TENDON, length, "m", "commanded length of cord that is wound in, else 0")
     return table
 
 

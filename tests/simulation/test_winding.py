@@ -140,10 +140,11 @@ def test_a_motor_of_two_cords_winds_each_by_its_own_radius_and_sign():
     table = to_toml(scenario({"tendon_winding": {"flexor": LENGTH}}, SERVO))
     table = __import__("tomllib").loads(table)
     table["finger"]["tendons"]["extensor"] = {"crossings": {"mcp": {"radius": -0.004}}}
+    table["finger"]["tendons"]["pulled"] = {"crossings": {"pip": {"radius": -0.003}}}
     table["finger"]["actuators"]["servo"] |= {"tendons": ["flexor", "extensor"], "spool_radius": [SPOOL, 0.003]}
     result = fp.simulate(read_scenario(table))
     assert float(result.spool_angle[-1, 0]) == pytest.approx(2.0)
-    np.testing.assert_allclose(result.tendon_winding.values[-1], [0.010, -0.006])
+    np.testing.assert_allclose(result.tendon_winding.values[-1], [0.010, -0.006, 0.0])
 
 
 def test_steps_and_policies_wind_a_winch_by_its_length():

@@ -8,6 +8,7 @@ from .force_capability import plot_force_polytope as plot_force_polytope
 from .force_capability import plot_radius_sensitivity as plot_radius_sensitivity
 from .hand_motion import plot_hand_motion as plot_hand_motion
 from .identification import plot_identification as plot_identification
+from .identification import plot_predictions as plot_predictions
 from .identification import plot_profiles as plot_profiles
 from .losses import plot_losses as plot_losses
 from .pareto import plot_pareto as plot_pareto
