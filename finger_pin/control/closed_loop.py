@@ -185,6 +185,15 @@ class ClosedLoop:
         signals = (*self.reference.signals(), *self.controller.signals(), *other)
         return _knots(signals, tolerance).copy()
 
+    def spool_goals(self, time: Array) -> Array | None:
+        """Return theta_m^d of the motors in position drive at times (m,), shape (m, k), rad; None without loops."""
+        drives = None if self.drives is None else self.drives.compiled
+        return None if drives is None else drives.held(drives.goals, time)
+
+    def wound(self, angle: Array) -> Array:
+        """Return the lengths that spools at angles (m, k), rad, wind in of their k' cords, shape (m, k'), m."""
+        return angle @ self.finger.actuators.spools.T
+
     def longest_step(self, tolerance: float) -> float:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
         return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST)

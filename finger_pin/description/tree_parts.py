@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.muscle import Muscle
@@ -86,6 +87,15 @@ class Body(Description):
         norm = sum(each * each for each in value) ** 0.5
         if abs(norm - 1.0) > 1e-6:
             raise problem("", "must be a quaternion x, y, z, w of length 1", list(value))
+        return value
+
+    @field_validator("inertia")
+    @classmethod
+    def _positive(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        xx, yy, zz, xy, xz, yz = value
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if moments[0] < -1e-12 * moments[-1]:
+            raise problem("", "must have principal moments that are not negative", list(value))
         return value
 
 

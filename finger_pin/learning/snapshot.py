@@ -102,6 +102,16 @@ class BatchedLoop(ClosedLoop):
         assert isinstance(self.dynamics, CompiledFingers)
         self.dynamics.replace(index, _compiled(loop))
 
+    def spool_goals(self, time: Array) -> Array | None:
+        """Return the goals of the worlds' motors, each at its own time, shape (w, k), rad."""
+        drives = [action.compiled for action in self.actions]
+        found = [each.held(each.goals, at) for each, at in zip(drives, time, strict=True) if each is not None]
+        return np.array(found) if found else None
+
+    def wound(self, angle: Array) -> Array:
+        """Return what every world's spools wind in, shape (w, k'), m."""
+        return np.array([loop.wound(own[None])[0] for loop, own in zip(self.loops, angle, strict=True)])
+
     @property
     def shared(self) -> bool:
         """Whether all worlds have the same numbers."""

@@ -100,17 +100,16 @@ def _of_windings(loop: ClosedLoop) -> dict[str, Quantity]:
 
     def angle(of: SampledTrajectory) -> Array:
         found = np.zeros((len(of.times), len(actuators.names)))
-        if of.loop.drives is not None and of.loop.drives.compiled is not None:
-            found[:, actuators.holds] = of.loop.drives.compiled.held(of.loop.drives.compiled.goals, of.times)
+        goals = of.loop.spool_goals(of.times)
+        if goals is not None:
+            found[:, actuators.holds] = goals
         return found
 
     def length(of: SampledTrajectory) -> Array:
         found = np.zeros((len(of.times), len(routing.tendons)))
         winched = np.flatnonzero(routing.winched)
         found[:, winched] = of.control.tension[:, winched]
-        for row, tendon in enumerate(actuators.tendons):
-            motor = int(np.argmax(actuators.spools[row] != 0.0))
-            found[:, tendon] = actuators.spools[row, motor] * angle(of)[:, motor]
+        found[:, actuators.tendons] = of.loop.wound(angle(of))
         return found
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"

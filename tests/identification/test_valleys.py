@@ -1,8 +1,11 @@
 """Searches where something rings: a likelihood with a minimum for every cycle, written out."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 import finger_pin as fp
+from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.identification.checkpoint import Checkpoint
 from finger_pin.identification.estimate import fit
 from finger_pin.identification.pipeline import FitPipeline
@@ -17,6 +20,7 @@ class Ringing:
     """Rings at 2000 rad/s times the coefficient, and rises with both."""
 
     scenario, own = fp.load_scenario("canal"), ()
+    recording = SimpleNamespace(name="pull", settings=RecordingSettings.model_construct(values={}, parameters={}))
 
     def compute(self, scenario, own):
         friction = scenario.finger.tendon_friction
