@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
+from finger_pin.description.parameters import Tendon
 from finger_pin.typing import Array, Indices
 
 # Below this share of the largest, an internal tension counts as none.
@@ -87,12 +88,7 @@ class Routing:
             coupling=np.array(coupling).reshape(-1, len(joints)),
             strand_coupling=np.array(strands).reshape(-1, len(joints)),
             curvature_matrix=np.array(curvature).reshape(-1, len(joints)),
-            curvature_offset=np.array(
-                [
-                    tendon.curvature_offset + sum(each.curvature_offset for each in tendon.crossings.values())
-                    for tendon in description.tendons.values()
-                ]
-            ),
+            curvature_offset=np.array([_offset(description, each) for each in description.tendons.values()]),
             loads=np.array(loads).reshape(-1, len(joints)).T,
             fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
             winched=np.array(
@@ -229,6 +225,12 @@ class ForceClosure:
             balance = _largest_one(self.null_space[:, 0])
         worst = [name for name, tension in zip(self.tendons, balance, strict=True) if tension <= _SLACK]
         return f"no force closure: {', '.join(worst)} cannot be kept taut at zero joint torque"
+
+
+def _offset(description: FingerDescription, tendon: Tendon) -> float:
+    """Return the curvature of a tendon at theta = 0 that its path does not show: its own, its crossings', its path's."""
+    along = description.tree.tendons[tendon.along].curvature_offset if description.tree and tendon.along else 0.0
+    return tendon.curvature_offset + along + sum(each.curvature_offset for each in tendon.crossings.values())
 
 
 def _beginning(names: tuple[str, ...], start: str) -> Indices:

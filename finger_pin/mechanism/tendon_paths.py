@@ -115,7 +115,7 @@ def _stretches(description: FingerDescription, tendon: str, branch: int) -> tupl
         return found, own.curvature_offset
     assert tree is not None
     route = tree.tendons[str(own.along) if own else tendon]
-    offset = 0.0 if branch else (own or route).curvature_offset
+    offset = 0.0 if branch else route.curvature_offset + (own.curvature_offset if own else 0.0)
     if route.path is None:
         around = route.wound.items()
         return [_Stretch(name, bool(r), bool(r), 0.0, frozenset({name})) for name, r in around], offset

@@ -163,6 +163,8 @@ SOMETIMES = {
     r".*actuators\.reversal_speed": "without compensation",
     r".*\.(objects|shapes)\..*": "what touches nothing at these instants, or is turned about its own axis",
     r".*bodies\.(centre|inertia)": "of a body that turns about one axis",
+    r".*bodies\.(position|orientation)": "of a body that slides, and that no path passes",
+    r".*bodies\.gravity_compensation": "without gravity",
     r".*\.(bearing|tendons\.joints)": "that nothing loads",
     r".*\.input_range": "limits that are not reached",
     r"simulation\.start_time": "where inputs are constant",
