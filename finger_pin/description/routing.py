@@ -228,7 +228,7 @@ class ForceClosure:
 
 
 def _offset(description: FingerDescription, tendon: Tendon) -> float:
-    """Return the curvature of a tendon at theta = 0 that its path does not show: its own, its crossings', its path's."""
+    """Return the curvature of a tendon at theta = 0 that does not show: its own, its crossings', its path's."""
     along = description.tree.tendons[tendon.along].curvature_offset if description.tree and tendon.along else 0.0
     return tendon.curvature_offset + along + sum(each.curvature_offset for each in tendon.crossings.values())
 
