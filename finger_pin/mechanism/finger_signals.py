@@ -43,7 +43,7 @@ class TendonForces:
 
     def at_wraps(self, of: Callable[[RowSignals], Array]) -> Array:
         """Return a signal at every place of the tendons that rub at several, in the order of `Finger.wrap_names`."""
-        return np.concatenate([of(self.driven)[..., self._first], *(of(wraps) for wraps, _ in self.beyond)], axis=-1)
+        return np.concatenate([of(self.driven)[..., self._first()], *(of(wraps) for wraps, _ in self.beyond)], axis=-1)
 
     @property
     def wrap_tension(self) -> Array:
@@ -51,11 +51,10 @@ class TendonForces:
         acting = self.driven.rows.parameters[self.driven.rows.law.parameters.index("acting")]
         first = self.driven.force + acting * self.driven.row.command
         behind = (wraps.row.command + wraps.force for wraps, _ in self.beyond)
-        return np.concatenate([first[..., self._first], *behind], axis=-1)
+        return np.concatenate([first[..., self._first()], *behind], axis=-1)
 
-    @property
     def _first(self) -> NDArray[np.intp]:
-        return np.flatnonzero(self._several[: self.driven.rows.count])
+        return np.flatnonzero(self._several()[: self.driven.rows.count])
 
     @property
     def curvature(self) -> Array:
@@ -69,12 +68,13 @@ class TendonForces:
         if not self.beyond:
             return whole
         surface = np.concatenate([self.driven.rows.parameters[0], self.passive.rows.parameters[0]])
-        return np.where(self._several, capstan_coefficient(surface, self.curvature), whole)
+        return np.where(self._several(), capstan_coefficient(surface, self.curvature), whole)
 
-    @property
     def _several(self) -> NDArray[np.bool_]:
         """Which tendons rub at several places, shape (t,)."""
-        found: NDArray[np.bool_] = np.any([np.any(weights, axis=1) for _, weights in self.beyond], axis=0)
+        found = np.zeros(self.driven.rows.count + self.passive.rows.count, dtype=bool)
+        for _, weights in self.beyond:
+            found |= np.any(weights, axis=1)
         return found
 
     @property
@@ -95,7 +95,7 @@ class TendonForces:
             return of_first
         actuated = self.driven.rows.count
         ends = np.abs(self.strands[..., :actuated]) + np.abs(self.driven.row.command)
-        return np.where(self._several, np.concatenate([ends, of_first[..., actuated:]], axis=-1), of_first)
+        return np.where(self._several(), np.concatenate([ends, of_first[..., actuated:]], axis=-1), of_first)
 
     @property
     def level(self) -> Array:
