@@ -75,7 +75,7 @@ def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
     theta = finite_vector("position", position, len(finger.routing.joints))
     if finger.paths is None:
         return finger
-    if any(len(places) > 1 for places in finger.tendons.wraps):
+    if finger.tendons.at_bends:
         allowed = 'must be "canal" for statics of tendons along paths through space'
         raise InputError("finger.tendon_friction.place", allowed, finger.description.tendon_friction.place)
     coupling, actuated = finger.coupling_at(theta), finger.routing.actuated

@@ -261,7 +261,7 @@ class FrictionLoop:
         return found
 
     def _of_joints(self, strands: Array) -> tuple[Array, Array]:
-        """Return the torques of strands of tensions at every joint, (m, s, n), and what loads the pins, (m, n) each."""
+        """Return joint torques and pin loads, (m, n) each, of tensions of the strands at every joint, (m, s, n)."""
         routing = self.tendons.routing
         pull, load = (np.einsum("msj,sj->mj", strands, each) for each in (routing.strand_coupling, routing.loads.T))
         return pull, load

@@ -29,7 +29,7 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
     Raises:
         InputError: If tendons rub at several bends: a tendon of MuJoCo has one force along all of its length.
     """
-    if any(len(places) > 1 for places in tendons.wraps):
+    if tendons.at_bends:
         allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
         raise InputError("finger.tendon_friction.place", allowed, description.tendon_friction.place)
     found = [*_of_tendons(description, tendons, massless), *_of_joints(description, tendons)]

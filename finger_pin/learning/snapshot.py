@@ -96,7 +96,7 @@ class BatchedLoop(ClosedLoop):
             own["palm"] = first.palm and replace(first.palm, signal=cast(Signal, _PalmSignals(loops)))
         return cls(**own, loops=loops, actions=actions, accelerated=accelerated)
 
-    def renew(self, index: int, loop: ClosedLoop, action: Action) -> None:
+    def replace_world(self, index: int, loop: ClosedLoop, action: Action) -> None:
         """Put another world in the place of one; all have loops of their own then."""
         self.loops[index], self.actions[index] = loop, action
         assert isinstance(self.dynamics, CompiledFingers)

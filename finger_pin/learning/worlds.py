@@ -93,7 +93,7 @@ class Worlds:
                     self._context[name] = np.zeros((len(self.each), *value.shape))
                 self._context[name][i] = value
             if world.rebuilt:
-                self._now.renew(i, world.origin, world.action)
+                self._now.replace_world(i, world.origin, world.action)
         if self.each[0].rebuilt and len(places):
             self._steppers = BatchStepper([world.stepper for world in self.each])
 

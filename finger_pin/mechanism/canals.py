@@ -95,7 +95,7 @@ class Canals:
         self.wraps: dict[str, Array] = {}
         self._description, self._tree, self._tendons = description, description.tree, tendons
         self._joints, self._width = tuple(description.joints), width
-        self._known = known = {table.group: table for table in rows}
+        self._known = {table.group: table for table in rows}
         # They load the pins by themselves.
         self._pressing = {"driven_tendons", *pulled}
         own = [self._own(index, name, routes, pulled) for index, name in enumerate(description.actuated_names)]
@@ -108,8 +108,8 @@ class Canals:
             return
         cords = {name: shares for name in self._tree.rubbing if (shares := self._tree.linked(name))}
         if cords:
-            known[CORDS] = self._cords(cords, known, width)
-            self.tables.append(known[CORDS])
+            self._known[CORDS] = self._cords(cords)
+            self.tables.append(self._known[CORDS])
         trunks = [self._trunk(name, routes) for name in self._tree.rubbing]
         left |= {each.name: {} for each in trunks}
         self._rub(CANALS, trunks, left)
@@ -213,7 +213,7 @@ class Canals:
                 found.append(_Canal(name, trunk.tendon, route, trunk.one_way, crossed, sources, wraps=wraps))
         return found
 
-    def _cords(self, cords: Mapping[str, Mapping[str, float]], known: Mapping[str, Rows], width: int) -> Rows:
+    def _cords(self, cords: Mapping[str, Mapping[str, float]]) -> Rows:
         """Return the tensions of cords that turn joints."""
         tree = self._tree
         assert tree is not None
@@ -224,8 +224,8 @@ class Canals:
             law=CORD_TENSION,
             names=tuple(cords),
             parameters=np.array([[float(not tree.opposed(name)) for name in cords]]),
-            arm=np.zeros((len(cords), width)),
-            inputs=_wired(shares, known),
+            arm=np.zeros((len(cords), self._width)),
+            inputs=_wired(shares, self._known),
             powers=(SOURCES,),
         )
 

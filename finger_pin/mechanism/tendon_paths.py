@@ -271,7 +271,7 @@ class Excursions:
             description: Of the finger.
             paths: The paths of its tree; None without a tree.
         """
-        self._names, self._coupling, self._paths, self._rest = routing.tendons, routing.coupling, paths, np.zeros(0)
+        self._coupling, self._paths, self._rest = routing.coupling, paths, np.zeros(0)
         # Of every tendon that goes along a path, which one.
         self._along: dict[int, int] = {}
         if paths is not None and description.tree is not None:

@@ -104,8 +104,13 @@ class Tendons:
             mass=expand(passive.mass, routing.passive),
         )
 
+    @property
+    def at_bends(self) -> bool:
+        """Whether any tendon rubs at several places."""
+        return any(len(places) > 1 for places in self.wraps)
+
     def in_sliding(self, position: Array, direction: Array) -> tuple[Array, Array]:
-        """Return what of tendons' tensions arrives at every joint in steady sliding at M^d: a share, less a drag.
+        """Return the shares of tendons' tensions that arrive at every joint in steady sliding at M^d, and the drags.
 
         All places of a tendon slide the same way.
 
