@@ -4,7 +4,8 @@
 
 f^d are the tensions that the controller plans for the reference itself: what keeps tendons taut, and what compensates
 gravity or friction if it does. What the finger really needs beyond them has to come from angles that err.
-A motor whose spool angle or wound cord is given follows that in place of theta_m^d.
+A motor whose spool angle or wound cord is given follows that in place of theta_m^d; one whose voltage
+is given has no loop.
 """
 
 from __future__ import annotations
@@ -87,6 +88,7 @@ class PositionDrives:
         duration: float,
         start_time: float = 0.0,
         wound: Mapping[int, tuple[Signal, float]] = {},
+        voltages: Mapping[int, Signal] = {},
     ) -> None:
         """Work out the goals of a motion.
 
@@ -97,6 +99,7 @@ class PositionDrives:
             duration: Of the motion, s.
             start_time: Of the motion, s.
             wound: From `wound_spools`.
+            voltages: From `given_voltages`.
 
         Raises:
             InputError: If a goal is beyond what its encoder can be told, or drives differ in their period.
@@ -104,7 +107,7 @@ class PositionDrives:
         period = loop_period(finger)
         self._controller, actuators = controller, finger.actuators
         self._positioned = np.isin(np.arange(finger.routing.actuated), actuators.positioned)
-        given = actuators.tendons[np.any(actuators.spools[:, list(wound)] != 0.0, axis=1)]
+        given = actuators.tendons[np.any(actuators.spools[:, [*wound, *voltages]] != 0.0, axis=1)]
         self._wound = np.isin(np.arange(len(finger.routing.tendons)), given)
         self.channels = actuators.voltages
         times: Array = period * np.arange(math.ceil(duration / period) + 1.0)
@@ -114,14 +117,17 @@ class PositionDrives:
         goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated], drawn)
         for motor, (signal, radius) in wound.items():
             goals[:, motor] = signal.later(start_time).at(times)[0][:, 0] / radius
-        goals = goals[:, actuators.holds]
+        goals[:, list(voltages)], volts = 0.0, np.full_like(goals, np.nan)
+        for motor, signal in voltages.items():
+            volts[:, motor] = signal.later(start_time).at(times)[0][:, 0]
+        goals, volts = goals[:, actuators.holds], np.ascontiguousarray(volts[:, actuators.holds])
         for (name, actuator), goal in zip(_positioned(finger), goals.T, strict=True):
             encoder = actuator.motor.encoder
             least, most = float(goal.min()), float(goal.max())
             if encoder is not None and not encoder.range[0] <= least <= most <= encoder.range[1]:
                 allowed = f"the motion takes the spool from {least:.4g} to {most:.4g} rad"
                 raise InputError(f"finger.actuators.{name}.motor.encoder.range", allowed, list(encoder.range))
-        self.compiled = build_drives(finger, goals, start_time)
+        self.compiled = build_drives(finger, goals, start_time, volts)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return the commands with the tensions of the goals in place of those of the errors."""
@@ -162,6 +168,16 @@ def wound_spools(scenario: Scenario, finger: Finger) -> dict[int, tuple[Signal, 
     return {motor: (Signal.from_settings([each], tolerance), radius) for motor, (each, radius) in found.items()}
 
 
+def given_voltages(scenario: Scenario, finger: Finger) -> dict[int, Signal]:
+    """Return the voltages of motors that are given in place of their loops, by their number, V."""
+    tolerance, names = scenario.simulation.rtol, finger.actuators.names
+    return {
+        names.index(name): Signal.from_settings([each], tolerance)
+        for part in scenario.parts().values()
+        for name, each in (part.controller.motor_voltage or {}).items()
+    }
+
+
 def loop_period(finger: Finger) -> float:
     """Return the sampling period of all motors of a finger in position drive, s.
 
@@ -177,13 +193,14 @@ def loop_period(finger: Finger) -> float:
     return period
 
 
-def build_drives(finger: Finger, goals: Array, start_time: float = 0.0) -> Drives:
+def build_drives(finger: Finger, goals: Array, start_time: float = 0.0, given: Array | None = None) -> Drives:
     """Return the loops of all motors of a finger in position drive, m of them.
 
     Args:
         finger: The finger.
         goals: theta_m^d at multiples of their period, shape (k, m), rad.
         start_time: Time at the first of these, s.
+        given: Voltages in place of the loops, shape (k, m), V; not numbers where these run.
     """
     chosen = [actuator for _, actuator in _positioned(finger)]
     loops, encoders = [each.position_loop for each in chosen], [each.motor.encoder for each in chosen]
@@ -194,6 +211,7 @@ def build_drives(finger: Finger, goals: Array, start_time: float = 0.0) -> Drive
         channels=actuators.voltages,
         period=loop_period(finger),
         goals=np.ascontiguousarray(goals),
+        given=np.full(goals.shape, np.nan) if given is None else given,
         resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
         gains=np.ascontiguousarray(np.array([[e.proportional, e.derivative, e.integral] for e in loops]).T),
         torque_off=np.array([np.inf if each.torque_off is None else each.torque_off for each in loops]) - start_time,

@@ -19,6 +19,7 @@ from finger_pin.description.loading import load_scenario
 from finger_pin.description.recordings.series import Series
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals, SignalReference
@@ -198,13 +199,13 @@ def with_columns(
 ) -> tuple[Scenario, Controller | Samples | None]:
     """Return a scenario with samples given by name, times and columns, and the controller that is left, if any.
 
-    Columns have the names of ``controller.file``: tendons, ``spool_angle.NAME`` and ``tendon_winding.NAME``.
+    Columns have the names of ``controller.file``: tendons, and ``spool_angle.NAME`` and its kin.
     """
     if not (isinstance(controller, tuple | list) and len(controller) == 2 and isinstance(controller[1], Mapping)):
         return scenario, controller
     times, overrides = controller[0], dict[str, Any]()
     for name, values in controller[1].items():
-        wound = name.startswith(("spool_angle.", "tendon_winding."))
+        wound = name.partition(".")[0] in WINDINGS and "." in name
         samples = {"kind": "samples", "times": Series(_numbers(times)), "values": Series(_numbers(values))}
         overrides[f"controller.{name}" if wound else f"controller.tensions.{name}"] = samples
         if not wound:

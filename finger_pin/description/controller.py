@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, field_serializer, field_validator
 
 from finger_pin.description.by_finger import dump_set_fields, flatten, unflatten
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.signals import ForceSignal, InputSignal, SpoolAngle, WoundLength, of_axes
+from finger_pin.description.signals import ForceSignal, InputSignal, SpoolAngle, VoltageSignal, WoundLength, of_axes
 from finger_pin.description.validation import (
     Description,
     FullName,
@@ -104,7 +104,8 @@ class ControllerSettings(Description):
     of a closed loop (no gain or other entry of it, and no reference) and there is no other way: tensions or windings
     are given, a tree has actuators, or tensions cannot hold the finger at every posture, but its joints have springs.
     In a file, ``file`` then names a CSV file: its columns are ``time`` and actuated tendons, and become samples of
-    ``tensions``; those called ``spool_angle.NAME`` and ``tendon_winding.NAME`` become samples of these.
+    ``tensions``; those called ``spool_angle.NAME``, ``tendon_winding.NAME`` and ``motor_voltage.NAME`` are samples of
+    these.
 
     In a hand it is the controller of every finger, with what the finger's table in ``fingers`` has on top; only
     ``sampling`` is the same for all.
@@ -126,6 +127,9 @@ class ControllerSettings(Description):
     )
     tendon_winding: dict[FullName, WoundLength] | None = Field(
         None, description="By tendon: what its motor in position drive winds in, or, without a motor, an ideal winch."
+    )
+    motor_voltage: dict[FullName, VoltageSignal] | None = Field(
+        None, description="By motor in position drive: what its loop would ask for, held from sample to sample."
     )
     inputs: dict[Name, InputSignal] | None = Field(
         None, description="By actuator of a tree; one without a signal has zero input."
@@ -180,7 +184,9 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
         entry = "controller.passive_tension_loop"
         raise problem(entry, "works from sample to sample: set controller.sampling.period too")
     _check_tensions(settings, finger)
-    check_winding(finger, settings.spool_angle or (), settings.tendon_winding or (), settings.kind)
+    check_winding(
+        finger, settings.spool_angle or (), settings.tendon_winding or (), settings.motor_voltage or {}, settings.kind
+    )
     joints, tendons = tuple(finger.joints), tuple(finger.tendons)
     of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")
     sizes: list[tuple[str, Numbers | None, tuple[tuple[str, ...], str]]] = [

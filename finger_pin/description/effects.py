@@ -32,8 +32,8 @@ _OPEN = 'has no effect with controller.kind = "tensions"'
 
 
 def wound_tendons(scenario: Any, controller: Any) -> set[str]:
-    """Return the names of the tendons whose wound length is given, by their own or by the angle of their spool."""
-    angles = controller.spool_angle or {}
+    """Return the names of the tendons that are wound: by a length, or by the angle or the voltage of a motor."""
+    angles = {*(controller.spool_angle or ()), *(controller.motor_voltage or ())}
     given = {*(controller.tendon_winding or {})}
     for name, each in scenario.finger.actuators.items():
         if name in angles or given.intersection(each.tendons):

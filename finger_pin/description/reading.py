@@ -15,6 +15,7 @@ from typing import Any
 from finger_pin.description.recordings.columns import expand, read_signals, read_text
 from finger_pin.description.recordings.series import PACKED
 from finger_pin.description.validation import suggestion
+from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError
 
 Table = dict[str, Any]
@@ -24,8 +25,6 @@ _SIGNAL_FILES = (
     ("controller", "file", "tensions", "N"),
     ("environment", "fingertip_force_file", "fingertip_force_signal", "N"),
 )
-# Tables that a column of the controller's file may name, and their units.
-_WINDINGS = {"spool_angle": "rad", "tendon_winding": "m"}
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
 _KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
 
@@ -208,7 +207,7 @@ def resolve_signals(table: Table, folder: Path) -> None:
     for section, key, target, unit in _SIGNAL_FILES:
         settings = table.get(section)
         if isinstance(settings, dict) and key in settings:
-            apart = _WINDINGS if section == "controller" else {}
+            apart = WINDINGS if section == "controller" else {}
             samples = read_signals(f"{section}.{key}", settings.pop(key), folder, unit, apart)
             for name, each in samples.items():
                 before, _, own = name.partition(".")

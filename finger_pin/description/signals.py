@@ -28,6 +28,8 @@ _ANGLE = real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)
 _FORCE = real(-_MOST_FORCE, _MOST_FORCE)
 _MOST_TURN, _MOST_WOUND, _MILLIMETRES = 1e6, 1.0, " m (is it in millimetres?)"
 _TURN, _WOUND = real(-_MOST_TURN, _MOST_TURN), real(-_MOST_WOUND, _MOST_WOUND, hint=_MILLIMETRES)
+_MOST_VOLTAGE = 1e4
+_VOLTAGE = real(-_MOST_VOLTAGE, _MOST_VOLTAGE)
 
 
 class SignalSettings(Description):
@@ -141,6 +143,17 @@ class WoundLength(SignalSettings):
     height: Annotated[float, _WOUND] | None = quantity(None, unit="m", source="chosen", doc="Of the step or ramp.")
     values: Annotated[tuple[float, ...] | Series, series(-_MOST_WOUND, _MOST_WOUND, _MILLIMETRES)] | None = quantity(
         None, unit="m", source="chosen", doc="At the points or samples."
+    )
+
+
+class VoltageSignal(SignalSettings):
+    """Voltage of a motor in place of its loop; of pulse widths the mean, their part of the supply."""
+
+    offset: Annotated[float, _VOLTAGE] = quantity(0.0, unit="V", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _VOLTAGE] = quantity(0.0, unit="V", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _VOLTAGE] | None = quantity(None, unit="V", source="chosen", doc="Of the step or ramp.")
+    values: Annotated[tuple[float, ...] | Series, series(-_MOST_VOLTAGE, _MOST_VOLTAGE)] | None = quantity(
+        None, unit="V", source="chosen", doc="At the points or samples."
     )
 
 

@@ -1,4 +1,4 @@
-"""Winding as a command: which tendons an ideal winch winds, and which entries fit motors and tendons."""
+"""Commands of winches and motors: which tendons an ideal winch winds, and which entries fit motors and tendons."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.parameters import Tendon, Winch
+from finger_pin.description.signals import SignalSettings
 from finger_pin.description.validation import problem, suggestion
 
-#: Tables of a controller by motor or tendon, which stand for open loop.
-BY_SOURCE = ("tensions", "spool_angle", "tendon_winding")
+#: Tables of a controller by motor or tendon beside tensions, and their units; all of them stand for open loop.
+WINDINGS = {"spool_angle": "rad", "tendon_winding": "m", "motor_voltage": "V"}
+BY_SOURCE = ("tensions", *WINDINGS)
 
 
 @memoised(lambda finger, tendons: (finger, *tendons))
@@ -44,15 +46,31 @@ def hand_with_winches(hand: HandSettings, tendons: Mapping[str, Collection[str]]
     return hand.updated(fingers=fingers) if changed else hand
 
 
-def check_winding(finger: FingerDescription, angles: Collection[str], lengths: Collection[str], kind: str) -> None:
-    """Raise the error of a winding, by motor or tendon, that does not fit the finger, another one or the controller."""
+def check_winding(
+    finger: FingerDescription,
+    angles: Collection[str],
+    lengths: Collection[str],
+    voltages: Mapping[str, SignalSettings],
+    kind: str,
+) -> None:
+    """Raise the error of a command, by motor or tendon, that does not fit the finger, another one or the controller."""
     motors, names = finger.actuators, finger.actuated_names
     winder = {tendon: motor for motor, each in motors.items() for tendon in each.tendons}
-    for name in angles:
-        entry = f"controller.spool_angle.{name}"
-        _check_name(entry, name, "motor", tuple(motors), f"controller.tendon_winding.{name}" if name in names else "")
-        _check_drive(entry, name, finger)
-    wound: dict[str, str] = {motor: f"controller.spool_angle.{motor}" for motor in angles}
+    wound: dict[str, str] = {}
+    for table, given in (("spool_angle", angles), ("motor_voltage", voltages)):
+        for name in given:
+            entry = f"controller.{table}.{name}"
+            instead = f"controller.tendon_winding.{name}" if name in names else ""
+            _check_name(entry, name, "motor", tuple(motors), instead)
+            _check_drive(entry, name, finger)
+            if name in wound:
+                raise problem(entry, f"has two sources: {wound[name]} turns the same spool; leave one out")
+            wound[name] = entry
+    for name, signal in voltages.items():
+        supply = motors[name].motor.voltage
+        if signal.greatest > supply:
+            allowed = f"reaches {signal.greatest:.4g} V, beyond the supply of finger.actuators.{name}.motor.voltage"
+            raise problem(f"controller.motor_voltage.{name}", allowed, supply)
     for name in lengths:
         entry = f"controller.tendon_winding.{name}"
         instead = f"controller.spool_angle.{name}" if name in motors else ""
@@ -100,4 +118,4 @@ def _check_name(entry: str, name: str, what: str, known: tuple[str, ...], instea
 
 def _check_drive(entry: str, motor: str, finger: FingerDescription) -> None:
     if finger.actuators[motor].drive != "position":
-        raise problem(entry, f'finger.actuators.{motor} must have drive = "position" to be wound by an angle')
+        raise problem(entry, f'finger.actuators.{motor} must have drive = "position" for that')

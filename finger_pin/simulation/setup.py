@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled_control
 from finger_pin.control.interface import LoopController
-from finger_pin.control.position_drive import PositionDrives, wound_spools
+from finger_pin.control.position_drive import PositionDrives, given_voltages, wound_spools
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.stepping.integrator import integrate_compiled
@@ -107,7 +107,8 @@ class Setup:
         if positioned:
             duration, start = scenario.simulation.duration, scenario.simulation.start_time
             wound = wound_spools(scenario, loop.finger)
-            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, start, wound)
+            voltages = given_voltages(scenario, loop.finger)
+            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, start, wound, voltages)
             loop = replace(loop, drives=drives)
         if sampled is not None:
             loop = replace(loop, controller=sampled)

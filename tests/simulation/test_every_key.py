@@ -9,7 +9,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.position_drive import PositionDrives, wound_spools
+from finger_pin.control.position_drive import PositionDrives, given_voltages, wound_spools
 from finger_pin.description.loading import list_scenarios, read_scenario, to_toml
 from finger_pin.exceptions import InputError
 
@@ -122,14 +122,14 @@ class Acts:
         yield np.array([loop.finger.layout == self.layout])
         yield from (loop.initial_state(), loop.knots(1e-6), scenario.sample_times())
         if np.any(loop.finger.actuators.holds):
-            wound, settings = wound_spools(scenario, loop.finger), scenario.simulation
+            given = [each(scenario, loop.finger) for each in (wound_spools, given_voltages)]
+            settings = scenario.simulation
             made = PositionDrives(
-                loop.finger, loop.controller, loop.reference, settings.duration, settings.start_time, wound
+                loop.finger, loop.controller, loop.reference, settings.duration, settings.start_time, *given
             )
             drives = made.compiled
-            yield from (
-                np.asarray(getattr(drives, name)) for name in ("goals", "gains", "period", "resolution", "supply")
-            )
+            names = ("goals", "given", "gains", "period", "resolution", "supply")
+            yield from (np.asarray(getattr(drives, name)) for name in names)
         at = self.layout.unpack(self.states[0])
         yield loop.finger.motion(at.position, at.velocity).tip
         most = FEW if len(self.layout.names_of("contact_bend")) > 2 * MANY else INSTANTS

@@ -199,7 +199,48 @@ def test_an_imported_tendon_is_wound_as_the_position_actuator_of_its_model_winds
         moved(model, {"tendon_winding": {"cord": {}}})
 
 
+def test_a_voltage_turns_the_motor_until_the_cord_holds_its_torque():
+    """T = K_t U / (R r) without friction in the gears, and the springs' angles for it."""
+    motor = {"voltage": 5.0, "torque_constant": 0.4, "resistance": 3.2, "maximum_current": 1.5, "inertia": 2e-4}
+    motor |= {"friction": {"coulomb": 0.0, "viscous": 0.02}, "encoder": {"range": [-9.0, 9.0]}}
+    voltage = {"kind": "ramp", "time": 0.1, "duration": 0.2, "height": 3.2}
+    made = scenario(
+        {"motor_voltage": {"servo": voltage}},
+        {**SERVO, "motor": motor, "spool_radius": 0.02},
+        {"simulation.duration": 9.0},
+    )
+    result = fp.simulate(made)
+    np.testing.assert_allclose(result.joint_position.values[-1], share_of(0.4 * 3.2 / (3.2 * 0.02)), rtol=2e-5)
+    assert float(result.motor_voltage[-1, 0]) == 3.2
+
+
+def test_the_voltages_that_a_loop_asked_for_make_the_same_motion_when_they_are_given(tmp_path):
+    overrides = {"simulation.sample_rate": 1000.0, "simulation.duration": 1.0}
+    led = fp.simulate(scenario({"spool_angle": {"servo": TURN}}, SERVO, overrides))
+    times, volts = led.time.values, led.motor_voltage.values[:, 0]
+    bare = scenario({"motor_voltage": {"servo": {}}}, SERVO, overrides)
+    given = fp.simulate(bare, controller=(times, {"motor_voltage.servo": volts}))
+    np.testing.assert_allclose(given.joint_position.values, led.joint_position.values, atol=1e-9)
+    np.savetxt(
+        tmp_path / "pwm.csv",
+        np.column_stack([times, volts * 1e3]),
+        delimiter=",",
+        header="time,motor_voltage.servo (mV)",
+        comments="",
+    )
+    file = {"file": str(tmp_path / "pwm.csv")}
+    np.testing.assert_allclose(
+        fp.simulate(scenario(file, SERVO, overrides)).joint_position.values, led.joint_position.values, atol=1e-9
+    )
+
+
 WRONG = {
+    "a voltage beyond the supply": ({"motor_voltage": {"servo": {"offset": 6.0}}}, r"reaches 6 V, beyond the supply"),
+    "an angle and a voltage": (
+        {"motor_voltage": {"servo": {}}, "spool_angle": {"servo": TURN}},
+        "two sources.*spool_angle.servo turns the same",
+    ),
+    "a voltage of a cord": ({"motor_voltage": {"flexor": {}}}, r"no such motor"),
     "a variable's name": ({"motor_position": {"servo": TURN}}, r"did you mean controller\.spool_angle\?"),
     "a tension": (
         {"tensions": {"flexor": TURN}},

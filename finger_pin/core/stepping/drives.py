@@ -31,6 +31,7 @@ class Drives(NamedTuple):
         channels: Inputs that are their voltages, shape (m,).
         period: s.
         goals: theta_m^d at multiples of the period, shape (k, m), rad; the last one is kept.
+        given: In place of what a loop asks for, at the same times, shape (k, m), V; not numbers where it runs.
         resolution: Step of the measured angles, 0 for none, shape (m,), rad.
         gains: k_p, k_d, k_i, shape (3, m).
         supply: V, shape (m,), V.
@@ -46,6 +47,7 @@ class Drives(NamedTuple):
     channels: Indices
     period: float
     goals: Matrix
+    given: Matrix
     resolution: Vector
     gains: Matrix
     supply: Vector
@@ -99,6 +101,8 @@ def _sample(drives: Any, x: Vector, tension: Vector) -> None:
             # The integral stands still while the supply is at its limit.
             drives.integral[j] = summed
         voltage = drives.supply[j] * min(max(duty, -1.0), 1.0)
+        if not np.isnan(drives.given[k, j]):
+            voltage = drives.given[k, j]
         if drives.taken[0] * drives.period * (1.0 + 1e-12) >= drives.torque_off[j]:
             voltage = OPEN_CIRCUIT
         # Until the next one is taken, perhaps never.
