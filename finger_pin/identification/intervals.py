@@ -47,8 +47,10 @@ def covariance(problem: Problem, found: Fit) -> Array:
     return np.asarray(np.linalg.pinv(scaled, rcond=1e-14, hermitian=True) * np.outer(width, width))
 
 
-def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss: str = "linear") -> ProfileBound:
-    """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841.
+def profile(
+    problem: Problem, found: Fit, k: int, way: int, spread: Array, loss: str = "linear", inflation: float = 1.0
+) -> ProfileBound:
+    """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841 times an inflation.
 
     Args:
         problem: The problem that was fitted.
@@ -57,11 +59,13 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss:
         way: 1 for the upper end, -1 for the lower.
         spread: Covariance of z.
         loss: As for `fit`.
+        inflation: Variance of the parameter over that by the likelihood (Pace, Salvan and Sartori, Statistica Sinica
+            21, 2011); rises of the path are divided by it.
     """
     low, high = problem.box
     limit = high[k] if way > 0 else low[k]
     room = abs(limit - found.z[k])
-    deviation = math.sqrt(max(spread[k, k], 0.0))
+    deviation = math.sqrt(max(inflation * spread[k, k], 0.0))
     tilt = spread[:, k] / spread[k, k] if spread[k, k] > 0.0 else np.zeros(len(found.z))
     path = [(float(found.z[k]), 0.0)]
     reach = min(room, max(math.sqrt(LEVEL) * deviation, 1e-6 * (high[k] - low[k])))
@@ -73,9 +77,9 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss:
         guess = np.clip(there.z + tilt * (at - there.z[k]), low, high)
         same = {"weights": found.weights, "scale": found.noise}
         there = fit(problem, guess, held={k: at}, loss=loss, slopes=slopes, **same)
-        slopes, rise = there.slopes or slopes, there.objective - found.objective
+        slopes, rise = there.slopes or slopes, (there.objective - found.objective) / inflation
         path.append((at, rise))
-        if rise < -_BELOW:
+        if rise * inflation < -_BELOW:
             return ProfileBound(end, np.array(path), there)
         if rise >= LEVEL:
             outer = (reach, math.sqrt(rise))

@@ -14,7 +14,9 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
+from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.identification.problem import At, NuisanceParameter, own_number
 from finger_pin.identification.recordings import Recording
@@ -30,6 +32,10 @@ from finger_pin.typing import Array
 # Where the inputs of a motion go in a scenario, by variable.
 _INPUTS = {
     "tendon_command": ("controller", "tensions"),
+    "spool_angle": ("controller", "spool_angle"),
+    "tendon_winding": ("controller", "tendon_winding"),
+    "motor_voltage": ("controller", "motor_voltage"),
+    "actuator_input": ("controller", "inputs"),
     "joint_reference": ("reference", "joints"),
     "fingertip_force": ("environment", "fingertip_force_signal"),
 }
@@ -106,9 +112,7 @@ class RecordedMotion:
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
         there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
-        feeling = [
-            k for k, (scenario, own) in enumerate(there) if self._with_start(scenario, own) != motion[0].scenario
-        ]
+        feeling = [k for k, (scenario, own) in enumerate(there) if self._with_own(scenario, own) != motion[0].scenario]
         others = {k: self._setup(*there[k]) for k in feeling}
         # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
         same = self._setup(*here)
@@ -139,8 +143,24 @@ class RecordedMotion:
         columns = in_threads(column, range(len(values)))
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
-    def _with_start(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
-        """Return a scenario with the starts of joints that are being found."""
+    def _with_own(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
+        """Return a scenario with the starts of joints and the corrections of inputs that are being found."""
+        for name, values in self.recording.inputs.items():
+            numbers = [
+                own_number(own, self.recording.name, name, what, default)
+                for what, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
+            ]
+            if numbers == [1.0, 0.0, 0.0]:
+                continue
+            (section, group), label = _INPUTS[name.partition(".")[0]], name.partition(".")[2]
+            signals = dict(getattr(getattr(scenario, section), group))
+            corrected = numbers[0] * values + numbers[1]
+            if name.startswith("tendon_command."):
+                # A tendon only pulls: what a wrong zero takes below it is a slack one.
+                corrected = np.maximum(corrected, 0.0)
+            times = np.asarray(signals[label].times) - numbers[2]
+            signals[label] = signals[label].updated(times=Series(times), values=Series(corrected))
+            scenario = scenario.updated(**{section: {group: signals}})
         starts = {key.rpartition(".")[2]: value for key, value in own.items() if key in {o.key for o in self.own}}
         if not starts:
             return scenario
@@ -149,7 +169,7 @@ class RecordedMotion:
         return scenario.updated(simulation={"initial": {"position": {**initial.position, **starts}}})
 
     def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
-        moved = self._with_start(scenario, own)
+        moved = self._with_own(scenario, own)
         finger = None if self._finger is None else fitted(self._finger, self.scenario, moved)
         return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger), judged=False)
 
@@ -205,13 +225,18 @@ class RecordedMotion:
             section, group = _INPUTS[variable]
             entries = table.setdefault(section, {})
             if variable == "tendon_command" and entries.get("kind") != "tensions":
-                kept = {key: entries[key] for key in ("minimum_tension",) if key in entries}
+                kept = {key: entries[key] for key in ("minimum_tension", "inputs", *WINDINGS) if key in entries}
                 entries = table[section] = {"kind": "tensions", **kept}
             delay = self.recording.settings.inputs[name].delay
             times = (self.recording.time - delay + scenario.simulation.start_time).tolist()
             samples = {"kind": "samples", "times": times, "values": values.tolist()}
             finger, dot, own = label.partition(".")
             into = entries.setdefault(group, {})
+            if variable in ("spool_angle", "motor_voltage"):
+                # What the scenario itself tells that motor is not what was recorded.
+                for other in WINDINGS:
+                    if other != group:
+                        entries.get(other, {}).pop(label, None)
             if dot:
                 into.setdefault(finger, {})[own] = samples
             else:

@@ -17,6 +17,7 @@ from finger_pin.identification.checkpoint import Checkpoint
 from finger_pin.identification.comparison import LawComparison, compare_laws
 from finger_pin.identification.estimate import Fit, best_of, fit
 from finger_pin.identification.intervals import ProfileBound, covariance, profile
+from finger_pin.identification.misfit import sandwich
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.identification.scenario_parameters import entry_of
 from finger_pin.typing import Array
@@ -51,6 +52,7 @@ class FitPipeline:
         self.middle: Fit | None = None
         self.sides: dict[tuple[int, int], ProfileBound] = {}
         self.spread: Array | None = None
+        self.inflation = np.ones(len(problem.keys))
         self.comparison: LawComparison | None = None
 
     @property
@@ -150,14 +152,16 @@ class FitPipeline:
         """Compute all profiles; restart from a lower minimum if one is found."""
         fine, number = self.problem.fine(), self.fits.index(self.best)
         best = self.fits[number] = self.middle = fit(fine, place.z, loss=self.loss, slopes=place.slopes)
-        self.spread = covariance(fine, best)
+        naive = covariance(fine, best)
+        self.spread = sandwich(fine, best, naive)
+        naive_variance = np.diag(naive)
+        self.inflation = np.where(naive_variance > 0.0, np.diag(self.spread) / np.maximum(naive_variance, 1e-300), 1.0)
         self.problem.join(fine)
         ends = [(k, way) for k in range(self.problem.asked) for way in (-1, 1)]
 
         def one(item: tuple[int, Problem]) -> Fit | None:
-            (k, way), twin, spread = ends[item[0]], item[1], self.spread
-            assert spread is not None
-            work = partial(profile, twin, best, k, way, spread, self.loss)
+            (k, way), twin = ends[item[0]], item[1]
+            work = partial(profile, twin, best, k, way, naive, self.loss, float(self.inflation[k]))
             side = self.ledger.side(f"side {k} {way} {turn}", work)
             if side.better is None:
                 self.sides[k, way] = side

@@ -15,7 +15,7 @@ from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.limits import Limits
-from finger_pin.identification.recordings import RecordedSignal, Recording
+from finger_pin.identification.recordings import RecordedSignal, Recording, unit_of
 from finger_pin.identification.scenario_parameters import ScenarioPart, check_apart, is_of_scenario, owner
 from finger_pin.typing import Array
 
@@ -63,7 +63,7 @@ class RecordingModel(Protocol):
 
 
 def own_number(own: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0) -> float:
-    """Return the offset, scale or delay of an output that is being found."""
+    """Return the offset, scale or delay of an input or output that is being found."""
     return own.get(f"recordings.{recording}.{output}.{what}", default)
 
 
@@ -87,6 +87,7 @@ class Problem:
         evaluations: Number of scenarios computed.
         best: The least objective so far, and where.
         finely: Whether the errors of what is computed are smaller than the scenario asks.
+        units: SI units of all columns, by recording and name.
         means: Of how many samples in a row, at the most, the mean is met in place of each, by signal; none: of one.
     """
 
@@ -111,9 +112,10 @@ class Problem:
         self.keys = (*self.keys, *(own.key for own in further))
         self.low = np.append(self.low, [own.low for own in further])
         self.high = np.append(self.high, [own.high for own in further])
-        outputs = {f"{s.recording}.{s.name}" for s in self.signals}
+        taken = [model.recording for model in self.models]
+        self.units = {f"{each.name}.{name}": unit_of(name) for each in taken for name in (*each.inputs, *each.outputs)}
         self._numbers = np.array(
-            [k for k, key in enumerate(self.keys[: self.asked]) if is_of_scenario(key, outputs)], dtype=int
+            [k for k, key in enumerate(self.keys[: self.asked]) if is_of_scenario(key, self.units)], dtype=int
         )
         keys = tuple(self.keys[k] for k in self._numbers)
 

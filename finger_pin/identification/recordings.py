@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.recordings.bench import Column, RecordingSettings
-from finger_pin.description.recordings.columns import Table, read_columns
+from finger_pin.description.recordings.columns import Table, chosen_rows, read_columns
 from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
@@ -36,6 +36,8 @@ VARIABLES = {
     "motor_current": "A",
     "motor_voltage": "V",
     "motor_torque": "N m",
+    "spool_angle": "rad",
+    "tendon_winding": "m",
 }
 
 
@@ -104,7 +106,8 @@ def read_recording(
     if data is None and settings.file is None:
         raise InputError(f"{entry}.file", "is missing: the path of a CSV file")
     path = Path(str(settings.file))
-    table = Table(entry, read_columns(f"{entry}.file {path.name}", path) if data is None else data)
+    columns = read_columns(f"{entry}.file {path.name}", path) if data is None else data
+    table = Table(entry, chosen_rows(entry, columns, settings.rows))
 
     time, speed = np.zeros(table.rows), np.zeros(table.rows)
     if settings.time is not None:

@@ -20,6 +20,7 @@ from finger_pin.files import write_text
 from finger_pin.identification.comparison import LawComparison
 from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import LEVEL, ProfileBound, free_directions
+from finger_pin.identification.misfit import repeats
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.identification.recordings import RecordedSignal
 from finger_pin.identification.scenario_parameters import bare, owner
@@ -133,7 +134,7 @@ def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Profi
 
 
 def _units(problem: Problem, key: str) -> str:
-    unit = {f"{OF_RECORDINGS}{s.recording}.{s.name}": s.unit for s in problem.signals}.get(key.rpartition(".")[0])
+    unit = problem.units.get(key.removeprefix(OF_RECORDINGS).rpartition(".")[0])
     if unit is None:
         return describe(bare(key))["units"]
     return {"offset": unit, "delay": "s"}.get(key.rpartition(".")[2], "1")
@@ -143,6 +144,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
     signals, groups = problem.signals, problem.groups
     # The first of every output's windows stands for what they share.
     first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
+    known = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}
     whole = {
         "signal_index": np.repeat(groups, [len(s.measured) for s in signals]),
         "instant": np.concatenate([s.instant for s in signals]),
@@ -161,7 +163,16 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
         "signal_units": ("signal", [signals[k].unit for k in first]),
         "signal_steady": ("signal", [not signals[k].ordered for k in first]),
         "noise": ("signal", best.noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
-        "replicate_noise": ("signal", [replicates(signals[k]) for k in first], {"long_name": "rms of equal readings"}),
+        "replicate_noise": (
+            "signal",
+            [math.sqrt(known[k].scatter) if k in known else math.nan for k in range(len(first))],
+            {"long_name": "rms of equal readings, or of runs with equal inputs, about their mean"},
+        ),
+        "lack_of_fit": (
+            "signal",
+            [known[k].chance if k in known else math.nan for k in range(len(first))],
+            {"units": "1", "long_name": "probability that a model that misses nothing misses as much (F test)"},
+        ),
         "signal_samples": ("signal", np.bincount(whole["signal_index"], minlength=len(first))),
         "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),

@@ -14,8 +14,8 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
-#: What may be found of an output itself, besides the scenario's numbers.
-OF_OUTPUTS = ("offset", "scale", "delay")
+#: What may be found of a column itself, besides the scenario's numbers.
+OF_COLUMNS = ("offset", "scale", "delay")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,24 +71,24 @@ def entry_of(key: str) -> str:
     return f"identify.parameters.{key}" if own is None else f"identify.recordings.{own}.parameters.{bare(key)}"
 
 
-def is_of_scenario(key: str, outputs: Iterable[str]) -> bool:
-    """Return whether a parameter is a key of a scenario, not an offset, scale or delay of an output.
+def is_of_scenario(key: str, columns: Iterable[str]) -> bool:
+    """Return whether a parameter is a key of a scenario, not an offset, scale or delay of a column.
 
     Args:
         key: Dotted key.
-        outputs: Names of all outputs, with their recordings.
+        columns: Names of all inputs and outputs, with their recordings.
 
     Raises:
         InputError: If it is neither.
     """
     own = owner(key)
     name, _, what = key.removeprefix(OF_RECORDINGS).rpartition(".")
-    known = sorted(outputs)
-    if own is None or (what in OF_OUTPUTS and name in known):
+    known = sorted(columns)
+    if own is None or (what in OF_COLUMNS and name in known):
         return own is None
     if any(each.startswith(f"{own}.") for each in known) and bare(key).partition(".")[0] in Scenario.model_fields:
         return True
-    allowed = f"must be a key of the scenario, or variable.label and .{', '.join(OF_OUTPUTS)}; there are"
+    allowed = f"must be a key of the scenario, or variable.label and .{', '.join(OF_COLUMNS)}; there are"
     raise InputError(entry_of(key), f"{allowed} {', '.join(known)}")
 
 

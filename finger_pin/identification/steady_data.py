@@ -45,6 +45,7 @@ class SteadyReadings:
         self._entry = f"identify.recordings.{recording.name}"
         rows = len(recording.speed)
         joints, tendons = list(finger.joints), list(finger.actuated_names)
+        self._inputs: list[tuple[str, Array, int]] = []
         self.load, self._position = np.zeros((rows, len(tendons))), np.zeros((rows, len(joints)))
         if scenario.simulation.initial is not None:
             for joint, angle in scenario.simulation.initial.position.items():
@@ -57,9 +58,13 @@ class SteadyReadings:
                     hint = "" if np.any(values > 0.0) else "; scale = -1 turns the sign of a column"
                     below = f"is below 0 N in row {row}, and a tendon only pulls{hint}"
                     raise InputError(f"{self._entry}.inputs.{name}", below)
-                self.load[:, self._place(f"inputs.{name}", label, tendons)] = values
+                place = self._place(f"inputs.{name}", label, tendons)
+                self.load[:, place] = values
+                self._inputs.append((name, self.load, place))
             elif variable == "joint_position":
-                self._position[:, self._place(f"inputs.{name}", label, joints)] = values
+                place = self._place(f"inputs.{name}", label, joints)
+                self._position[:, place] = values
+                self._inputs.append((name, self._position, place))
             else:
                 allowed = "a steady state is given tendon_command, spool_tension and joint_position"
                 raise InputError(f"{self._entry}.inputs.{name}", allowed)
@@ -81,9 +86,11 @@ class SteadyReadings:
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
         settings = self.recording.settings
-        position = self._settled(scenario) if self._settles else self._position
+        load, position = self._corrected(own)
+        if self._settles:
+            position = self._settled(scenario, load)
         held = settings.at_rest or self._settles
-        found = steady_state(scenario.finger, self.load, self.recording.speed, position, held)
+        found = steady_state(scenario.finger, load, self.recording.speed, position, held)
         by_name = {"tendon_tension": found.tension, "tendon_friction": found.friction, "motor_current": found.current}
         by_name[_POSTURE] = position
         name = self.recording.name
@@ -118,17 +125,30 @@ class SteadyReadings:
     def tune(self, factor: float) -> None:
         """Do nothing: a closed form has no errors."""
 
+    def _corrected(self, own: Mapping[str, float]) -> tuple[Array, Array]:
+        """Return tensions, shape (m, a), N, and angles, (m, n), rad, with scales and offsets that are being found."""
+        load, position = self.load.copy(), self._position.copy()
+        for name, group, place in self._inputs:
+            scale = own_number(own, self.recording.name, name, "scale", 1.0)
+            values = scale * group[:, place] + own_number(own, self.recording.name, name, "offset")
+            if group is self.load:
+                # A tendon only pulls: what a wrong zero takes below it is a slack one.
+                load[:, place] = np.maximum(values, 0.0)
+            else:
+                position[:, place] = values
+        return load, position
+
     def _finger(self, scenario: Scenario) -> Finger:
         if self._replacing is not None:
             return fitted(self._replacing, self.scenario, scenario)
         return Finger(scenario.finger, objects=scenario.environment.objects)
 
-    def _settled(self, scenario: Scenario) -> Array:
+    def _settled(self, scenario: Scenario, load: Array) -> Array:
         """Return the posture at rest of every row nearest to what was read, shape (m, n), rad."""
         finger, force = self._finger(scenario), np.array(scenario.environment.fingertip_force)
-        speeds = [None] * len(self.load) if self.recording.settings.speed is None else self.recording.speed.tolist()
-        rows = zip(self.load, speeds, self._position, strict=True)
-        return np.array([settled_posture(finger, load, speed, near, force) for load, speed, near in rows])
+        speeds = [None] * len(load) if self.recording.settings.speed is None else self.recording.speed.tolist()
+        rows = zip(load, speeds, self._position, strict=True)
+        return np.array([settled_posture(finger, each, speed, near, force) for each, speed, near in rows])
 
     def _check_direction(self) -> None:
         """Refuse joints that are both given and read, and a direction that does not tell what friction holds.

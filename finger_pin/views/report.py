@@ -14,6 +14,10 @@ from finger_pin.files import write_text
 from finger_pin.views.document import document, image
 from finger_pin.views.plots.identification import plot_identification, plot_predictions, plot_profiles, short_name
 
+# From which probability of chance on a model is said to miss something; from which correlation of neighbours residuals
+# are said to follow each other.
+_MISSED, _FOLLOWING = 0.01, 0.9
+
 
 def summarize_identification(result: xr.Dataset) -> str:
     """Return the table of an identification as text."""
@@ -112,13 +116,7 @@ def _words(result: xr.Dataset) -> list[str]:
         words.append(f"{'The' if _borne_out(result) else 'Near this place the'} recordings determine every parameter.")
     if _borne_out(result):
         words.append(_agreement(result))
-    for name, repeated, noise in zip(
-        *(result[each].values for each in ("signal", "replicate_noise", "noise")), strict=True
-    ):
-        if math.isfinite(repeated):
-            words.append(
-                f"Equal readings of {name} differ by {repeated:.3g} rms, all readings from the law by {noise:.3g}."
-            )
+    words += _misses(result)
     if "law" in result.dims:
         order = np.argsort(result["law_bic"].values)
         first, *others = (str(result["law"].values[k]) for k in order)
@@ -127,6 +125,30 @@ def _words(result: xr.Dataset) -> list[str]:
         words.append(f"By BIC the law '{first}' is to be preferred: it is better than {rest} (10 is decisive).")
     if "unfinished" in result.attrs:
         words.append(f"{result.attrs['unfinished'].capitalize()}.")
+    return words
+
+
+def _misses(result: xr.Dataset) -> list[str]:
+    """Return sentences on what repeats and the correlation of residuals say of the model."""
+    words = []
+    columns = ("signal", "replicate_noise", "noise", "lack_of_fit", "signal_correlation", "signal_steady")
+    for name, repeated, noise, chance, correlation, steady in zip(
+        *(result[each].values for each in columns), strict=True
+    ):
+        if math.isfinite(repeated):
+            what = "Equal readings" if steady else "Repeated runs"
+            words.append(f"{what} of {name} differ by {repeated:.3g} rms, all from the law by {noise:.3g}.")
+        if chance < _MISSED:
+            words.append(
+                f"The model misses something of {name}: by chance alone it would miss as much with a probability of "
+                f"{chance:.2g}. The intervals count that as noise which repeats share; numbers that take the place of "
+                "what is missing may still be off."
+            )
+        elif math.isnan(chance) and correlation > _FOLLOWING:
+            words.append(
+                f"Residuals of {name} follow each other (correlation {correlation:.2f} of neighbours): the sensor or "
+                "the model; repeated runs would tell which. The intervals count them as noise with that correlation."
+            )
     return words
 
 

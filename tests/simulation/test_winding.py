@@ -211,7 +211,7 @@ def test_a_voltage_turns_the_motor_until_the_cord_holds_its_torque():
     )
     result = fp.simulate(made)
     np.testing.assert_allclose(result.joint_position.values[-1], share_of(0.4 * 3.2 / (3.2 * 0.02)), rtol=2e-5)
-    assert float(result.motor_voltage[-1, 0]) == 3.2
+    assert float(result.motor_voltage[-1, 0]) == pytest.approx(3.2)
 
 
 def test_the_voltages_that_a_loop_asked_for_make_the_same_motion_when_they_are_given(tmp_path):

@@ -39,6 +39,13 @@ class Column(Description):
     )
     scale: Annotated[float, real(-1e12, 1e12)] = quantity(1.0, unit="1", source="calibration", doc="Factor.")
     offset: Annotated[float, real(-1e12, 1e12)] = quantity(0.0, unit="SI", source="calibration", doc="Added, in SI.")
+    supply: str | None = Field(
+        None,
+        strict=True,
+        min_length=1,
+        max_length=200,
+        description="Another column that it is multiplied by: the voltage, V, that a pulse width is a part of.",
+    )
     delay: Annotated[float, real(-10.0, 10.0)] = quantity(
         0.0, unit="s", source="calibration", doc="Delay of the column behind its quantity; motions only."
     )
@@ -53,6 +60,9 @@ class RecordingSettings(Description):
     """A table of readings or of a motion. Columns are named ``variable.label`` as in a result."""
 
     file: str | None = Field(None, strict=True, description="A CSV file, relative to the file that names it.")
+    rows: dict[str, float | str] = Field(
+        {}, description="By column of a file with several recordings, the number or word in the rows of this one."
+    )
     kind: Annotated[Literal["motion", "steady"], choice("motion", "steady")] = quantity(
         "motion", unit="1", source="the recording", doc="Samples over time, or rows each of which is a steady state."
     )

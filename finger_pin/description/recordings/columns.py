@@ -111,7 +111,12 @@ class Table:
         wrong = np.flatnonzero(np.isinf(cells) if missing else ~np.isfinite(cells))
         if len(wrong):
             raise InputError(entry, f"column {name} has no number in row {wrong[0] + 1}")
-        values: NDArray[np.float64] = given.scale * factor * cells + given.offset
+        values: NDArray[np.float64] = given.scale * factor * cells
+        if given.supply is not None:
+            if si != "V" or unit is not None:
+                raise InputError(f"{entry}.supply", "is for a part of a voltage, without a unit", given.supply)
+            values = values * self.column(f"{key}.supply", Column(column=given.supply), "V")
+        values = values + given.offset
         return values
 
     def times(self, key: str, given: Column) -> NDArray[np.float64]:
@@ -218,6 +223,29 @@ def read_columns(what: str, path: Path) -> dict[str, Any]:
         if len(row) != len(header):
             raise InputError(what, f"row {number} has {len(row)} values, the header names {len(header)}")
     return {name: [_cell(row[k].strip()) for row in rows] for k, name in enumerate(header)}
+
+
+def chosen_rows(entry: str, columns: Mapping[str, Any], rows: Mapping[str, float | str]) -> Mapping[str, Any]:
+    """Return the rows of columns in which some of these have given numbers or words.
+
+    Raises:
+        InputError: If there is no such column, or no such row.
+    """
+    if not rows:
+        return columns
+    chosen = np.ones(len(next(iter(columns.values()))), dtype=bool)
+    for name, value in rows.items():
+        if name not in columns:
+            allowed = f"no such column; there are {', '.join(columns)}{suggestion(name, columns)}"
+            raise InputError(f"{entry}.rows.{name}", allowed)
+        here = np.array([cell == value for cell in columns[name]])
+        if not here.any():
+            found = list(dict.fromkeys(str(cell) for cell in columns[name]))[:12]
+            raise InputError(f"{entry}.rows.{name}", f"no row has it; there are {', '.join(found)}", value)
+        chosen &= here
+    if not chosen.any():
+        raise InputError(f"{entry}.rows", "no row has all of them")
+    return {name: [cells[k] for k in np.flatnonzero(chosen)] for name, cells in columns.items()}
 
 
 def read_text(what: str, path: Path) -> str:

@@ -1,0 +1,150 @@
+"""Misfit: correlated residuals, what a model misses beyond the scatter of repeats, and intervals that know both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
+from scipy.stats import f as f_distribution
+
+from finger_pin.identification.estimate import Fit
+from finger_pin.identification.problem import Problem
+from finger_pin.identification.recordings import RecordedSignal, Recording
+from finger_pin.typing import Array
+
+# From which probability of chance on a model is said to miss something, and how many lags of correlation are fitted.
+_CHANCE, _LAGS = 0.01, 8
+
+
+@dataclass(frozen=True, eq=False)
+class Repeats:
+    """Signals, or readings of one signal, that a model cannot tell apart.
+
+    Attributes:
+        signals: Their numbers: of motions all repeated runs, of readings one.
+        scatter: Mean square of residuals about their mean, independent of any model.
+        common: Mean square of what they share beyond that scatter, which the model misses; 0 if that may be chance.
+        chance: Probability of as much under a model that misses nothing (F test).
+    """
+
+    signals: tuple[int, ...]
+    scatter: float
+    common: float
+    chance: float
+
+
+def sandwich(problem: Problem, found: Fit, spread: Array) -> Array:
+    """Return the covariance of z with residuals correlated as they are, shape (p, p).
+
+    The estimate weighs samples as if they were independent but for their share; its covariance H^-1 V H^-1 has V of
+    the scores under the fitted correlation (Huber, 5th Berkeley Symposium, 1967): autoregressive over time, and with
+    what the model misses shared by repeats.
+
+    Args:
+        problem: The problem that was fitted.
+        found: Its minimum.
+        spread: Covariance by the likelihood alone, H^-1, shape (p, p).
+    """
+    slopes = problem.slopes(found.z)
+    scores = [w / n**2 * j for w, n, j in zip(found.weights, found.noise, slopes, strict=True)]
+    total, together = np.zeros_like(spread), set[int]()
+    for each in repeats(problem, found.residuals):
+        if each.common == 0.0:
+            continue
+        together.update(each.signals)
+        members = [problem.signals[k] for k in each.signals]
+        if members[0].ordered:
+            mean = np.mean([found.residuals[k] for k in each.signals], axis=0)
+            shared = np.sum([scores[k] for k in each.signals], axis=0)
+            total += each.common * _correlated(shared, _process([mean]))
+            apart = [found.residuals[k] - mean for k in each.signals]
+            total += each.scatter * sum(_correlated(scores[k], _process(apart)) for k in each.signals)
+        else:
+            score, alike = scores[each.signals[0]], members[0].alike
+            sums = np.zeros((alike.max() + 1, score.shape[1]))
+            np.add.at(sums, alike, score)
+            total += each.common * sums.T @ sums + each.scatter * score.T @ score
+    for group in np.unique(problem.groups):
+        own = [k for k in np.flatnonzero(problem.groups == group).tolist() if k not in together]
+        process = _process([found.residuals[k] for k in own if problem.signals[k].ordered])
+        total += sum(found.noise[k] ** 2 * _correlated(scores[k], process) for k in own)
+    return np.asarray(spread @ total @ spread)
+
+
+def repeats(problem: Problem, residuals: Sequence[Array]) -> list[Repeats]:
+    """Return what is repeated among the signals, with residuals of all of them."""
+    found, runs = [], dict[tuple[object, ...], list[int]]()
+    by_name = {model.recording.name: model.recording for model in problem.models}
+    for k, signal in enumerate(problem.signals):
+        if signal.ordered:
+            runs.setdefault(_setting(by_name[signal.recording], signal), []).append(k)
+        elif signal.alike.max(initial=-1) + 1 < len(signal.measured):
+            found.append(_of_readings(k, signal.alike, residuals[k], len(problem.keys)))
+    found += [_of_runs(tuple(own), [residuals[k] for k in own]) for own in runs.values() if len(own) > 1]
+    return found
+
+
+def _setting(recording: Recording, signal: RecordedSignal) -> tuple[object, ...]:
+    """Return what repeated runs have in common: what moves them, when they are read, and what is read."""
+    settings, columns = recording.settings, sorted(recording.inputs.items())
+    arrays = (recording.time, signal.instant, *(values for _, values in columns))
+    names = tuple(name for name, _ in columns)
+    return (signal.name, names, repr(settings.values), settings.start, *(each.tobytes() for each in arrays))
+
+
+def _of_readings(k: int, alike: NDArray[np.intp], residual: Array, parameters: int) -> Repeats:
+    count = np.bincount(alike)
+    mean = np.bincount(alike, residual) / count
+    inner, outer = len(residual) - len(count), max(len(count) - parameters, 1)
+    scatter = float(np.sum((residual - mean[alike]) ** 2)) / inner
+    between = float(np.sum(count * mean**2)) / outer
+    chance = float(f_distribution.sf(between / max(scatter, 1e-300), outer, inner))
+    common = max(between - scatter, 0.0) / float(np.mean(count))
+    return Repeats((k,), scatter, common if chance < _CHANCE else 0.0, chance)
+
+
+def _of_runs(signals: tuple[int, ...], residuals: Sequence[Array]) -> Repeats:
+    runs = len(residuals)
+    mean = np.mean(residuals, axis=0)
+    apart = [each - mean for each in residuals]
+    scatter = sum(float(np.mean(each**2)) for each in apart) / (runs - 1)
+    # Squares of what is correlated by rho count as (1 - rho^2) / (1 + rho^2) (Bartlett, J. Roy. Stat. Soc. B 8, 1946).
+    square = sum(float(each @ each) for each in apart)
+    rho = sum(float(each[1:] @ each[:-1]) for each in apart) / max(square, 1e-300)
+    independent = max(len(mean) * (1.0 - rho**2) / (1.0 + rho**2), 1.0)
+    between = runs * float(np.mean(mean**2))
+    chance = float(f_distribution.sf(between / max(scatter, 1e-300), independent, (runs - 1) * independent))
+    common = max(between - scatter, 0.0) / runs
+    return Repeats(signals, scatter, common if chance < _CHANCE else 0.0, chance)
+
+
+def _process(residuals: Sequence[Array]) -> Array:
+    """Return the autoregressive process of residuals, as a filter of white noise: numerator, then denominator.
+
+    Its variance is one; its order is that of least BIC (Yule and Walker).
+    """
+    count = sum(map(len, residuals))
+    lags = min(_LAGS, min(map(len, residuals), default=0) - 1)
+    if lags < 1 or not any(each.any() for each in residuals):
+        return np.array([1.0, 1.0])
+    moments = np.array([sum(float(e[h:] @ e[: len(e) - h]) for e in residuals) for h in range(lags + 1)]) / count
+    best, least = np.array([1.0, 1.0]), 0.0
+    for order in range(1, lags + 1):
+        ahead = solve_toeplitz(moments[:order] * np.append(1.0 + 1e-9, np.ones(order - 1)), moments[1 : order + 1])
+        left = max(1.0 - float(ahead @ moments[1 : order + 1]) / moments[0], 1e-12)
+        bic = count * np.log(left) + order * np.log(count)
+        if bic < least:
+            best, least = np.concatenate([[np.sqrt(left), 1.0], -ahead]), bic
+    return best
+
+
+def _correlated(score: Array, process: Array) -> Array:
+    """Return B^T R B of scores B, shape (m, p), under a stationary process, shape (p, p)."""
+    # What came before the first sample goes on in it: as many instants as there are samples tell it.
+    reversed_scores = np.concatenate([score[::-1], np.zeros_like(score if len(process) > 2 else score[:0])])
+    filtered = lfilter(process[:1], process[1:], reversed_scores, axis=0)
+    return np.asarray(filtered.T @ filtered)

@@ -1,0 +1,93 @@
+"""Misfit: what correlated residuals and repeated readings do to intervals, against statistics in closed form."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from intervals import COULOMB, MOTION, TURN, motion
+from scipy.signal import lfilter
+
+import finger_pin as fp
+from finger_pin.identification.misfit import repeats, sandwich
+from finger_pin.views.report import summarize_identification
+
+
+def stub(residual, slopes, *, ordered=True, alike=None, weight=1.0):
+    """One signal of a linear problem, and its minimum."""
+    count = len(residual)
+    alike = np.arange(count) if alike is None else alike
+    settings = SimpleNamespace(values={}, start="rest")
+    recording = SimpleNamespace(name="one", settings=settings, inputs={}, time=np.arange(count))
+    signal = SimpleNamespace(
+        recording="one", name="out", instant=np.arange(count), alike=alike, ordered=ordered, measured=residual
+    )
+    problem = SimpleNamespace(
+        signals=[signal],
+        models=[SimpleNamespace(recording=recording)],
+        groups=np.zeros(1, dtype=int),
+        keys=("a",) * slopes.shape[1],
+        slopes=lambda z: [slopes],
+    )
+    noise = np.full(1, np.sqrt(np.mean(residual**2)))
+    found = SimpleNamespace(z=np.zeros(slopes.shape[1]), residuals=[residual], noise=noise, weights=np.full(1, weight))
+    return problem, found, np.linalg.inv(slopes.T @ slopes * weight / noise[0] ** 2)
+
+
+@pytest.mark.parametrize("rho", [0.6, 0.95])
+@pytest.mark.parametrize("frequency", [0.01, 0.3, 1.5])
+def test_a_slope_that_swings_has_the_variance_of_the_noise_at_its_frequency(rho, frequency):
+    """Its spectral density at the slope cos(w t): sigma^2 (1 - rho^2) / (1 - 2 rho cos w + rho^2)."""
+    count = 40_000
+    fresh = np.random.default_rng(1).normal(size=count)
+    residual = lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], fresh)
+    slopes = np.cos(frequency * np.arange(count))[:, None]
+    weight = (1.0 - rho) / (1.0 + rho)
+    problem, found, naive = stub(residual, slopes, weight=weight)
+    density = (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(frequency) + rho**2)
+    assert sandwich(problem, found, naive)[0, 0] == pytest.approx(weight * density * naive[0, 0], rel=0.05)
+
+
+def test_readings_whose_law_misses_something_count_as_one_for_each_setting():
+    """Fifty settings of eight readings share a miss of 0.3 each beside a scatter of 0.1: variance of their mean."""
+    rng, alike = np.random.default_rng(2), np.repeat(np.arange(50), 8)
+    residual = 0.3 * rng.normal(size=50)[alike] + 0.1 * rng.normal(size=400)
+    residual -= residual.mean()
+    problem, found, naive = stub(residual, np.ones((400, 1)), ordered=False, alike=alike)
+    variance = sandwich(problem, found, naive)[0, 0]
+    means = residual.reshape(50, 8).mean(axis=1)
+    assert variance == pytest.approx(means.var(ddof=1) / 50, rel=0.02)
+    assert repeats(problem, found.residuals)[0].chance < 1e-6
+
+
+def test_readings_whose_law_holds_are_said_to_miss_something_as_rarely_as_chance_has_it():
+    rng, alike = np.random.default_rng(3), np.repeat(np.arange(8), 5)
+    chances = []
+    for _ in range(400):
+        problem, found, _ = stub(rng.normal(size=40), np.zeros((40, 0)), ordered=False, alike=alike)
+        chances.append(repeats(problem, found.residuals)[0].chance)
+    # Uniform: the share below 0.2 is 0.2, with a standard deviation of 0.02.
+    assert np.mean(np.array(chances) < 0.2) == pytest.approx(0.2, abs=0.06)
+
+
+def test_repeated_runs_tell_a_law_that_lacks_a_term_from_one_that_does_not():
+    """Two runs of one canal with drag: fitted with it nothing is said; without it the missing term is, and widens."""
+    rng = np.random.default_rng(4)
+    runs = {name: motion(rng, 0.15, 0.6, 0.0) for name in ("first", "second")}
+    recordings = {name: {**MOTION, "settle": 0.1} for name in runs}
+
+    def found(parameters):
+        overrides = {"finger.tendons.T1.curvature_offset": TURN}
+        return fp.identify(
+            "canal", parameters=parameters, recordings=recordings, data=runs, overrides=overrides, starts=1
+        )
+
+    whole = found({COULOMB: (0.005, 1.0), "finger.tendon_friction.drag": (0.0, 3.0)})
+    lacking = found({COULOMB: (0.005, 1.0)})
+    force = "first.tendon_tension.T1"
+    assert float(whole.lack_of_fit.sel(signal=force)) > 0.01
+    assert float(whole.replicate_noise.sel(signal=force)) == pytest.approx(0.05, rel=0.15)
+    assert float(lacking.lack_of_fit.sel(signal=force)) < 1e-6
+    assert "The model misses something of first.tendon_tension.T1" in summarize_identification(lacking)
+    assert "misses" not in summarize_identification(whole)
+    width = [float(each.upper[0] - each.lower[0]) for each in (whole, lacking)]
+    assert width[1] > 2.0 * width[0]
