@@ -19,7 +19,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.identification.problem import At, NuisanceParameter, own_number
-from finger_pin.identification.recordings import Recording
+from finger_pin.identification.recordings import Recording, check_pulling
 from finger_pin.mechanism.coerce import fitted
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import RunArrays, recorded
@@ -227,6 +227,9 @@ class RecordedMotion:
             if variable == "tendon_command" and entries.get("kind") != "tensions":
                 kept = {key: entries[key] for key in ("minimum_tension", "inputs", *WINDINGS) if key in entries}
                 entries = table[section] = {"kind": "tensions", **kept}
+            if variable == "tendon_command":
+                check_pulling(f"{self._entry}.inputs.{name}", values)
+                values = np.maximum(values, 0.0)
             delay = self.recording.settings.inputs[name].delay
             times = (self.recording.time - delay + scenario.simulation.start_time).tolist()
             samples = {"kind": "samples", "times": times, "values": values.tolist()}

@@ -39,6 +39,8 @@ VARIABLES = {
     "spool_angle": "rad",
     "tendon_winding": "m",
 }
+# By how much of its greatest reading a load cell of a slack cord may err.
+_WRONG_ZERO = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +94,19 @@ class Recording:
 def unit_of(name: str) -> str:
     """Return the SI unit of ``variable.label``; empty for an unknown one."""
     return VARIABLES.get(name.partition(".")[0], "")
+
+
+def check_pulling(entry: str, tension: Array) -> None:
+    """Refuse recorded tensions that are negative by more than a wrong zero makes them; below 0 N a cord is slack.
+
+    Raises:
+        InputError: Naming the row of the least one.
+    """
+    least, greatest = float(tension.min()), float(tension.max())
+    if least < -_WRONG_ZERO * max(greatest, 0.0):
+        hint = "" if greatest > 0.0 else "; scale = -1 turns the sign of a column"
+        below = f"is {least:.4g} N in row {int(np.argmin(tension)) + 1}, and a tendon only pulls{hint}"
+        raise InputError(entry, below)
 
 
 def read_recording(

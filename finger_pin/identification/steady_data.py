@@ -10,7 +10,7 @@ from finger_pin.analysis.steady import steady_state
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.problem import At, NuisanceParameter, own_number
-from finger_pin.identification.recordings import Recording
+from finger_pin.identification.recordings import Recording, check_pulling
 from finger_pin.identification.settled import settled_posture
 from finger_pin.mechanism.coerce import fitted
 from finger_pin.mechanism.finger import Finger
@@ -53,11 +53,7 @@ class SteadyReadings:
         for name, values in recording.inputs.items():
             variable, _, label = name.partition(".")
             if variable in ("tendon_command", "spool_tension"):
-                if np.any(values < 0.0):
-                    row = int(np.flatnonzero(values < 0.0)[0]) + 1
-                    hint = "" if np.any(values > 0.0) else "; scale = -1 turns the sign of a column"
-                    below = f"is below 0 N in row {row}, and a tendon only pulls{hint}"
-                    raise InputError(f"{self._entry}.inputs.{name}", below)
+                check_pulling(f"{self._entry}.inputs.{name}", values)
                 place = self._place(f"inputs.{name}", label, tendons)
                 self.load[:, place] = values
                 self._inputs.append((name, self.load, place))

@@ -1,0 +1,108 @@
+"""Inputs as people record them: with a wrong zero, a wrong gain or late, as parts of a supply, several in one file."""
+
+import numpy as np
+import pytest
+from intervals import COULOMB, DRAG, MOTION, STEADY, TURN, motion, readings
+
+import finger_pin as fp
+from finger_pin.description.recordings.bench import RecordingSettings
+from finger_pin.description.validation import validate
+from finger_pin.identification.recordings import read_recording
+
+BENT = {"finger.tendons.T1.curvature_offset": TURN}
+
+
+def column(what):
+    return f"recordings.pull.tendon_command.T1.{what}"
+
+
+def test_the_zero_and_the_gain_of_what_pulls_are_found_from_steady_readings():
+    data = readings(np.random.default_rng(1), 0.15, 0.4, 0.0)
+    data["in"] = (data["in"] - 0.3) / 1.1
+    bounds = {COULOMB: (0.01, 0.5), column("offset"): (-1.0, 1.0), column("scale"): (0.5, 2.0)}
+    overrides = {**BENT, DRAG: 0.4}
+    found = fp.identify(
+        "canal", parameters=bounds, recordings={"pull": STEADY}, data={"pull": data}, overrides=overrides, starts=1
+    )
+    true = [0.15, 0.3, 1.1]
+    # Within three standard deviations, as a regression of these tables has them.
+    assert np.all(np.abs(found.estimate.values - true) < [0.003, 0.08, 0.01]) and found.determined.all()
+    assert list(found.units.values) == ["1", "N", "1"]
+
+
+def test_how_late_an_input_is_and_its_wrong_zero_are_found_from_a_motion():
+    """The motion is integrated apart from the package; the load cell of the pull tells 0.2 N too little, 20 ms late."""
+    data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
+    data["in"] = 6.0 - 6.0 * np.cos(2.0 * np.pi * 0.4 * (data["t"] - 0.02)) - 0.2
+    bounds = {COULOMB: (0.01, 0.5), column("offset"): (-1.0, 1.0), column("delay"): (-0.1, 0.1)}
+    found = fp.identify(
+        "canal",
+        parameters=bounds,
+        recordings={"pull": {**MOTION, "settle": 0.2}},
+        data={"pull": data},
+        overrides={**BENT, DRAG: 0.4},
+        starts=1,
+    )
+    assert found.estimate.values == pytest.approx([0.15, 0.2, 0.02], rel=0.05)
+    assert list(found.units.values) == ["1", "N", "s"]
+
+
+PWM = {
+    "time": "t",
+    "rows": {"trial": "slow"},
+    "inputs": {"motor_voltage.M1": {"column": "pwm", "scale": 0.01, "supply": "volts"}},
+    "outputs": {"motor_position.M1": "angle"},
+}
+TABLE = {
+    "trial": ["slow", "fast", "slow"],
+    "t": [0.0, 0.0, 1.0],
+    "pwm": [50.0, 80.0, -100.0],
+    "volts": [7.0, 7.2, 6.0],
+    "angle": [0.0, 0.1, 0.2],
+}
+
+
+def recording(change):
+    return read_recording("one", validate(RecordingSettings, PWM | change, ("identify", "recordings", "one")), TABLE)
+
+
+def test_a_pulse_width_is_its_part_of_the_supply_in_the_rows_of_its_trial():
+    np.testing.assert_allclose(recording({}).inputs["motor_voltage.M1"], [3.5, -6.0])
+    np.testing.assert_array_equal(recording({}).outputs["motor_position.M1"], [0.0, 0.2])
+    np.testing.assert_array_equal(
+        recording({"rows": {"volts": 6.0}, "kind": "steady", "time": None, "speed": 1.0}).speed, [1.0]
+    )
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        ({"rows": {"trail": "slow"}}, r"rows\.trail: no such column; there are trial.*did you mean trial"),
+        ({"rows": {"trial": "slwo"}}, r"rows\.trial = .slwo.: no row has it; there are slow, fast"),
+        ({"rows": {"trial": "fast", "t": 1.0}}, "rows: no row has all of them"),
+        (
+            {"inputs": {"spool_angle.M1": {"column": "pwm", "supply": "volts"}}},
+            r"inputs\.spool_angle\.M1\.supply = .volts.: is for a part of a voltage, without a unit",
+        ),
+        (
+            {"inputs": {"motor_voltage.M1": {"column": "pwm", "unit": "V", "supply": "volts"}}},
+            "is for a part of a voltage, without a unit",
+        ),
+        (
+            {"inputs": {"motor_voltage.M1": {"column": "pwm", "supply": "battery"}}},
+            r"motor_voltage\.M1\.supply = .battery.: no such column",
+        ),
+    ],
+)
+def test_rows_and_supplies_that_are_not_there_are_refused_by_their_entry(change, said):
+    with pytest.raises(fp.InputError, match=said):
+        recording(change)
+
+
+def test_what_a_motion_cannot_be_given_is_refused_with_what_it_can():
+    told = {**MOTION, "inputs": {"motor_position.M1": "in"}}
+    data = {"pull": dict.fromkeys(("t", "in", "out", "angle"), np.arange(5.0))}
+    with pytest.raises(
+        fp.InputError, match=r"inputs\.motor_position\.M1: a motion is given tendon_command, spool_angle"
+    ):
+        fp.identify("canal", parameters={COULOMB: (0.01, 0.5)}, recordings={"pull": told}, data=data)
