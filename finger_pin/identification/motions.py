@@ -24,7 +24,7 @@ from finger_pin.mechanism.coerce import fitted
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import RunArrays, recorded
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
-from finger_pin.simulation.sensitivity import changed, nearby
+from finger_pin.simulation.sensitivity import changed, nearby, with_exact_encoders
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates
 from finger_pin.typing import Array
@@ -106,12 +106,17 @@ class RecordedMotion:
             values: Values of the parameters, shape (p,).
             sizes: Sizes of changes of the values, shape (p,).
         """
-        here = at(values)
+
+        def exact(values: Array) -> tuple[Scenario, dict[str, float]]:
+            scenario, own = at(values)
+            return with_exact_encoders(scenario), own
+
+        here = exact(values)
         factor = max(self._factor, _SLOPES)
         computed, motion = self._made(*here, factor)
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
-        there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
+        there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: exact(np.array(moved)))
         feeling = [k for k, (scenario, own) in enumerate(there) if self._with_own(scenario, own) != motion[0].scenario]
         others = {k: self._setup(*there[k]) for k in feeling}
         # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
@@ -136,7 +141,7 @@ class RecordedMotion:
                 moved[k] += np.sign(changes[k]) * _COARSE * float(sizes[k])
                 # At the edge of what goes together there is no such change.
                 with suppress(InputError):
-                    found, _ = self._made(*at(moved), factor)
+                    found, _ = self._made(*exact(moved), factor)
                     slopes = [(f - c) / (moved[k] - values[k]) for f, c in zip(found, computed, strict=True)]
             return [np.nan_to_num(each, nan=0.0) for each in slopes]
 

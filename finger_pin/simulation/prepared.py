@@ -25,7 +25,7 @@ from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.recording import RunArrays, attributes_of, record, recorded, refuse_unknown
 from finger_pin.simulation.running import interruptible, run
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
-from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
+from finger_pin.simulation.sensitivity import add_slopes, changed, nearby, with_exact_encoders
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates, variables
 from finger_pin.typing import Array
@@ -148,7 +148,10 @@ class Prepared:
             raise InputError("simulation.method", f"sensitivities are for {', '.join(TABLEAUS)}", setup.method)
         numbers = [float(value) for value in given]
         sizes = [abs(value) or 1.0 for value in numbers]
-        others, changes = changed(numbers, sizes, lambda moved: self._setup(self.scenario(moved), initial))
+        others, changes = changed(
+            numbers, sizes, lambda moved: self._setup(with_exact_encoders(self.scenario(moved)), initial)
+        )
+        scenario = with_exact_encoders(scenario)
         _, chosen, _ = self._made(with_tighter(scenario, _FINER), initial, stop)
         # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
         setups = [self._setup(scenario, initial), *others]

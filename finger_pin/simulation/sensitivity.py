@@ -15,6 +15,7 @@ import numpy as np
 
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.recording import RunArrays
 from finger_pin.simulation.setup import Setup
@@ -55,6 +56,21 @@ def changed(
         found.append(made)
         changes.append(other[k] - value)
     return found, np.array(changes)
+
+
+def with_exact_encoders(scenario: Scenario) -> Scenario:
+    """Return a scenario whose position drives read exact angles.
+
+    Between the steps of an encoder a loop would not feel what a parameter does to its angle: derivatives of a run are
+    those of one that reads it exactly.
+    """
+    finger = scenario.finger
+    rounding = {
+        name: each.updated(motor={"encoder": {"resolution": 0.0}})
+        for name, each in finger.actuators.items()
+        if each.drive == "position" and each.motor.encoder is not None and each.motor.encoder.resolution > 0.0
+    }
+    return scenario.updated(finger={"actuators": finger.actuators | rounding}) if rounding else scenario
 
 
 def nearby(trajectory: Trajectory, others: Sequence[Setup]) -> list[Trajectory]:

@@ -55,6 +55,19 @@ def test_sensitivities_are_the_differences_of_tight_runs(name, entries, keys, va
             assert error < bound * np.sqrt(np.mean(expected**2)), (variable, keys[k])
 
 
+def test_a_loop_with_an_encoder_that_rounds_feels_a_parameter_as_one_that_reads_exactly_does():
+    """Between the encoder's steps nothing comes back to the loop, so that there it would seem to run open."""
+    key, entries = "finger.actuators.servo.position_loop.proportional", {"simulation.duration": 1.0}
+    run = fp.prepare(fp.load_scenario("wound", entries), [key], VARIABLES).run(sensitivities=True)
+    exact = {"finger.actuators.servo.motor": {"base": "XL330-M288", "encoder": {"resolution": 0.0}}}
+    tight = fp.prepare(fp.load_scenario("wound", entries | exact | TIGHT), [key], VARIABLES)
+    ends = [tight.run([9.2 * change]) for change in (1.001, 0.999)]
+    for variable in VARIABLES:
+        expected = (ends[0][variable] - ends[1][variable]) / (2e-3 * 9.2)
+        error = np.sqrt(np.mean((run.slopes[variable][0] - expected) ** 2))
+        assert error < 1e-2 * np.sqrt(np.mean(expected**2)), variable
+
+
 def test_differences_on_the_same_steps_and_branches_do_not_depend_on_the_change():
     # Before 0.7 s the pad touches; one that touches a little later or not yet must not differ by a leap.
     prepared = fp.prepare(fp.load_scenario("press", {"simulation.duration": 0.7}), ["finger.tendon_friction.coulomb"])
