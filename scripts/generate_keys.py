@@ -16,6 +16,7 @@ from pydantic_core import PydanticUndefined
 from finger_pin.commands.application import run_function
 from finger_pin.description.controller import ControllerSettings
 from finger_pin.description.finger import FingerDescription
+from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import EnvironmentSettings, Scenario
 from finger_pin.description.validation import Description
 
@@ -23,8 +24,8 @@ PAGE = Path(__file__).resolve().parents[1] / "finger_pin" / "description" / "KEY
 HEAD = """# All keys of a scenario file
 
 Names in angle brackets are yours. A key without a default must be given; `-` is left out. A finger alone (`fingers/`)
-has the keys of `finger` without that prefix, a hand those of `hand`. What a scenario says by joint or tendon
-stands, for a hand, in a table of its finger, such as `reference.joints.index.medial`.
+has the keys of `finger` without that prefix, a hand those of `hand`; a bench has `identify` besides. What a scenario
+says by joint or tendon stands, for a hand, in a table of its finger, such as `reference.joints.index.medial`.
 Written by `python scripts/generate_keys.py`.
 """
 
@@ -47,7 +48,9 @@ def generate_keys(
 def page() -> str:
     """Return the page: a table for each table of a scenario."""
     parts = [HEAD]
-    for name, field in Scenario.model_fields.items():
+    # A bench is a scenario with one table more.
+    bench = {"identify": FieldInfo(annotation=IdentifySettings)}
+    for name, field in (Scenario.model_fields | bench).items():
         rows = list(_rows(name, field))
         parts.append(f"## {name}\n\n| key | unit | default | meaning |\n|---|---|---|---|\n" + "\n".join(rows) + "\n")
     return "\n".join(parts)

@@ -32,6 +32,8 @@ _LITTLE, _LEAST = 1e-4, 1e-12
 #: Called with what is being done, how much of it is finished, and how much there is.
 Progress = Callable[[str, int, int], None]
 _Found = TypeVar("_Found")
+# Where in the bounds of a parameter it is asked whether anything feels it.
+_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 # So many places are tried for each further search, by one evaluation each; by how much minus twice the likelihood jumps
 # where the motion hunts, for a change of this part of the bounds.
 _TRIED, _JUMP, _TINY = 4, 10.0, 1e-5
@@ -225,8 +227,18 @@ def _check_felt(problem: Problem, fits: Sequence[Fit], places: Sequence[Array]) 
             felt |= np.any(np.abs(slopes) * (high - low) > 1e-9 * size, axis=0)
         if felt.all():
             return
+    best = best_of(problem, fits)
+    for k in np.flatnonzero(~felt):
+        # What is not felt at one place may be at another, such as friction that holds wherever searches have been.
+        for share in _SHARES:
+            place = best.z.copy()
+            place[k] = low[k] + share * (high - low)[k]
+            moved = problem.residuals(problem.feasible(place))
+            felt[k] |= not all(map(np.array_equal, moved, best.residuals))
+    if felt.all():
+        return
     key = problem.keys[int(np.flatnonzero(~felt)[0])]
-    raise InputError(entry_of(key), "no output of any recording feels it; leave it out")
+    raise InputError(entry_of(key), "no output of any recording feels it, at no value in its bounds; leave it out")
 
 
 def beside(problem: Problem, z: Array) -> list[Array]:

@@ -47,6 +47,22 @@ def test_how_late_an_input_is_and_its_wrong_zero_are_found_from_a_motion():
     assert list(found.units.values) == ["1", "N", "s"]
 
 
+def test_a_stop_is_found_though_where_the_search_starts_nothing_touches_it():
+    """The drum is pulled to 1.8 rad and stopped at 1.2: a stop at 4 rad, where the scenario has it, is not felt."""
+    time = np.arange(0.0, 3.5, 0.02)
+    pull = 6.0 * time
+    made = fp.simulate(
+        fp.load_scenario("canal", {"finger.joints.drum.range": [-1.0, 1.2], "simulation.sample_rate": 50.0}),
+        controller=(time, {"T1": pull}),
+    )
+    angle = made.joint_position.sel(joint="drum").values[: len(time)]
+    stop = "finger.joints.drum.range[1]"
+    told = {"time": "t", "inputs": {"tendon_command.T1": "in"}, "outputs": {"joint_position.drum": "angle"}}
+    data = {"t": time, "in": pull, "angle": angle + np.random.default_rng(3).normal(0.0, 1e-3, len(time))}
+    found = fp.identify("canal", parameters={stop: (0.5, 4.0)}, recordings={"pull": told}, data={"pull": data})
+    assert float(found.estimate[0]) == pytest.approx(1.2, abs=2e-3)
+
+
 PWM = {
     "time": "t",
     "rows": {"trial": "slow"},
