@@ -29,10 +29,10 @@ _LOST = {
 def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw joints against spools, tensions at both ends, currents and powers, from a result of a finger with servos.
 
-    (a) One panel per motor: angles of the joints that its tendons turn against the angle of its spool, deg; what gears,
-    stretch and canals keep back makes loops of them. (b) One panel per tendon on a spool, N: the tension there, and
-    what reaches the finger. (c) Currents, A. (d) Electrical power, W, and on top of each other where it goes; what is
-    between is stored, or comes back.
+    (a) One panel per motor: joints that its tendons turn, deg, or move, mm, against the angle of its spool, deg; what
+    gears, stretch and canals keep back makes loops of them. (b) One panel per tendon on a spool, N: the tension there,
+    and what reaches the finger. (c) Currents, A. (d) Electrical power, W, and on top of each other where it goes; what
+    is between is stored, or comes back.
 
     Args:
         result: Dataset of `simulate`.
@@ -52,7 +52,7 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     loops: list[Axes] = list(left.subplots(len(actuators), 1, squeeze=False)[:, 0])
     title(loops[0], "(a) joints against spools")
     for axes, (name, actuator) in zip(loops, actuators.items(), strict=True):
-        _loop(axes, result, name, _turned(finger, actuator.tendons))
+        _loop(axes, result, name, finger, _turned(finger, actuator.tendons))
     loops[-1].set_xlabel("angle of the spool (°)")
     shown = {line.get_label(): line for axes in loops for line in axes.get_lines()}
     legend(left, list(shown.values()))
@@ -82,12 +82,15 @@ def _turned(finger: FingerDescription, tendons: Iterable[str]) -> set[str]:
     return found
 
 
-def _loop(axes: Axes, result: xr.Dataset, motor: str, turned: set[str]) -> None:
+def _loop(axes: Axes, result: xr.Dataset, motor: str, finger: FingerDescription, turned: set[str]) -> None:
     spool = np.rad2deg(result["motor_position"].sel(motor=motor).values)
     for index, joint in enumerate(names(result, "joint")):
         if joint in turned:
-            angle = np.rad2deg(result["joint_position"].sel(joint=joint).values)
-            axes.plot(spool, angle, label=joint, linewidth=thin(), **series(index))
+            slides = finger.tree is not None and finger.tree.joints[joint].kind == "slide"
+            position = result["joint_position"].sel(joint=joint).values
+            shown = 1e3 * position if slides else np.rad2deg(position)
+            label = f"{joint} (mm)" if slides else joint
+            axes.plot(spool, shown, label=label, linewidth=thin(), **series(index))
     axes.set_ylabel(f"{motor}: joints (°)")
 
 
