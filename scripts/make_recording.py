@@ -13,6 +13,8 @@ from scipy.integrate import solve_ivp
 COULOMB, DRAG, DELAY, TURN = 0.12, 0.4, 0.03, np.pi / 2.0
 # Of the pressing finger: least and greatest tensions, N, and where its joints start, rad.
 RAMPS, POSTURE = ((3.0, 9.0), (1.3, 3.2), (1.0, 1.0)), (0.7, 0.2)
+# Of a finger of three joints: what its cord turns them with, m, and their springs, N m/rad.
+ARMS, SPRINGS = np.array([0.010, 0.008, 0.006]), np.array([0.08, 0.05, 0.03])
 
 
 def to_and_fro() -> Made:
@@ -118,7 +120,53 @@ def pressing() -> Made:
     return {"time_s": time, **pulls, "cell_N": force + 0.05 + noise}
 
 
-MADE = {"to_and_fro": to_and_fro, "weights": weights, "winding": winding, "pressing": pressing}
+def postures() -> Made:
+    """Return angles of three joints under hanging weights, shaken until nothing holds their springs: k theta = r T."""
+    pull = np.repeat([1.0, 2.0, 3.0, 4.0, 5.0], 3)
+    angle = pull[:, None] * ARMS / SPRINGS + np.random.default_rng(41).normal(0.0, np.deg2rad(0.7), (pull.size, 3))
+    read = dict(zip(("mcp_deg", "pip_deg", "dip_deg"), np.rad2deg(angle).T, strict=True))
+    return {"weight_kg": pull / 9.80665, **read}
+
+
+def spool_finger() -> Made:
+    """Return three joints on springs whose cord a spool winds in and lets out, twice, filmed at 25 Hz.
+
+    Inertia is left out: at these speeds it takes 1e-4 of what the springs do. The cord rubs where it bends.
+    """
+    spool, cord, coulomb, bristles, damping = 0.008, 2e4, 0.18, 5e4 / 3.0, np.array([2e-3, 1e-3, 5e-4])
+    time = np.arange(0.0, 6.0, 0.04)
+
+    def turned(at: Any) -> Any:
+        return 1.4 - 1.4 * np.cos(2.0 * np.pi * np.asarray(at) / 3.0)
+
+    def rate(at: float, state: np.ndarray) -> np.ndarray:
+        angle, friction = state[:3], state[3:]
+        arriving = [max(cord * (spool * float(turned(at)) - ARMS @ angle), 0.0)]
+        for held in friction:
+            arriving.append(max(arriving[-1] - held, 0.0))
+        before, behind = np.array(arriving[:-1]), np.array(arriving[1:])
+        speed = (ARMS * behind - SPRINGS * angle) / damping
+        sliding = np.cumsum((ARMS * speed)[::-1])[::-1]
+        level = np.maximum(np.tanh(0.5 * coulomb * np.abs(angle)) * (before + behind), 1e-4)
+        return np.concatenate([speed, bristles * (sliding - friction * np.abs(sliding) / level)])
+
+    found = solve_ivp(rate, (0.0, time[-1]), np.zeros(6), "Radau", time, rtol=1e-7, atol=1e-9, max_step=0.02)
+    rng, rows = np.random.default_rng(43), []
+    for run in ("first", "second"):
+        angle = np.rad2deg(found.y[:3] + rng.normal(0.0, 8e-3, (3, time.size)))
+        read = dict(zip(("mcp_deg", "pip_deg", "dip_deg"), angle, strict=True))
+        rows.append({"run": np.full(time.size, run), "time_s": time, "spool_rad": turned(time), **read})
+    return {name: np.concatenate([each[name] for each in rows]) for name in rows[0]}
+
+
+MADE = {
+    "to_and_fro": to_and_fro,
+    "weights": weights,
+    "winding": winding,
+    "pressing": pressing,
+    "postures": postures,
+    "spool_finger": spool_finger,
+}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -132,7 +180,8 @@ def main(arguments: list[str] | None = None) -> int:
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(found)
-        writer.writerows([[f"{value:.4f}" for value in row] for row in zip(*found.values(), strict=True)])
+        rows = zip(*found.values(), strict=True)
+        writer.writerows([[v if isinstance(v, str) else f"{v:.4f}" for v in row] for row in rows])
     return 0
 
 
