@@ -1,9 +1,13 @@
 """Identification from the made-up recordings of motions that ship."""
 
+from importlib import resources
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.description.recordings.columns import read_columns
 
 
 def test_the_made_up_recording_that_ships_tells_the_numbers_it_was_made_with():
@@ -28,6 +32,19 @@ def test_the_angle_of_a_spool_tells_friction_at_the_bends_and_how_springs_share_
     assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and result.determined.all()
     assert result.replicate_noise.values == pytest.approx(np.full(6, 8e-3), rel=0.1)
     assert np.all(result.lack_of_fit > 0.01)
+
+
+def test_a_cord_that_is_loose_at_first_is_found_as_an_offset_of_what_is_wound():
+    """The spool of 8 mm has turned by 0.1 rad more than the recording that ships says: 0.8 mm of slack."""
+    folder = resources.files("finger_pin.description").joinpath("benches")
+    table = read_columns("the recording", Path(str(folder.joinpath("spool_finger.csv"))))
+    table["spool_rad"] = np.array(table["spool_rad"]) + 0.1
+    offsets = {f"recordings.{run}.tendon_winding.flexor.offset": (-2e-3, 2e-3) for run in ("first", "second")}
+    data = dict.fromkeys(("first", "second"), table)
+    result = fp.identify("spool_finger", parameters=offsets, data=data, starts=1)
+    found = dict(zip(result.parameter.values, result.estimate.values, strict=True))
+    assert [found[key] for key in offsets] == pytest.approx([-8e-4, -8e-4], abs=2e-5)
+    assert found["finger.tendon_friction.coulomb"] == pytest.approx(0.18, abs=4e-3)
 
 
 def test_a_fingertip_against_a_load_cell_tells_the_friction_of_its_canals_and_the_wrong_zero():
