@@ -31,6 +31,7 @@ _NAMES = {
     "bias": "mean of measured less predicted, in the unit of the signal",
     "within": "share of samples within the band",
     "scatter": "rms of repeated readings or runs about their mean, in the unit of the signal",
+    "beyond": "share of samples whose load is beyond those that were fitted: no band knows what the model lacks there",
     "samples": "number of samples",
     "units": "units of the signal",
     "steady": "whether readings, not a motion",
@@ -59,7 +60,8 @@ def predict(
     Returns:
         Along ``prediction``, the signals: ``prediction_rms``, ``prediction_bias`` (measured less predicted),
         ``prediction_within``, the share of samples in the band, ``prediction_scatter`` of equal readings of a table or
-        of runs with equal inputs, not a number without any; along ``predicted``, the samples: ``predicted_measured``,
+        of runs with equal inputs, not a number without any, ``prediction_beyond``, the share of loads outside of those
+        that were fitted; along ``predicted``, the samples: ``predicted_measured``,
         ``predicted_value`` and ``predicted_band``, half its width.
 
     Raises:
@@ -127,7 +129,7 @@ def predictions(
             rows = np.concatenate(pieces, axis=1)
             signals.append(
                 {"name": f"{recording.name}.{name}", "unit": first.unit, "steady": not first.ordered}
-                | {"rows": rows, "scatter": scatter}
+                | {"rows": rows, "scatter": scatter, "beyond": _beyond(result, rows[1])}
             )
     return _dataset(signals) if signals else xr.Dataset()
 
@@ -170,6 +172,13 @@ def _noise(result: xr.Dataset, recording: str, name: str) -> float:
     return math.sqrt(sum(each**2 for each in alike) / len(alike)) if alike else math.nan
 
 
+def _beyond(result: xr.Dataset, load: Array) -> float:
+    """Return the share of loads, N, that are more or less than all that were fitted; not numbers are within."""
+    fitted = result["applied"].values[np.isfinite(result["applied"].values)]
+    least, most = (float(fitted.min()), float(fitted.max())) if len(fitted) else (-math.inf, math.inf)
+    return float(np.mean((load < least) | (load > most)))
+
+
 def _repeats(recording: Recording, name: str, known: Sequence[Recording]) -> float:
     """Return the rms of an output about its mean over motions with equal inputs; not a number of one alone."""
 
@@ -210,6 +219,7 @@ def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
             # A run that fails is within no band; without noise there is no band.
             "within": float(np.mean(np.abs(off) <= band)) if np.isfinite(band).all() else math.nan,
             "scatter": each["scatter"],
+            "beyond": each["beyond"],
             "samples": len(off),
             "units": each["unit"],
             "steady": each["steady"],

@@ -88,13 +88,18 @@ def _predictions(result: xr.Dataset) -> list[str]:
     """Return a sentence on every signal that was held out."""
     if "prediction" not in result.dims:
         return []
-    columns = ("rms", "bias", "within", "scatter", "samples", "units")
+    columns = ("rms", "bias", "within", "scatter", "beyond", "samples", "units")
     rows = zip(result["prediction"].values, *(result[f"prediction_{each}"].values for each in columns), strict=True)
     found = []
-    for name, rms, bias, within, scatter, count, unit in rows:
+    for name, rms, bias, within, scatter, beyond, count, unit in rows:
         share = "" if math.isnan(within) else f", {within:.0%} of {count} samples within the 95 % band"
         repeated = "" if math.isnan(scatter) else f"; repeats scatter by {scatter:.3g}"
         found.append(f"Held out: {name} is predicted to {rms:.3g} {unit} rms, bias {bias:.3g}{share}{repeated}.")
+        if beyond > 0.0:
+            found.append(
+                f"{beyond:.0%} of these loads are beyond those that were fitted: the band does not know what the model "
+                "lacks there."
+            )
     return found
 
 

@@ -53,12 +53,13 @@ def test_readings_that_are_held_out_are_predicted_with_a_band_by_noise_and_covar
     means = other["out"].reshape(3, 40)
     scatter = np.sqrt(np.sum((means - means.mean(axis=1, keepdims=True)) ** 2) / 117)
     expected = {"rms": np.sqrt(np.mean(off**2)), "bias": off.mean(), "within": np.mean(np.abs(off) <= band)}
-    for name, value in {**expected, "scatter": scatter, "samples": 120}.items():
+    for name, value in {**expected, "scatter": scatter, "samples": 120, "beyond": 1.0}.items():
         assert float(result[f"prediction_{name}"][0]) == pytest.approx(value, rel=1e-4), name
     np.testing.assert_allclose(result.predicted_band, band, rtol=1e-3)
     assert result.signal.values.tolist() == ["light.tendon_tension.T1"]
     told = summarize_identification(result)
     assert told.startswith("Held out: heavy.tendon_tension.T1 is predicted to ") and "repeats scatter by" in told
+    assert "100% of these loads are beyond those that were fitted" in told
     page = write_report(result, tmp_path / "page.html").read_text("utf-8")
     assert page.index("What was predicted") < page.index("What was found")
     again = fp.predict(fp.load(tmp_path / "identification.nc"), {"heavy": steady()}, data=data)
