@@ -106,17 +106,12 @@ class RecordedMotion:
             values: Values of the parameters, shape (p,).
             sizes: Sizes of changes of the values, shape (p,).
         """
-
-        def exact(values: Array) -> tuple[Scenario, dict[str, float]]:
-            scenario, own = at(values)
-            return with_exact_encoders(scenario), own
-
-        here = exact(values)
+        here = at(values)
         factor = max(self._factor, _SLOPES)
         computed, motion = self._made(*here, factor)
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
-        there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: exact(np.array(moved)))
+        there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
         feeling = [k for k, (scenario, own) in enumerate(there) if self._with_own(scenario, own) != motion[0].scenario]
         others = {k: self._setup(*there[k]) for k in feeling}
         # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
@@ -141,7 +136,7 @@ class RecordedMotion:
                 moved[k] += np.sign(changes[k]) * _COARSE * float(sizes[k])
                 # At the edge of what goes together there is no such change.
                 with suppress(InputError):
-                    found, _ = self._made(*exact(moved), factor)
+                    found, _ = self._made(*at(moved), factor)
                     slopes = [(f - c) / (moved[k] - values[k]) for f, c in zip(found, computed, strict=True)]
             return [np.nan_to_num(each, nan=0.0) for each in slopes]
 
@@ -149,7 +144,12 @@ class RecordedMotion:
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
     def _with_own(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
-        """Return a scenario with the starts of joints and the corrections of inputs that are being found."""
+        """Return a scenario with the starts of joints and the corrections of inputs that are being found.
+
+        Its position drives read exact angles: the steps of an encoder would make the likelihood as rough as what ends
+        an interval.
+        """
+        scenario = with_exact_encoders(scenario)
         for name, values in self.recording.inputs.items():
             numbers = [
                 own_number(own, self.recording.name, name, what, default)
