@@ -39,5 +39,6 @@ from .studies import sweep as sweep
 from .studies.batch import simulate_many as simulate_many
 from .version import __version__ as __version__
 from .views import plots as plots
+from .views.playground import play as play
 from .views.plots import plot_fig6 as plot_fig6
 from .views.viewer import view as view

@@ -15,7 +15,7 @@ from typing import Any
 import typer
 
 from finger_pin.cancellation import signals_interrupt
-from finger_pin.commands import export, force_capability, identify, optimise, self_locking, simulate, sweep
+from finger_pin.commands import export, force_capability, identify, optimise, play, self_locking, simulate, sweep
 from finger_pin.commands.console import Unsuccessful, complain
 from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, StudyError
 
@@ -25,6 +25,7 @@ atexit.register(gc.freeze)
 DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 COMMANDS = (
     simulate.simulate,
+    play.play,
     sweep.sweep,
     optimise.optimise,
     identify.identify,

@@ -24,6 +24,7 @@ from finger_pin.description.actuators import Actuator
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
+from finger_pin.laws.motor import OPEN_CIRCUIT
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
@@ -111,12 +112,7 @@ class PositionDrives:
         self._wound = np.isin(np.arange(len(finger.routing.tendons)), given)
         self.channels = actuators.voltages
         times: Array = period * np.arange(math.ceil(duration / period) + 1.0)
-        wanted = reference.at(times)
-        planned = controller.command(times, wanted, wanted.position, wanted.velocity).tension
-        drawn = finger.excursion(wanted.position)
-        goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated], drawn)
-        for motor, (signal, radius) in wound.items():
-            goals[:, motor] = signal.later(start_time).at(times)[0][:, 0] / radius
+        goals = spool_goals(finger, controller, times, reference.at(times), wound, start_time)
         goals[:, list(voltages)], volts = 0.0, np.full_like(goals, np.nan)
         for motor, signal in voltages.items():
             volts[:, motor] = signal.later(start_time).at(times)[0][:, 0]
@@ -145,6 +141,67 @@ class PositionDrives:
         From when it is let go a motor has `OPEN_CIRCUIT`.
         """
         return self.compiled.held(self.compiled.voltages, time)
+
+
+def spool_goals(
+    finger: Finger,
+    controller: Controller,
+    times: Array,
+    wanted: ReferenceSignals,
+    wound: Mapping[int, tuple[Signal, float]] = {},
+    start_time: float = 0.0,
+) -> Array:
+    """Return theta_m^d of all motors for a desired motion, shape (k, m), rad.
+
+    Args:
+        finger: The finger.
+        controller: Plans tensions.
+        times: Shape (k,), s.
+        wanted: The desired motion then, shape (k, n).
+        wound: From `wound_spools`.
+        start_time: Of the motion, s.
+    """
+    actuators = finger.actuators
+    planned = controller.command(times, wanted, wanted.position, wanted.velocity).tension
+    drawn = finger.excursion(wanted.position)
+    goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated], drawn)
+    for motor, (signal, radius) in wound.items():
+        goals[:, motor] = signal.later(start_time).at(times)[0][:, 0] / radius
+    return goals
+
+
+class SteppedDrives:
+    """The same loops for a caller that steps a finger by their period, such as with `Simulator`.
+
+    Attributes:
+        period: s.
+    """
+
+    def __init__(self, finger: Finger) -> None:
+        """Read the motors of a finger in position drive, m of them."""
+        self._drives = build_drives(finger, np.zeros((1, int(finger.actuators.holds.sum()))))
+        self.period = self._drives.period
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all samples."""
+        self._integral = np.zeros(len(self._drives.motors))
+        self._last: Array | None = None
+
+    def voltages(self, time: float, x: Array, goals: Array) -> Array:
+        """Return the voltages of a sample, shape (m,), V, at a packed state, for goals of spools, shape (m,), rad."""
+        drives, resolution = self._drives, self._drives.resolution
+        angle = x[drives.places]
+        coarse = resolution > 0.0
+        angle[coarse] = np.round(angle[coarse] / resolution[coarse]) * resolution[coarse]
+        error = goals - angle
+        rate = np.zeros_like(error) if self._last is None else (error - self._last) / self.period
+        summed = self._integral + error * self.period
+        duty = drives.gains[0] * error + drives.gains[1] * rate + drives.gains[2] * summed
+        # The integral stands still while the supply is at its limit.
+        self._integral, self._last = np.where(np.abs(duty) < 1.0, summed, self._integral), error
+        off = time * (1.0 + 1e-12) >= drives.torque_off
+        return np.where(off, OPEN_CIRCUIT, drives.supply * np.clip(duty, -1.0, 1.0))
 
 
 def _positioned(finger: Finger) -> list[tuple[str, Actuator]]:

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finger_pin.control.input_ranges import input_ranges, spool_ranges
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.position_drive import build_drives, loop_period
 from finger_pin.core.stepping.drives import Drives
@@ -20,8 +21,6 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.typing import Array
 
-# Tension that an action may ask for by default, and by which it may stretch a tendon on a spool, N.
-_STRONGEST = 20.0
 # Of the tensions that goals of joints stretch tendons by, which turn no joint, the largest, N.
 _CLOSING = 5.0
 
@@ -60,11 +59,11 @@ class Action(LoopController):
                 raise InputError("action", f'"tension" is not for motors in position drive: {", ".join(names)}')
             if finger.routing.winched.any():
                 raise InputError("action", '"tension" is not for winches; "tendon_winding" is')
-            self.low, self.high = _inputs(finger)
+            self.low, self.high = input_ranges(finger)
             self.names = finger.input_names
             self._goals: Callable[[Array], Array] = np.array
         elif kind == "tendon_winding" and finger.routing.winched.all() and finger.routing.actuated:
-            self.low, self.high = _inputs(finger)
+            self.low, self.high = input_ranges(finger)
             self.names = finger.input_names
             self._goals = np.array
         else:
@@ -81,7 +80,7 @@ class Action(LoopController):
                 self.names = finger.actuators.names
                 scale = radius if kind == "tendon_winding" else np.ones(len(radius))
                 self._goals = partial(_over, scale)
-                self.low, self.high = (each * scale for each in _reach(finger))
+                self.low, self.high = (each * scale for each in spool_ranges(finger))
             rows = math.ceil(duration / loop_period(finger)) + 1
             self._drives = build_drives(finger, np.zeros((rows, len(radius))))
         self.reset(0.0)
@@ -185,31 +184,6 @@ class Action(LoopController):
         return low, high
 
 
-def _inputs(finger: Finger) -> tuple[Array, Array]:
-    """Return least and largest inputs: tensions or, of winches, lengths, and what the actuators of a tree take.
-
-    Raises:
-        InputError: If an actuator's input has no range, and it holds no joint whose range would say.
-    """
-    description, winched = finger.description, finger.routing.winched
-    drawn = finger.excursion(_corners(finger)).T if winched.any() else np.zeros((len(winched), 1))
-    ends = [
-        (0.0, each.maximum_tension or _STRONGEST)
-        if each.winch is None
-        else (own.min(), own.max() + (each.maximum_tension or _STRONGEST) / each.winch.stiffness)
-        for each, own in zip(description.tendons.values(), drawn, strict=False)
-    ]
-    for name, each in (description.tree.actuators if description.tree is not None else {}).items():
-        reach = each.reach(description.joints[each.joint].range if each.joint else None)
-        if reach is None:
-            raise InputError(
-                f"finger.tree.actuators.{name}.input_range", "is missing: actions need a least and a largest"
-            )
-        ends.append(reach)
-    low, high = np.array(ends, dtype=float).reshape(-1, 2).T
-    return low, high
-
-
 def _over(scale: Array, action: Array) -> Array:
     return np.asarray(action / scale)
 
@@ -221,28 +195,6 @@ def _spools(finger: Finger, coupling: PassiveCoupling, free: NDArray[np.int64], 
     position, closure = coupling.matrix @ base + coupling.offset, finger.routing.force_closure()
     tension = _CLOSING * closure.tension[: finger.routing.actuated]
     return finger.actuators.angle(position, tension, finger.excursion(position))
-
-
-def _corners(finger: Finger) -> Array:
-    """Return the postures at the corners of the joints' ranges, shape (2^n, n), rad."""
-    limiter = finger.stroke_limiter
-    return np.array(np.meshgrid(*zip(limiter.lower, limiter.upper, strict=True))).reshape(len(limiter.lower), -1).T
-
-
-def _reach(finger: Finger) -> tuple[Array, Array]:
-    """Return the least and the largest spool angles that postures need, and some stretch, shape (m,), rad."""
-    actuators, corners = finger.actuators, _corners(finger)
-    drawn = finger.excursion(corners)
-    taut = actuators.angle(corners, None, drawn)
-    stretched = actuators.angle(corners, np.full(drawn.shape, _STRONGEST), drawn)
-    least, most = taut.min(axis=0), stretched.max(axis=0)
-    # Of tendons that are wound in together the one that needs most decides, not all on average.
-    for motor in np.flatnonzero(np.sum(actuators.spools > 0.0, axis=0) > 1):
-        wound = np.flatnonzero(actuators.spools[:, motor] > 0.0)
-        own = (drawn[:, actuators.tendons[wound]] - actuators.slack[wound]) / actuators.spools[wound, motor]
-        stretch = _STRONGEST / actuators.stiffness[wound] / actuators.spools[wound, motor]
-        least[motor], most[motor] = own.min(), (own + stretch).max()
-    return least, most
 
 
 class Replayed:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.control.palm import PrescribedObjects
+from finger_pin.control.palm import PalmPath, PrescribedObjects
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import core_signal, held_control
@@ -34,6 +34,8 @@ _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 
 class Simulator:
     """A finger that is stepped under tensions held over each step; deterministic, and compiled.
+
+    A palm with a path moves along it.
 
         sim = Simulator(Finger(load_finger("ub")), position=[0.0, 0.3, 0.3, 0.2])
         for _ in range(1000):
@@ -90,8 +92,11 @@ class Simulator:
         self.finger, mechanism = finger, finger.mechanism
         control = held_control(mechanism.channels, mechanism.coordinates)
         self._guides = PrescribedObjects.of(finger, 0.0, self._settings["rtol"])
+        self._palm = PalmPath.of(finger.description.hand, 0.0, finger, self._settings["rtol"])
         if self._guides is not None:
             control = control._replace(guide=core_signal(self._guides.signal))
+        if self._palm is not None:
+            control = control._replace(palm=core_signal(self._palm.signal))
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
         self._stepper = Stepper.of(finger, control, rest, **self._settings)
         self._fresh = self._stepper.state_snapshot
@@ -102,6 +107,8 @@ class Simulator:
     def _at(self, position: Array) -> Array:
         """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
         finger, x = self.finger, self.finger.rest_state(position)
+        if self._palm is not None:
+            x = self._palm.put(finger, x)
         if self._guides is not None:
             x = self._guides.place(finger, x)
         if finger.scene is not None:
@@ -244,11 +251,14 @@ class Simulator:
             InputError: If nothing has been run, or the sample rate or reference is wrong.
             IntegrationError: If there are more steps than can be kept in memory; its ``result`` holds the first.
         """
-        return self._log.result(self.finger, {**self._settings, "sample_rate": sample_rate}, reference)
+        return self._log.result(self.finger, {**self._settings, "sample_rate": sample_rate}, reference, self._palm)
 
     def signals(self) -> FingerSignals:
         """Return all signals at the present state, under the tensions and force of the last step."""
-        return self._compiled.evaluate(self.x, self._tension, self._force)
+        mover = self._palm or self._guides
+        return self._compiled.evaluate(
+            self.x, self._tension, self._force, None if mover is None else mover.base(self.time)
+        )
 
     def clone(self) -> Simulator:
         """Return an independent copy in the same state; both continue bit for bit alike."""

@@ -12,6 +12,7 @@ import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.control.palm import PalmPath
 from finger_pin.control.position_drive import GivenVoltages
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -59,13 +60,20 @@ class StepLog:
         twin._stepper, twin._numbers = stepper, self._numbers[:]
         return twin
 
-    def result(self, finger: Finger, settings: dict[str, Any], reference: Reference | Samples | None) -> xr.Dataset:
+    def result(
+        self,
+        finger: Finger,
+        settings: dict[str, Any],
+        reference: Reference | Samples | None,
+        palm: PalmPath | None = None,
+    ) -> xr.Dataset:
         """Repeat the steps bit by bit, and return their signals.
 
         Args:
             finger: The finger.
             settings: As in ``simulation`` of a scenario, without the duration.
             reference: As for `simulate`; by default the posture at the start.
+            palm: Path of the palm, if it moves.
 
         Raises:
             InputError: If there are no steps yet, or a setting or the reference is wrong.
@@ -100,6 +108,7 @@ class StepLog:
             fingertip_force=np.zeros(3 if len(tips) == 1 else (len(tips), 3)),
             varying_force=Signal.held(knots, force),
             dynamics=CompiledFinger(finger),
+            palm=palm,
             drives=GivenVoltages(channels, Signal.held(knots, inputs[:, channels])) if len(channels) else None,
         )
         again = _Repeated(stepper, knots, inputs, force)

@@ -1,4 +1,4 @@
-"""Views of results and analyses: figures (`plots`), the viewer, the summary. All of it only reads."""
+"""Views of results and analyses: figures (`plots`), the viewer, the summary. It only reads, but for the playground."""
 
 import lazy_loader
 

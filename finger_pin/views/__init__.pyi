@@ -1,5 +1,7 @@
+from . import playground as playground
 from . import plots as plots
 from . import viewer as viewer
+from .playground import play as play
 from .summary import summarize as summarize
 from .viewer import draw as draw
 from .viewer import view as view

@@ -77,6 +77,7 @@ def shown(tmp_path_factory):
         forget_what_ships()
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
         patch.setattr("finger_pin.views.viewer.viewing.PageHandle.wait", lambda viewing: viewing.close())
+        patch.setattr("finger_pin.views.playground.playing.Playground.wait", lambda playing: playing.close())
         patch.setattr("finger_pin.views.plots.saving.save_figure", not_painted)
         # The comparison of controllers leaves out the start.
         patch.setattr("paper.comparison.SETTLED", 0.0)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import copy
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.integrate
+import tomli_w
 
 import finger_pin as fp
 from finger_pin.simulation.simulator import Simulator
@@ -213,3 +215,24 @@ def test_many_simulators_step_together_bit_by_bit_as_one_by_one(simulator: Simul
     assert together[3].result().equals(alone[3].result())
     with pytest.raises(fp.InputError, match="stands there twice"):
         fp.step_many([simulator, simulator], np.ones((2, 4)), 0.01)
+
+
+def test_a_palm_moves_along_its_path_and_the_result_has_it(tmp_path: Path) -> None:
+    path = {"z": {"amplitude": 0.02, "frequency": 3.0}, "roll": {"amplitude": 0.5, "frequency": 1.0}}
+    table = {
+        "name": "shaken",
+        "hand": {"name": "one", "fingers": {"index": {"finger": "ub"}}, "palm": {"path": path}},
+        "controller": {"kind": "tensions", "minimum_tension": 2.0},
+        "simulation": {"duration": 0.3, "rtol": 1e-8, "atol_scale": 1e-8},
+    }
+    (tmp_path / "shaken.toml").write_text(tomli_w.dumps(table))
+    scenario = fp.load_scenario(tmp_path / "shaken.toml")
+    expected = fp.simulate(scenario)
+    simulator = Simulator(scenario.finger, expected.joint_position[0].values, rtol=1e-8, atol_scale=1e-8)
+    for _ in range(30):
+        simulator.step([2.0] * 4, 1e-2)
+    found = simulator.result()
+    np.testing.assert_allclose(simulator.state.position, expected.joint_position[-1], atol=1e-6)
+    np.testing.assert_allclose(found.palm_position, expected.palm_position, atol=1e-12)
+    np.testing.assert_allclose(simulator.signals().acceleration, expected.joint_acceleration[-1], rtol=1e-3, atol=1e-2)
+    assert abs(float(found.energy_residual[-1])) < 1e-6

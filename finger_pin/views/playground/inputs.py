@@ -1,0 +1,225 @@
+"""What moves a finger that is played: the scenario itself, sliders of joints, or sliders of tendons and servos."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.input_ranges import input_ranges, spool_ranges
+from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.control.position_drive import SteppedDrives, given_voltages, spool_goals, wound_spools
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import expand
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.state import State
+from finger_pin.references.reference import ReferenceSignals
+from finger_pin.typing import Array
+
+#: Kinds of what moves the finger.
+SCENARIO, JOINTS, TENDONS = "the scenario", "joint references", "tendons and servos"
+# Period of controllers, s, and the time in which a goal follows its slider, so that a click is no blow, s.
+_PERIOD, _FOLLOWING = 1e-3, 0.05
+
+
+@dataclass(frozen=True)
+class Slider:
+    """An input, with its unit and its range.
+
+    Attributes:
+        name: Of the joint, tendon or motor.
+        unit: SI.
+        low: Least value.
+        high: Largest value.
+        follows: Whether its value is a goal that is approached, not one that acts at once.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    follows: bool = False
+
+
+class Inputs:
+    """The inputs of a scenario's finger over time.
+
+    Attributes:
+        kinds: Of `SCENARIO`, `JOINTS` and `TENDONS` those that there are.
+        kind: The present one.
+        sliders: By kind.
+        values: Values of the sliders, by kind.
+        period: Time between commands, s.
+    """
+
+    def __init__(self, scenario: Scenario, loop: ClosedLoop) -> None:
+        """Read a scenario.
+
+        Raises:
+            InputError: If it cannot be played.
+        """
+        if loop.controller.needs_sensors or scenario.controller.sampling is not None:
+            raise InputError(
+                "controller.sampling", "cannot be played: the playground has a controller of its own period"
+            )
+        if scenario.simulation.start_time:
+            raise InputError("simulation.start_time", "must be 0 to be played", scenario.simulation.start_time)
+        self.adopt(scenario, loop)
+        finger = loop.finger
+        self._drives = SteppedDrives(finger) if finger.actuators.holds.any() else None
+        self.period = _PERIOD if self._drives is None else self._drives.period
+        self._pulled = np.setdiff1d(np.arange(finger.mechanism.channels), finger.actuators.voltages)
+        self.sliders = {SCENARIO: (), TENDONS: self._tendon_sliders()}
+        if not isinstance(loop.controller, OpenLoopTensions):
+            self.sliders[JOINTS] = self._joint_sliders()
+        self.kinds = tuple(kind for kind in (SCENARIO, JOINTS, TENDONS) if kind in self.sliders)
+        self.values = {kind: np.array([max(each.low, 0.0) for each in own]) for kind, own in self.sliders.items()}
+        self.reset()
+
+    def adopt(self, scenario: Scenario, loop: ClosedLoop) -> None:
+        """Go on with other numbers of the same scenario."""
+        self._scenario, self._loop = scenario, loop
+        self._coupling = scenario.coupling(loop.finger.routing)
+        self._wound = wound_spools(scenario, loop.finger)
+        self._voltages = given_voltages(scenario, loop.finger)
+        parts = scenario.parts().values()
+        self._damping = np.concatenate([expand(each.controller.damping, len(each.finger.joints)) for each in parts])
+
+    def reset(self) -> None:
+        """Go back to the scenario's own motion."""
+        self.kind, self._last = SCENARIO, np.zeros(self._loop.finger.mechanism.channels)
+        self._goals = np.zeros(int(self._loop.finger.actuators.holds.sum()))
+        self._shown = self.values[SCENARIO]
+        if self._drives is not None:
+            self._drives.reset()
+
+    def _tendon_sliders(self) -> tuple[Slider, ...]:
+        finger = self._loop.finger
+        low, high = input_ranges(finger)
+        winched, found = finger.routing.winched, []
+        for channel in self._pulled.tolist():
+            tendon = channel < finger.routing.actuated
+            name = finger.input_names[channel].removeprefix("tendon_winding.")
+            unit = "" if not tendon else "m" if winched[channel] else "N"
+            found.append(Slider(name, unit, float(low[channel]), float(high[channel]), unit != "N"))
+        holds = finger.actuators.holds
+        if holds.any():
+            names = [name for name, held in zip(finger.actuators.names, holds, strict=True) if held]
+            ends = zip(names, *(each[holds] for each in spool_ranges(finger)), strict=True)
+            found += [Slider(name, "rad", float(least), float(most), True) for name, least, most in ends]
+        return tuple(found)
+
+    def _joint_sliders(self) -> tuple[Slider, ...]:
+        finger, limiter = self._loop.finger, self._loop.finger.stroke_limiter
+        self._free = np.delete(np.arange(len(finger.routing.joints)), self._coupling.followers)
+        return tuple(
+            Slider(finger.routing.joints[k], "rad", float(limiter.lower[k]), float(limiter.upper[k]), True)
+            for k in self._free
+        )
+
+    def choose(self, kind: str, position: Array) -> None:
+        """Change the kind of input; sliders take the present posture, tensions and angles.
+
+        Args:
+            kind: One of `kinds`.
+            position: theta now, shape (n,), rad.
+        """
+        if kind not in self.kinds:
+            raise InputError("kind", f"must be one of {', '.join(self.kinds)}", kind)
+        if kind != SCENARIO:
+            self.values[kind] = self.present(kind, position)
+        self.kind, self._shown = kind, self.values[kind].copy()
+
+    def present(self, kind: str, position: Array) -> Array:
+        """Return the values that the sliders of a kind have to have for the present posture, tensions and angles."""
+        found = position[self._free] if kind == JOINTS else np.concatenate([self._last[self._pulled], self._goals])
+        low, high = np.array([(each.low, each.high) for each in self.sliders[kind]]).T
+        return np.asarray(np.clip(found, low, high))
+
+    def set(self, kind: str, index: int, value: float, position: Array) -> None:
+        """Move a slider, and let its kind move the finger."""
+        if kind != self.kind:
+            self.choose(kind, position)
+        slider = self.sliders[kind][index]
+        if not slider.low <= value <= slider.high:
+            raise InputError(slider.name, f"must be from {slider.low:.6g} to {slider.high:.6g}", value)
+        self.values[kind] = np.array([*self.values[kind][:index], value, *self.values[kind][index + 1 :]])
+
+    def command(self, time: float, x: Array) -> Array:
+        """Return the inputs for the next period, shape (u,), as `Simulator.step` takes them.
+
+        Args:
+            time: s.
+            x: The packed state, shape (size,).
+        """
+        loop, finger, given = self._loop, self._loop.finger, self.values[self.kind]
+        share = 1.0 - math.exp(-self.period / _FOLLOWING)
+        at_once = np.array([not each.follows for each in self.sliders[self.kind]], dtype=bool)
+        rate = (given - self._shown) / _FOLLOWING
+        self._shown = np.where(at_once, given, self._shown + share * (given - self._shown))
+        desired = self._desired(rate) if self.kind == JOINTS else loop.reference.at(time)
+        command = np.zeros(finger.mechanism.channels)
+        if self.kind == TENDONS:
+            command[self._pulled], self._goals = self._shown[: len(self._pulled)], self._shown[len(self._pulled) :]
+        else:
+            command, self._goals = self._planned(time, x, desired)
+        if self._drives is not None:
+            command[finger.actuators.voltages] = self._drives.voltages(time, x, self._goals)
+        for motor, signal in self._voltages.items() if self.kind == SCENARIO else ():
+            command[finger.actuators.channels[motor]] = signal.at(time)[0][0]
+        self._last = command
+        return command
+
+    def _desired(self, rate: Array) -> ReferenceSignals:
+        base, velocity = np.zeros((2, len(self._loop.finger.routing.joints)))
+        base[self._free], velocity[self._free] = self._shown, rate
+        matrix = self._coupling.matrix
+        return ReferenceSignals(matrix @ base + self._coupling.offset, matrix @ velocity)
+
+    def _felt(self, state: State, desired: Array) -> Array:
+        """Return the velocity that the damping of a sampled controller is given, shape (n,), rad/s.
+
+        Held over a period h, damping D of a light link, D h > 2 J, would throw it to and fro. It acts on the velocity
+        at the period's end instead, (M + h D) v' = M v, as in Tan, Liu and Turk, IEEE CG&A 31(4), 2011. Rotors of
+        servos are heavy enough.
+        """
+        finger = self._loop.finger
+        if finger.actuators.names or not self._damping.any():
+            return state.velocity
+        mass = finger.rigid_body.mass_matrix(state.position)
+        ahead = np.linalg.solve(mass + np.diag(self.period * self._damping), mass @ (state.velocity - desired))
+        return np.asarray(desired + ahead)
+
+    def _planned(self, time: float, x: Array, desired: ReferenceSignals) -> tuple[Array, Array]:
+        """Return what the scenario's controller commands, and the goals of spools."""
+        finger, state = self._loop.finger, self._loop.finger.layout.unpack(x)
+        velocity = self._felt(state, desired.velocity)
+        plan = self._loop.controller.command(time, desired, state.position, velocity)
+        command = np.array(plan.tension[: finger.routing.actuated])
+        # Rounding may take what is at zero below it.
+        pulling = ~finger.routing.winched
+        command[pulling] = np.maximum(command[pulling], 0.0)
+        if plan.inputs is not None:
+            command = np.concatenate([command, plan.inputs])
+        if self._drives is None:
+            return command, self._goals
+        wanted = ReferenceSignals(desired.position[None], desired.velocity[None])
+        wound = self._wound if self.kind == SCENARIO else {}
+        return command, spool_goals(finger, self._loop.controller, np.array([time]), wanted, wound)[
+            0, finger.actuators.holds
+        ]
+
+
+def position_of(sliders: Sequence[Slider], name: str) -> int:
+    """Return the place of a slider by its name.
+
+    Raises:
+        InputError: If there is none.
+    """
+    names = [each.name for each in sliders]
+    if name not in names:
+        raise InputError("slider", f"must be one of {', '.join(names)}", name)
+    return names.index(name)

@@ -1,0 +1,191 @@
+"""Play a scenario in the browser: the loop that steps it in real time, and the page that it is seen on."""
+
+from __future__ import annotations
+
+import queue
+import sys
+import threading
+import time
+import webbrowser
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Self
+
+import viser
+
+from finger_pin.exceptions import FingerPinError
+from finger_pin.simulation.progress import in_notebook
+from finger_pin.simulation.simulator import Simulator
+from finger_pin.views.playground.pacing import Pacer
+from finger_pin.views.playground.panel import PAUSE, PLAY, RESET, STEP, Panel
+from finger_pin.views.playground.session import Session, save_pieces
+from finger_pin.views.playground.stage import Stage
+
+# Height of the page in a notebook, pixels.
+_CELL = 620
+# Time between two updates of the text and the plots, and between two looks for somebody who looks, s.
+_REPORTED, _IDLE = 0.1, 0.1
+# What a press of Step simulates, s.
+_STEP = 0.02
+
+
+class Playground:
+    """A scenario that is being played; a context manager that ends it.
+
+    Attributes:
+        session: What is played.
+        url: Address of the page.
+        playing: Whether time runs.
+        rate: Simulated seconds per second as they come.
+        message: The last one on the page.
+    """
+
+    def __init__(self, session: Session, host: str, port: int, folder: Path) -> None:
+        """Serve a page and play from a thread."""
+        self.session, self.playing, self.message = session, True, ""
+        self._folder, self._pacer = folder, Pacer()
+        self._jobs: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._closed, self._reported = threading.Event(), 0.0
+        self._server = viser.ViserServer(host=host, port=port, label=session.scenario.name, verbose=False)
+        self.url = f"http://{host}:{self._server.get_port()}/"
+        self._stage = Stage(self._server, session)
+        self._panel = Panel(self._server, self, self._stage)
+        self._draw()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    @property
+    def rate(self) -> float:
+        """Simulated seconds per second as they come."""
+        return self._pacer.rate
+
+    def later(self, job: Callable[[], None]) -> None:
+        """Do something between two steps; what is refused is shown."""
+        self._jobs.put(job)
+
+    def press(self, button: str) -> None:
+        """Pause, play, step or reset."""
+        if button in (PLAY, PAUSE):
+            self.playing = button == PLAY
+            self._pacer.restart()
+        elif button == STEP:
+            self.playing = False
+            self._advance(_STEP)
+        elif button == RESET:
+            self.session.reset()
+            self._panel.let_go()
+            self._panel.follow()
+
+    def set_speed(self, speed: float) -> None:
+        """Change how fast time runs."""
+        self._pacer.speed = speed
+        self._pacer.restart()
+
+    def record(self, on: bool) -> None:
+        """Start a record, or stop and save it."""
+        if on:
+            self.session.record()
+            self.message = ""
+            return
+        pieces = self.session.stop()
+        self.message = "saving the record ..."
+        # A record is repeated to find its signals, which takes about as long as it did: time runs on meanwhile.
+        threading.Thread(target=self._save, args=(pieces,), daemon=True).start()
+
+    def _save(self, pieces: Sequence[Simulator]) -> None:
+        try:
+            paths = save_pieces(pieces, self._folder, self.session.scenario.name)
+            self.message = f"saved: {', '.join(map(str, paths))}"
+        except (FingerPinError, OSError) as error:
+            self.message = f"not saved: {error}"
+        print(self.message, flush=True)
+
+    def _advance(self, duration: float) -> float:
+        """Step by a time, unless that takes too long; return the simulated time, s."""
+        period, done = self.session.inputs.period, 0.0
+        while done + 0.999 * period <= duration and not (self.playing and self._pacer.late):
+            self.session.step()
+            done += period
+        return done
+
+    def _run(self) -> None:
+        while not self._closed.is_set():
+            if not self._server.get_clients():
+                # Nobody looks.
+                self._pacer.restart()
+                self._closed.wait(_IDLE)
+                continue
+            try:
+                with suppress(queue.Empty):
+                    while True:
+                        self._jobs.get_nowait()()
+                if self.playing:
+                    self._pacer.stepped(self._advance(self._pacer.due()))
+                else:
+                    self._pacer.due()
+                self._draw()
+            except FingerPinError as error:
+                self._refuse(str(error), error)
+            self._closed.wait(self._pacer.rest())
+
+    def _refuse(self, text: str, error: FingerPinError) -> None:
+        self.message = text
+        # A motion that cannot go on stands still until it is reset.
+        self.playing = self.playing and not isinstance(error, RuntimeError)
+
+    def _draw(self) -> None:
+        reading, now = self.session.reading(), time.perf_counter()
+        with self._server.atomic():
+            self._stage.show(reading)
+            if now - self._reported > _REPORTED:
+                self._reported = now
+                self._panel.show(reading)
+                self._panel.report(reading.time, self.rate, self._pacer.slow, self.message)
+
+    def wait(self) -> None:
+        """Play until the user interrupts (Ctrl-C)."""
+        try:
+            while self._thread.is_alive():
+                self._thread.join(0.2)
+        except KeyboardInterrupt:
+            self.close()
+
+    def close(self) -> None:
+        """End it. Closing twice is allowed."""
+        if not self._closed.is_set():
+            self._closed.set()
+            self._thread.join()
+            self._server.stop()
+
+    def __repr__(self) -> str:
+        """Return the address."""
+        return f"<{type(self).__name__} of {self.session.scenario.name} at {self.url}>"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.url}" width="100%" height="{_CELL}" style="border: none"></iframe>'
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """End it."""
+        self.close()
+
+
+def serve(
+    session: Session, host: str, port: int, folder: Path, open_browser: bool | None, block: bool | None
+) -> Playground:
+    """Play a session, as `finger_pin.views.playground.play` says."""
+    playing = Playground(session, host, port, folder)
+    if not in_notebook() if open_browser is None else open_browser:
+        webbrowser.open(playing.url, new=2)
+    if block is None:
+        block = not (sys.flags.interactive or "ps1" in vars(sys) or in_notebook())
+    if block:
+        if host not in ("127.0.0.1", "localhost"):
+            print(f"Whoever reaches {host} on the network can play too", flush=True)
+        print(f"Play at {playing.url} (Ctrl-C ends this)", flush=True)
+        playing.wait()
+    return playing

@@ -1,0 +1,249 @@
+"""A scenario that is played, without a page: its simulator, what moves it, springs at the tips, the record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.description.loading import ScenarioLike, load_scenario
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.evaluation import ContactPoints
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.simulation.netcdf import save
+from finger_pin.simulation.simulator import Simulator
+from finger_pin.typing import Array
+from finger_pin.views.playground.inputs import Inputs, Slider
+from finger_pin.views.playground.parameters import OF_FINGER, parameters
+
+# Of what is not recorded this much is kept, s.
+_KEPT = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What a page shows of an instant.
+
+    Attributes:
+        time: s.
+        position: theta, shape (n,), rad.
+        strands: Tension of every strand, shape (s,), N.
+        tension: Of every tendon, of a passive one its distal half, shape (t,), N.
+        tendon_use: Bristle force of every tendon over the friction of steady sliding, shape (t,): 1 slips.
+        joint_use: The same of every joint, shape (n,), or (0,) where their law has no bristles.
+        force: F at the tips, shape (f, 3), N.
+        objects: Poses of the free objects, x, y, z and quaternion x, y, z, w, shape (k, 7).
+        contacts: Contacts in space; None without objects.
+    """
+
+    time: float
+    position: Array
+    strands: Array
+    tension: Array
+    tendon_use: Array
+    joint_use: Array
+    force: Array
+    objects: Array
+    contacts: ContactPoints | None
+
+
+class Session:
+    """A scenario that is played, step by step.
+
+    Attributes:
+        scenario: The scenario, with the present parameters.
+        simulator: Steps it.
+        inputs: What moves it.
+        parameters: What can be changed.
+        handles: Where the spring of every tip is held, shape (3,), m, base frame; None for none.
+        stiffness: Of the springs, N/m.
+        recording: Whether what is played is recorded.
+    """
+
+    def __init__(self, scenario: ScenarioLike, *, keys: Sequence[str] = (), rtol: float = 1e-3) -> None:
+        """Begin a scenario.
+
+        Args:
+            scenario: The scenario, its name, or the path of a file.
+            keys: Further keys to change while it is played.
+            rtol: Relative tolerance, and the absolute one over the scale of each kind of state.
+
+        Raises:
+            InputError: If the scenario cannot be played.
+        """
+        self.scenario = load_scenario(scenario)
+        loop = ClosedLoop.from_scenario(self.scenario)
+        self.inputs = Inputs(self.scenario, loop)
+        self.parameters = parameters(self.scenario, loop.controller, keys)
+        self._chosen = [each.start for each in self.parameters]
+        self._family = ParametrisedScenario(self.scenario, [key for each in self.parameters for key in each.keys])
+        start = loop.initial_state()
+        posture = loop.finger.layout.unpack(start).position
+        self.simulator = Simulator(loop.finger, posture, method="Rodas4", rtol=rtol, atol_scale=rtol)
+        self.handles: list[Array | None] = [None] * len(loop.finger.rigid_body.tips)
+        self.stiffness, self.recording = 20.0, False
+        self._loop, self._pieces = loop, list[Simulator]()
+        self.reset()
+
+    @property
+    def finger(self) -> Finger:
+        """The finger that moves."""
+        return self.simulator.finger
+
+    def reset(self) -> None:
+        """Go back to the start of the scenario, with the present parameters; a record goes on in a new piece."""
+        self._end_piece()
+        self.simulator.reset(self._loop.initial_state())
+        self._since = 0.0
+        self.inputs.reset()
+        self.handles = [None] * len(self.handles)
+
+    def postures(self, times: Array) -> Array:
+        """Return the postures that the scenario wants at times (m,), s, shape (m, n), rad."""
+        return self._loop.reference.at(times).position
+
+    @property
+    def tips(self) -> Array:
+        """The fingertips, shape (f, 3), m, base frame."""
+        tips: Array = self.finger.rigid_body.tip_position(self.simulator.state.position)
+        return tips.reshape(-1, 3)
+
+    def force(self) -> Array:
+        """Return F at the tips, shape (f, 3), N: the scenario's, and that of the springs."""
+        force = np.array(self._loop.force(self.simulator.time)).reshape(-1, 3)
+        if any(handle is not None for handle in self.handles):
+            for index, (handle, tip) in enumerate(zip(self.handles, self.tips, strict=True)):
+                if handle is not None:
+                    force[index] += self.stiffness * (handle - tip)
+        return force
+
+    def step(self) -> None:
+        """Advance by one period of the inputs.
+
+        Raises:
+            IntegrationError: If the integrator cannot go on.
+        """
+        simulator = self.simulator
+        if not self.recording and simulator.time - self._since > _KEPT:
+            self._forget()
+        command, force = self.inputs.command(simulator.time, simulator.x), self.force()
+        simulator.step(command, self.inputs.period, force[0] if len(force) == 1 else force)
+
+    def move(self, kind: str, index: int, value: float) -> None:
+        """Move a slider of the inputs.
+
+        Raises:
+            InputError: If there is none, or the value is beyond its range.
+        """
+        self.inputs.set(kind, index, value, self.simulator.state.position)
+
+    def choose(self, kind: str) -> tuple[Slider, ...]:
+        """Let another kind of input move the finger; return its sliders."""
+        self.inputs.choose(kind, self.simulator.state.position)
+        return self.inputs.sliders[kind]
+
+    def change(self, index: int, value: float) -> None:
+        """Change a parameter, and go on from the same state; a record goes on in a new piece.
+
+        Raises:
+            InputError: If the value is not allowed, or would make another structure; nothing has changed then.
+        """
+        chosen = [*self._chosen[:index], value, *self._chosen[index + 1 :]]
+        entries: dict[str, object] = {}
+        for parameter, each in zip(self.parameters, chosen, strict=True):
+            entries |= parameter.at(each)
+        scenario = self._family.with_values([*entries.values()])
+        loop = ClosedLoop.from_scenario(scenario)
+        if self.parameters[index].keys[0].partition(".")[0] in OF_FINGER:
+            before = self.simulator.clone()
+            self.simulator.set_parameters({key: entries[key] for key in entries if key.partition(".")[0] in OF_FINGER})
+            self._end_piece(before)
+            self._since = self.simulator.time
+        self.inputs.adopt(scenario, loop)
+        self.scenario, self._loop, self._chosen = scenario, loop, chosen
+
+    def _forget(self) -> None:
+        """Begin a new record at the present state."""
+        self.simulator.x = self.simulator.x
+        self._since = self.simulator.time
+
+    def _end_piece(self, piece: Simulator | None = None) -> None:
+        if self.recording and self.simulator.time > self._since:
+            self._pieces.append(piece or self.simulator.clone())
+
+    def record(self) -> None:
+        """Record from now on."""
+        self._pieces = []
+        self._forget()
+        self.recording = True
+
+    def stop(self) -> list[Simulator]:
+        """Stop the record; return the simulators of its pieces: one, and one more for every change of the finger.
+
+        Raises:
+            InputError: If nothing was recorded.
+        """
+        self._end_piece()
+        self.recording = False
+        pieces, self._pieces = self._pieces, []
+        self._forget()
+        if not pieces:
+            raise InputError("record", "is empty: play first")
+        return pieces
+
+    def signals(self) -> FingerSignals:
+        """Return all signals of the finger now."""
+        return self.simulator.signals()
+
+    def reading(self) -> Reading:
+        """Return what a page shows of this instant."""
+        finger, found = self.finger, self.signals()
+        state, tendons = found.state, found.tendons
+        around, pins = finger.scene, found.mechanism.rows["joint_friction"]
+        bristles = bool(finger.layout.names_of("joint_stiction"))
+        return Reading(
+            time=self.simulator.time,
+            position=state.position,
+            strands=tendons.strands,
+            tension=finger.routing.tendon_tension(tendons.strands),
+            tendon_use=_tendon_use(found),
+            joint_use=np.abs(pins.row.state) / pins["level"] if bristles else np.zeros(0),
+            force=np.reshape(found.fingertip_force, (-1, 3)),
+            objects=state.object_pose.reshape(-1, 7),
+            contacts=None if around is None else found.mechanism.touching,
+        )
+
+
+def _tendon_use(found: FingerSignals) -> Array:
+    """Return the bristle force of every tendon over its level; of several bends the largest."""
+    tables = [found.mechanism.rows[name] for name in ("driven_tendons", "passive_tendons")]
+    use = np.concatenate([np.abs(each.row.state) / each["level"] for each in tables])
+    for name, weights in found.wraps.items():
+        wraps = found.mechanism.rows[name]
+        at_bends = np.abs(wraps.row.state) / wraps["level"]
+        use = np.maximum(use, np.max((weights != 0.0) * at_bends, axis=1, initial=0.0))
+    return use
+
+
+def save_pieces(pieces: Sequence[Simulator], folder: Path, name: str) -> list[Path]:
+    """Write the record of a session as netCDF, a file for each piece, under names that are free; return their paths.
+
+    Raises:
+        OSError: If they cannot be written.
+    """
+    results: list[xr.Dataset] = [each.result() for each in pieces]
+    folder.mkdir(parents=True, exist_ok=True)
+    number = 1
+    while list(folder.glob(f"{name}-{number}*.nc")):
+        number += 1
+    single = len(results) == 1
+    paths = [folder / f"{name}-{number}{'' if single else f'-{part}'}.nc" for part in range(1, len(results) + 1)]
+    for result, path in zip(results, paths, strict=True):
+        save(result, path)
+    return paths
