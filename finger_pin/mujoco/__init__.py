@@ -3,6 +3,9 @@
 Importing this registers the plugin that computes it, so that models that have it can be loaded.
 """
 
+import importlib
+from typing import Any
+
 from finger_pin.exceptions import InputError
 
 try:
@@ -16,5 +19,13 @@ from finger_pin.mujoco.signals import Signals, friction
 from finger_pin.mujoco.specification import MujocoWarning, add_friction
 
 try_self_test()
+
+
+def __getattr__(name: str) -> Any:
+    """Return the subpackage ``warp``, which is imported where it is asked for."""
+    if name == "warp":
+        return importlib.import_module("finger_pin.mujoco.warp")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = ["MujocoWarning", "Signals", "add_friction", "add_tendons", "friction"]

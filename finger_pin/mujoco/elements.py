@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import Pointer, njit_inline
 from finger_pin.exchange.mujoco_friction import (
     BRANCH,
@@ -21,10 +22,12 @@ from finger_pin.exchange.mujoco_friction import (
     SHARE,
     VISCOUS,
 )
+from finger_pin.mujoco.friction_step import delivered
 from finger_pin.mujoco.layout import Data, Kinds, Model
 from finger_pin.mujoco.loads import between, spring, turn_of_path
 from finger_pin.mujoco.memory import integer_in, integers, number_in, numbers
 
+_delivered = inlined(delivered)
 #: Speed, load, normal force, largest friction and turn.
 Seen: TypeAlias = tuple[float, float, float, float, float]
 
@@ -52,23 +55,19 @@ def tendon(
         # A part of what its tendon's friction has left, which ``held`` is here.
         first, trunk = HEAD + 1, objects[HEAD]
         pull = along[trunk] + spring(m, d, at, of, trunk)
-        way = 1.0 if pull > 0.0 else -1.0
-        lost = way * (held + p[VISCOUS] * number_in(d, of.ten_velocity, trunk))
-        pull, held = way * p[HEAD] * max(abs(pull) - lost, 0.0), 0.0
+        left = _delivered(pull, abs(pull), held, p[VISCOUS], number_in(d, of.ten_velocity, trunk))[1]
+        pull, held = (p[HEAD] if pull > 0.0 else -p[HEAD]) * left, 0.0
     if int(p[KIND]) == LINK:
         drive = about[integer_in(m, at.jnt_dofadr, row)] * (abs(p[SHARE]) if p[RATIO] > 0.0 else -abs(p[SHARE]))
         pull += drive if p[SHARE] > 0.0 else min(drive, 0.0)
     tension = abs(pull) + held
-    # Against what pulls: of a pulled tendon its length's speed is negative when it is wound in.
-    way = 1.0 if pull > 0.0 else -1.0
     speed = number_in(d, of.ten_velocity, tendon)
-    loss = way * (force + p[VISCOUS] * speed)
-    delivered = max(tension - loss, 0.0)
-    bend, pressing = 0.0, tension + delivered
+    loss, left = _delivered(pull, tension, force, p[VISCOUS], speed)
+    bend, pressing = 0.0, tension + left
     if pressing > 0.0:
         bend = _turn(m, d, at, of, kinds, e, tendon)
     for k in range(first, int(p[LENGTH])):
-        reactions[integers(m, at.jnt_dofadr)[objects[k]]] += delivered
+        reactions[integers(m, at.jnt_dofadr)[objects[k]]] += left
     # What holds the tendon back takes no more than there is.
     most = tension + p[DRAG] + p[FLOOR] if loss > 0.0 else np.inf
     return speed, tension, pressing, most, p[OFFSET] + bend

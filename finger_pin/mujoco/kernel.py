@@ -11,8 +11,6 @@ this speed and level.
 
 from __future__ import annotations
 
-import math
-
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import Pointer, njit_inline, scratch
 from finger_pin.exchange.mujoco_friction import (
@@ -39,10 +37,9 @@ from finger_pin.exchange.mujoco_friction import (
     TURN,
     VISCOUS,
 )
-from finger_pin.laws.bristle import friction_coefficient, friction_level
-from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mujoco.constraint_rows import row_forces, write_rows
 from finger_pin.mujoco.elements import Seen, mass, pin, tendon
+from finger_pin.mujoco.friction_step import NUMERICAL_FLOOR, exerted, level_of, slide
 from finger_pin.mujoco.layout import Contact, Data, Kinds, Model
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
 from finger_pin.mujoco.memory import (
@@ -58,11 +55,9 @@ from finger_pin.mujoco.memory import (
     zeros,
 )
 
-# The floor that keeps (9a) finite where nothing is pressed, N: higher ones are friction that users have asked for.
-_NUMERICAL = 1e-4
 _LOW = 0xFFFFFFFF
 
-_coefficient, _capstan, _level = map(inlined, (friction_coefficient, capstan_coefficient, friction_level))
+_level, _law, _slide = map(inlined, (level_of, exerted, slide))
 
 
 @njit_inline
@@ -161,30 +156,9 @@ def compute(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) ->
 def _exerted(p: Pointer, of_pin: bool, seen: Seen, force: float, dt: float) -> tuple[float, float, float, float]:
     """Return the level by (9b), (16), and a friction's part of its row: F - x, c + b, and the most that it exerts."""
     speed, tension, pressing, most, turn = seen
-    kinetic = p[COULOMB] if of_pin else _capstan(p[COULOMB], turn)
-    static = p[STATIC] * (1.0 if of_pin else kinetic)
-    coefficient = _coefficient(speed, kinetic, static, p[STRIBECK], p[EXPONENT])
-    # The drag of a pin lets go at M^c / M^d of it.
-    drag = p[DRAG] * (coefficient / kinetic if of_pin and kinetic > 0.0 else 1.0)
-    level = _level(pressing, coefficient, p[FLOOR], drag)
-    viscous, micro, ratio, moved = p[VISCOUS], p[MICRO], p[RATIO], p[STIFFNESS] * dt * speed
-    if tension == 0.0 and force == 0.0:
-        pull, damp, limit = 0.0, viscous + micro, level + viscous * abs(speed)
-    else:
-        later, decay = _slid(force, moved, level)
-        # The micro-damping's sigma_1 z', as z goes at this speed; it may help the motion.
-        micro *= (later - force) / moved if moved != 0.0 else 1.0
-        limit = max(level, abs(later)) + (viscous + micro) * abs(speed)
-        pull = force - (force + moved - later) * decay + min(micro, 0.0) * speed
-        damp = viscous + max(micro, 0.0)
-    return level, ratio * pull, ratio * ratio * (p[STIFFNESS] * dt + damp), abs(ratio) * min(limit, most)
-
-
-@njit_inline
-def _slid(force: float, moved: float, level: float) -> tuple[float, float]:
-    """Return F^s by (9a) after a way s0 v dt at this speed and level, exactly, and the share of it that is left."""
-    steady, decay = math.copysign(level, moved), math.exp(-abs(moved) / level)
-    return steady + (force - steady) * decay, decay
+    level = _level(of_pin, p[COULOMB], p[STATIC], p[STRIBECK], p[EXPONENT], p[FLOOR], p[DRAG], speed, pressing, turn)
+    pull, damp, limit = _law(level, p[STIFFNESS], p[VISCOUS], p[MICRO], speed, tension, most, force, dt)
+    return level, p[RATIO] * pull, p[RATIO] * p[RATIO] * damp, abs(p[RATIO]) * limit
 
 
 @njit_inline
@@ -221,10 +195,10 @@ def advance(m: int, d: int, instance: int, at: Model, of: Data, contact: Contact
         speed = _speed(m, d, at, of, row, of_joint) * values[e + RATIO]
         row = integer_in(m, at.jnt_dofadr, row) if of_joint else width + row
         states[place + FORCE] = forces[row] / values[e + RATIO]
-        if kind != PIN and states[place + LOAD] == 0.0 and max(level, abs(bristle)) <= _NUMERICAL:
+        if kind != PIN and states[place + LOAD] == 0.0 and max(level, abs(bristle)) <= NUMERICAL_FLOOR:
             # A tendon that is slack: its bristles stand up, so that the next step need not ask for them.
             bristle = speed = 0.0
-        act[z] = _slid(bristle, values[e + STIFFNESS] * dt * speed, level)[0]
+        act[z] = bristle + _slide(bristle, values[e + STIFFNESS] * dt * speed, level)[0]
         if kind == PIN:
             places[objects[e]], pins = x, True
             act[x], act[x + 1], act[x + 2] = 0.0, 0.0, 0.0

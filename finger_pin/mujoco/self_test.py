@@ -10,7 +10,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.mujoco.signals import friction
 from finger_pin.mujoco.specification import add_friction
 
-_SLIDER = """
+#: A slider on a tendon, which a motor pulls, and another motor on its joint.
+SLIDER = """
 <mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body><joint name="x" type="slide" axis="1 0 0"/>
 <geom size="0.01" mass="0.1"/></body></worldbody><tendon><fixed name="rope"><joint joint="x" coef="1"/></fixed></tendon>
 <actuator><motor tendon="rope"/><motor joint="x"/></actuator></mujoco>"""
@@ -22,7 +23,7 @@ def try_self_test() -> None:
     Raises:
         InputError: If MuJoCo does not do so, or refuses the model.
     """
-    spec = mujoco.MjSpec.from_string(_SLIDER)
+    spec = mujoco.MjSpec.from_string(SLIDER)
     law = {"coulomb": 0.2, "curvature_offset": 1.5, "stiction_ratio": 1.0, "viscous": 0.0}
     add_friction(spec, tendons={"rope": law})
     try:

@@ -52,12 +52,8 @@ def add_friction(spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys 
         raise InputError("spec", "has friction already, or what is left of it: add all of it in one call to a new spec")
     if int(spec.option.integrator) == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1)):
         raise InputError("spec.option.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
-    if spec.option.noslip_iterations:
-        warnings.warn(
-            MujocoWarning("spec.option.noslip_iterations: they take the bristles away, so that friction creeps"),
-            stacklevel=2,
-        )
-    _name_all(spec)
+    warn_if_noslip(spec.option, "spec.option")
+    name_all(spec)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -70,11 +66,23 @@ def add_friction(spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys 
     found = frictions(model, rubbing, turning, branches)
     if not found:
         raise InputError("spec", "nothing pulls the tendons, and no joints are named: there is no friction to add")
+    warn_if_stiff(model, found, "spec.option.timestep")
+    _write(spec, model, found)
+
+
+def warn_if_noslip(option: Any, entry: str) -> None:
+    """Warn of iterations that take the bristles away."""
+    if option.noslip_iterations:
+        told = "they take the bristles away, so that friction creeps"
+        warnings.warn(MujocoWarning(f"{entry}.noslip_iterations: {told}"), stacklevel=3)
+
+
+def warn_if_stiff(model: mujoco.MjModel, found: list[PluginFriction], entry: str) -> None:
+    """Warn where dampers or servos are stiff for the step."""
     stiff = sorted({each.row for each in found if _damping(model, each) > _STIFF})
     if stiff:
         told = "a step is long for the dampers or servos there, and friction stops too little: take shorter steps"
-        warnings.warn(MujocoWarning(f"spec.option.timestep: {', '.join(stiff)}: {told}"), stacklevel=2)
-    _write(spec, model, found)
+        warnings.warn(MujocoWarning(f"{entry}: {', '.join(stiff)}: {told}"), stacklevel=3)
 
 
 def _damping(model: mujoco.MjModel, friction: PluginFriction) -> float:
@@ -101,7 +109,7 @@ def _damping_rate(model: mujoco.MjModel, of_joint: bool, name: str) -> float:
     return float(gain * weight)
 
 
-def _name_all(spec: mujoco.MjSpec) -> None:
+def name_all(spec: mujoco.MjSpec) -> None:
     """Name unnamed elements for the table and branches."""
     named = {"tendon": spec.tendons, "joint": spec.joints, "site": spec.sites, "geom": spec.geoms}
     for what, elements in named.items():

@@ -56,8 +56,13 @@ def main():
 
     builtins.__import__ = imported
     package = importlib.import_module("finger_pin")
-    needs = {"finger_pin.learning.stable_baselines": "stable_baselines3"}
-    for module in pkgutil.walk_packages(package.__path__, "finger_pin."):
+    needs = {"finger_pin.learning.stable_baselines": "stable_baselines3", "finger_pin.mujoco.warp": "mujoco_warp"}
+
+    def stopped(name):
+        if name not in needs:
+            raise
+
+    for module in pkgutil.walk_packages(package.__path__, "finger_pin.", onerror=stopped):
         missing = module.name in needs and importlib.util.find_spec(needs[module.name]) is None
         if not missing and not module.name.endswith("__main__"):
             importlib.import_module(module.name)

@@ -1,0 +1,96 @@
+"""Law (9) over a time step of MuJoCo: one text, which numba compiles for the plugin and Warp for its kernels.
+
+Plain functions of single numbers, with the laws of `finger_pin.laws` written so that single precision keeps their
+digits: small changes are computed as such, never as differences of large numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+#: The floor that keeps (9a) finite where nothing is pressed, N: higher ones are friction that users have asked for.
+NUMERICAL_FLOOR = 1e-4
+
+
+def coefficient(speed: float, kinetic: float, static: float, stribeck: float, exponent: float) -> float:
+    """Return M(v) of (9b)."""
+    ratio = abs(speed) / stribeck
+    return kinetic + (static - kinetic) * math.exp(-ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio))
+
+
+def relaxed(x: float) -> float:
+    """Return 1 - exp(-x) of x >= 0, to the last digit also where that is small."""
+    if x > 0.64:
+        return 1.0 - math.exp(-x)
+    # The series at an eighth of it, and three times 1 - exp(-2 y) = g (2 - g) with g = 1 - exp(-y).
+    y = 0.125 * x
+    higher = 1.0 / 720.0 - y * (1.0 / 5040.0 - y * (1.0 / 40320.0 - y / 362880.0))
+    eighth = y * (1.0 - y * (1.0 / 2.0 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0 - y * higher)))))
+    quarter = eighth * (2.0 - eighth)
+    half = quarter * (2.0 - quarter)
+    return half * (2.0 - half)
+
+
+def capstan(surface: float, turn: float) -> float:
+    """Return mu^d of (16)."""
+    lost = relaxed(surface * turn)
+    return lost / (2.0 - lost)
+
+
+def slide(force: float, moved: float, level: float) -> tuple[float, float]:
+    """Return the change of F^s by (9a) over s0 v dt at this speed and level, exactly, and the share that is left."""
+    gone = relaxed(abs(moved) / level)
+    return (math.copysign(level, moved) - force) * gone, 1.0 - gone
+
+
+def delivered(pull: float, tension: float, force: float, viscous: float, speed: float) -> tuple[float, float]:
+    """Return what friction takes of a tension, and what it leaves: against what pulls.
+
+    Of a pulled tendon the length's speed is negative when it is wound in.
+    """
+    way = 1.0 if pull > 0.0 else -1.0
+    loss = way * (force + viscous * speed)
+    return loss, max(tension - loss, 0.0)
+
+
+def level_of(
+    of_pin: bool,
+    coulomb: float,
+    static: float,
+    stribeck: float,
+    exponent: float,
+    floor: float,
+    drag: float,
+    speed: float,
+    pressing: float,
+    turn: float,
+) -> float:
+    """Return the level of friction, F^n M + drag, by (9b), (16): the ``static`` of a tendon is a ratio."""
+    kinetic = coulomb if of_pin else capstan(coulomb, turn)
+    found = coefficient(speed, kinetic, static if of_pin else static * kinetic, stribeck, exponent)
+    # The drag of a pin lets go at M^c / M^d of it.
+    drag_share = found / kinetic if of_pin and kinetic > 0.0 else 1.0
+    return max(pressing * found + drag * drag_share, floor)
+
+
+def exerted(
+    level: float,
+    stiffness: float,
+    viscous: float,
+    micro_damping: float,
+    speed: float,
+    tension: float,
+    most: float,
+    force: float,
+    dt: float,
+) -> tuple[float, float, float]:
+    """Return a friction's part of its row: F - x, c + b, and the most that it exerts."""
+    if tension == 0.0 and force == 0.0:
+        return 0.0, stiffness * dt + viscous + micro_damping, min(level + viscous * abs(speed), most)
+    moved = stiffness * dt * speed
+    change, left = slide(force, moved, level)
+    # The micro-damping's sigma_1 z', as z goes at this speed; it may help the motion.
+    micro = micro_damping * (change / moved if moved != 0.0 else 1.0)
+    limit = max(level, abs(force + change)) + (viscous + micro) * abs(speed)
+    pull = force - (moved - change) * left + min(micro, 0.0) * speed
+    return pull, stiffness * dt + viscous + max(micro, 0.0), min(limit, most)

@@ -1,0 +1,243 @@
+"""Friction added to a model of MuJoCo Warp: its callbacks, its arrays, and its state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+import warp as wp
+
+from finger_pin.exceptions import InputError
+from finger_pin.exchange.mujoco_friction import FORCE, LEVEL, LOAD, TURN, PluginFriction
+from finger_pin.mujoco.frictions import frictions, pulled
+from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose
+from finger_pin.mujoco.specification import Keys, warn_if_noslip, warn_if_stiff
+from finger_pin.mujoco.warp import kernels, row_kernels
+from finger_pin.mujoco.warp.names import NamedModel, branches_of
+from finger_pin.mujoco.warp.self_test import try_self_test
+from finger_pin.mujoco.warp.structures import LAW, MEMORY, NEVER, allocate
+from finger_pin.mujoco.warp.tables import build_table, check_rows, losses
+
+_DISCRETE = int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1))
+#: Switches that must stay as they are, with what they are for.
+_NEEDED = {
+    mujoco.mjtDisableBit.mjDSBL_CONSTRAINT: "the solver's rows are its force",
+    mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS: "the solver's rows are its force",
+    mujoco.mjtDisableBit.mjDSBL_ACTUATION: "it is computed after actuators",
+    mujoco.mjtDisableBit.mjDSBL_SENSOR: "the solver's forces are read after sensors",
+}
+
+
+class Friction:
+    """Frictions of all worlds, as arrays on the device of shape (worlds, frictions); N and N m.
+
+    Coefficients may be written in place at any time, also after a graph was captured; signals are those of the last
+    step.
+
+    Attributes:
+        names: Of the tendons and joints.
+        coulomb: mu_e of a tendon, M^d of a joint.
+        stiction: M^c / M^d of a tendon, M^c of a joint.
+        stiffness: N/m, N m/rad.
+        viscous: N s/m, N m s/rad.
+        stribeck_velocity: m/s, rad/s.
+        floor: Of a joint its constant friction loss where that is more.
+        stribeck_exponent: 1 or 2.
+        micro_damping: N s/m, N m s/rad.
+        drag: Of a tendon its constant friction loss where it was not given.
+        curvature_offset: rad, of a tendon.
+        level: Friction of steady sliding.
+        friction: Friction, along the tendon's length or the joint's coordinate, against the motion.
+        tension: Load, N: of a tendon its tension, of a joint the reaction (17).
+        turn: phi, rad, of a tendon.
+    """
+
+    def __init__(self, m: Any, d: Any, model: NamedModel, found: list[PluginFriction]) -> None:
+        """Make the arrays, and set the callbacks of ``m``; see `add_friction`."""
+        self.names = tuple(each.name for each in found)
+        self._data, self._device = d, d.qpos.device
+        self._model = m
+        with wp.ScopedDevice(self._device):
+            self._table = build_table(model, found)
+            rows = self._table.sharing_first.shape[0] - 1
+            self._arrays = s = allocate(d.nworld, len(found), rows, d.ten_J.shape[1])
+            law = np.array([each.law for each in found], np.float32).T[:, None]
+            s.law.assign(np.broadcast_to(law, (LAW, d.nworld, len(found))).copy())
+            self._every = wp.full((d.nworld,), True, dtype=bool)
+        self.coulomb, self.stiction, self.stiffness, self.viscous, self.stribeck_velocity = (s.law[k] for k in range(5))
+        self.floor, self.stribeck_exponent, self.micro_damping, self.drag, self.curvature_offset = (
+            s.law[k] for k in range(5, LAW)
+        )
+        self.level, self.friction, self.tension, self.turn = (s.signals[k] for k in (LEVEL, FORCE, LOAD, TURN))
+        self._before, self._sensors = m.callback.act_bias, m.callback.sensor
+        m.callback.act_bias, m.callback.sensor = self._act_bias, self._sensor
+
+    def index(self, name: str) -> int:
+        """Return the index of a tendon or joint in the arrays.
+
+        Raises:
+            InputError: If it has no friction.
+        """
+        if name not in self.names:
+            raise InputError(f"friction.{name}", f"there are {', '.join(self.names)}")
+        return self.names.index(name)
+
+    @property
+    def state(self) -> Any:
+        """A copy of the state, shape (worlds, frictions, 5): bristles' force, N, and loads that the last step leaves.
+
+        With ``qpos``, ``qvel`` and the like it makes a state of the simulation; those are written at any time, before
+        or after it.
+        """
+        self._finish()
+        return wp.clone(self._arrays.memory)
+
+    @state.setter
+    def state(self, value: Any) -> None:
+        shape, given = (
+            self._arrays.memory.shape,
+            value if isinstance(value, wp.array) else np.asarray(value, np.float32),
+        )
+        if tuple(given.shape) != tuple(shape):
+            raise InputError("state", f"must have the shape (worlds, frictions, {MEMORY}), {shape}", given.shape)
+        self._arrays.memory.assign(given)
+        self._arrays.clock.fill_(NEVER)
+
+    def reset(self, mask: Any = None) -> None:
+        """Put the friction of all worlds at rest, or of those with True in a mask, an array of shape (worlds,).
+
+        A world whose time goes back is reset at its next step by itself.
+        """
+        worlds, count = self.level.shape
+        if mask is None:
+            mask = self._every
+        elif not isinstance(mask, wp.array):
+            mask = wp.array(np.asarray(mask, bool), dtype=bool, device=self._device)
+        if mask.shape != (worlds,) or mask.dtype is not wp.bool:
+            raise InputError("mask", f"must be of shape ({worlds},) and of bool", mask.shape)
+        wp.launch(kernels.forget, (worlds, count), inputs=[self._arrays, mask], device=self._device)
+
+    def _finish(self) -> None:
+        """Finish the last step, up to the present time, and start the clock there."""
+        m, d = self._model, self._data
+        arguments = [self._table, self._arrays, m.nv, m.opt.timestep, m.ten_J_rowadr, m.ten_J_rownnz, m.ten_J_colind]
+        wp.launch(kernels.finish, self.level.shape, inputs=[*arguments, d.time, d.qvel], device=self._device)
+        wp.copy(self._arrays.clock, d.time)
+
+    def _act_bias(self, m: Any, d: Any) -> None:
+        """Write this step's rows: the callback that MuJoCo Warp calls once forces of actuators are known."""
+        if self._before:
+            self._before(m, d)
+        self._check(m, d)
+        self._finish()
+        t, s, worlds = self._table, self._arrays, d.nworld
+        actuators = [m.actuator_gear, m.actuator_forcelimited, m.actuator_forcerange]
+        springs = [m.tendon_actfrclimited, m.tendon_actfrcrange, m.tendon_stiffness, m.tendon_damping]
+        addresses = [m.tendon_lengthspring, m.ten_J_rowadr, m.ten_J_rownnz, m.jnt_qposadr]
+        lengths = [d.actuator_force, d.ten_length, d.ten_velocity, d.qpos, d.ten_J]
+        paths = [d.ten_wrapadr, d.ten_wrapnum, d.wrap_obj, d.wrap_xpos]
+        inputs = [t, s, m.nv, m.opt.timestep, *actuators, *springs, *addresses, *lengths, *paths]
+        self._launch(kernels.tendons, t.tendons, inputs)
+        bodies = [m.body_parentid, m.body_jntadr, m.body_jntnum, m.jnt_bodyid, d.qvel, d.xanchor, d.xmat]
+        self._launch(kernels.pins, t.pins, [t, s, m.opt.timestep, *bodies])
+        rows = [d.efc.type, d.efc.id, d.efc.D, d.efc.aref, d.efc.frictionloss]
+        inputs = [t, s, m.nv, m.opt.timestep, d.qvel, d.ten_velocity, d.ne, d.nf, d.njmax, *rows]
+        wp.launch(row_kernels.write_rows, (worlds, m.nv + m.ntendon), inputs=inputs, device=self._device)
+
+    def _launch(self, kernel: Any, which: Any, inputs: list[Any]) -> None:
+        if which.shape[0]:
+            wp.launch(kernel, (self._data.nworld, which.shape[0]), inputs=inputs, device=self._device)
+
+    def _sensor(self, m: Any, d: Any, stage: Any) -> None:
+        """Record the solver's forces: the callback that MuJoCo Warp calls while its rows are still this step's."""
+        if self._sensors:
+            self._sensors(m, d, stage)
+        if int(stage) != int(mujoco.mjtStage.mjSTAGE_ACC):
+            return
+        if m.callback.act_bias != self._act_bias:
+            raise InputError("m.callback.act_bias", "was set after friction was added, which is in it: set it before")
+        rows = [d.nefc, d.njmax, d.efc.type, d.efc.id, d.efc.force, m.eq_type, m.eq_obj1id, m.eq_obj2id]
+        contacts = [m.geom_bodyid, m.body_isdofancestor, d.contact.dim, d.contact.geom, d.contact.frame]
+        inputs = [self._table, self._arrays, *rows, *contacts, d.contact.friction, d.contact.efc_address]
+        wp.launch(row_kernels.record, self.level.shape, inputs=inputs, device=self._device)
+
+    def _check(self, m: Any, d: Any) -> None:
+        """Refuse other data, and options that leave no room for friction."""
+        check_options(m.opt, "m.opt")
+        if d.time.ptr != self._data.time.ptr:
+            raise InputError("d", "must be the data that friction was added with: add it to another model for others")
+        if m.callback.sensor != self._sensor:
+            raise InputError("m.callback.sensor", "was set after friction was added, which is in it: set it before")
+
+
+def check_options(option: Any, entry: str) -> None:
+    """Refuse an integrator or a switch that leaves no room for friction.
+
+    Raises:
+        InputError: Naming it.
+    """
+    if int(option.integrator) == _DISCRETE:
+        raise InputError(f"{entry}.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
+    for bit, told in _NEEDED.items():
+        if int(option.disableflags) & int(bit):
+            name = bit.name.removeprefix("mjDSBL_").lower()
+            raise InputError(f"{entry}.disableflags", f"friction needs what it disables: {told}", name)
+
+
+def add_friction(
+    m: Any, d: Any, mjm: mujoco.MjModel, tendons: Keys | None = None, joints: Keys | None = None
+) -> Friction:
+    """Add friction that grows with tension, and holds, to the worlds of MuJoCo Warp.
+
+    Names, keys and their meaning are those of `finger_pin.mujoco.add_friction`. Then call `mujoco_warp.step`, captured
+    or not. Callbacks ``act_bias`` and ``sensor`` of ``m`` that were set before are called first.
+
+    Args:
+        m: Of `mujoco_warp.put_model`, which is changed: it has friction losses where there was none.
+        d: Of `mujoco_warp.put_data` or ``make_data``, with room for the solver's rows in ``njmax``.
+        mjm: The model that they were made of, without `finger_pin.mujoco.add_friction`.
+        tendons: By name, as there.
+        joints: By name, as there.
+
+    Returns:
+        Coefficients, signals and state of all worlds.
+
+    Raises:
+        InputError: If a name matches nothing, a key or number is not allowed, a tendon with a pulley has no branches
+            (`add_branches`), the model is integrated by ``discrete`` or has no actuators, ``njmax`` is too small, or
+            this version of MuJoCo Warp gives wrong answers.
+    """
+    try_self_test(str(d.qpos.device), attach_friction)
+    return attach_friction(m, d, mjm, tendons, joints)
+
+
+def attach_friction(m: Any, d: Any, mjm: mujoco.MjModel, tendons: Keys | None, joints: Keys | None) -> Friction:
+    """Add friction without the self-test."""
+    if not isinstance(mjm, mujoco.MjModel):
+        raise InputError("mjm", "must be a mujoco.MjModel", type(mjm).__name__)
+    if (m.nv, m.ntendon, m.njnt, m.nactuator) != (mjm.nv, mjm.ntendon, mjm.njnt, mjm.nactuator):
+        raise InputError("mjm", "must be the model that m was made of")
+    callback: Callable[..., None] | None = m.callback.act_bias
+    if isinstance(getattr(callback, "__self__", None), Friction):
+        raise InputError("m", "has friction already: add all of it in one call to a new model")
+    check_options(m.opt, "m.opt")
+    if not m.nactuator:
+        raise InputError(
+            "mjm", "has no actuators: MuJoCo Warp computes friction after them, and does not where none is"
+        )
+    warn_if_noslip(m.opt, "m.opt")
+    model = NamedModel(mjm)
+    rubbing = choose(tendons, model.tendons, "tendons", TENDON_KEYS)
+    turning = choose(joints, model.joints, "joints", JOINT)
+    found = frictions(model, rubbing, turning, branches_of(model, pulled(model, rubbing)))
+    if not found:
+        raise InputError("mjm", "nothing pulls the tendons, and no joints are named: there is no friction to add")
+    warn_if_stiff(model, found, "mjm.opt.timestep")
+    of_dofs, of_tendons = losses(model, found)
+    check_rows(model, d, of_dofs, of_tendons)
+    for array, least in ((m.dof_frictionloss, of_dofs), (m.tendon_frictionloss, of_tendons)):
+        if array.size:
+            array.assign(np.maximum(array.numpy(), least).astype(np.float32))
+    return Friction(m, d, model, found)

@@ -1,0 +1,115 @@
+"""Functions of the kernels: the law's text compiled by Warp, and what loads and bends frictions."""
+
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
+
+import warp as wp
+
+from finger_pin.mujoco import friction_step
+
+wp.set_module_options({"enable_backward": False})
+
+
+def _compiled(function: Callable[..., Any], world: dict[str, Any]) -> Any:
+    """Return a plain function as one of Warp's, in which those of the text that it calls are Warp's too."""
+    assert isinstance(function, FunctionType)
+    twin = FunctionType(function.__code__, {**function.__globals__, **world}, function.__name__)
+    twin.__annotations__, twin.__module__ = function.__annotations__, __name__
+    return wp.func(twin)
+
+
+coefficient, relaxed, delivered = (
+    _compiled(each, {}) for each in (friction_step.coefficient, friction_step.relaxed, friction_step.delivered)
+)
+capstan, slide = (_compiled(each, {"relaxed": relaxed}) for each in (friction_step.capstan, friction_step.slide))
+level_of = _compiled(friction_step.level_of, {"coefficient": coefficient, "capstan": capstan})
+exerted = _compiled(friction_step.exerted, {"slide": slide})
+
+
+@wp.func
+def spring(
+    w: int,
+    tendon: int,
+    stiffness: wp.array2d[float],
+    damping: wp.array2d[float],
+    rest: wp.array2d[wp.vec2],
+    length: wp.array2d[float],
+    velocity: wp.array2d[float],
+) -> float:
+    """Return the force of a tendon's own spring and damper along it, N, negative in tension."""
+    reach = rest[w % rest.shape[0], tendon]
+    there = length[w, tendon]
+    stretch = wp.max(reach[0] - there, 0.0) + wp.min(reach[1] - there, 0.0)
+    return (
+        stiffness[w % stiffness.shape[0], tendon] * stretch
+        - damping[w % damping.shape[0], tendon] * velocity[w, tendon]
+    )
+
+
+@wp.func
+def path_point(w: int, k: int, points: wp.array2d[wp.spatial_vector]) -> wp.vec3:
+    """Return a point of the paths of all tendons: two stand in a vector."""
+    pair, first = points[w, k // 2], 3 * (k % 2)
+    return wp.vec3(pair[first], pair[first + 1], pair[first + 2])
+
+
+@wp.func
+def turn_of_path(
+    w: int, first: int, count: int, points: wp.array2d[wp.spatial_vector], wrapped: wp.array2d[wp.vec2i]
+) -> float:
+    """Return the angle by which a path turns up to its first pulley, rad, as `loads.turn_of_path` does."""
+    turn = float(0.0)
+    along = wp.vec3(0.0, 0.0, 0.0)
+    going = bool(True)
+    for k in range(first + 1, first + count):
+        if wrapped[w, k // 2][k % 2] == -2 or wrapped[w, (k - 1) // 2][(k - 1) % 2] == -2:
+            going = False
+        way = path_point(w, k, points) - path_point(w, k - 1, points)
+        # Nearer points are one point, to the digits that positions have.
+        if going and wp.length_sq(way) >= 1e-12:
+            turn += wp.atan2(wp.length(wp.cross(way, along)), wp.dot(way, along))
+            along = way
+    return turn
+
+
+@wp.func
+def proximal(
+    w: int,
+    joint: int,
+    parent: wp.array[int],
+    joints: wp.array[int],
+    count: wp.array[int],
+    body_of: wp.array[int],
+    anchor: wp.array2d[wp.vec3],
+    frame: wp.array2d[wp.mat33],
+) -> wp.vec3:
+    """Return e_j: from the joint before to this one, or the x axis of its carrier."""
+    carrier = parent[body_of[joint]]
+    found = wp.vec3(frame[w, carrier][0, 0], frame[w, carrier][1, 0], frame[w, carrier][2, 0])
+    body = int(carrier)
+    while body > 0:
+        if count[body] > 0:
+            way = anchor[w, joint] - anchor[w, joints[body] + count[body] - 1]
+            if wp.length(way) > 1e-6:
+                found = wp.normalize(way)
+                body = 0
+        body = parent[body]
+    return found
+
+
+@wp.func
+def contact_force(
+    w: int, r: int, elliptic: bool, dim: int, frame: wp.mat33, first: float, second: float, force: wp.array2d[float]
+) -> wp.vec3:
+    """Return the force of a contact on its second geom, world frame, N, from its rows from r on."""
+    normal = float(force[w, r])
+    across, along = float(0.0), float(0.0)
+    if dim > 1 and elliptic:
+        across, along = float(force[w, r + 1]), float(force[w, r + 2])
+    elif dim > 1:
+        for k in range(1, 2 * (dim - 1)):
+            normal += force[w, r + k]
+        across = first * (force[w, r] - force[w, r + 1])
+        along = second * (force[w, r + 2] - force[w, r + 3])
+    return normal * frame[0] + across * frame[1] + along * frame[2]
