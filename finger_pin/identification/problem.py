@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.threads import in_threads
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
@@ -181,7 +182,9 @@ class Problem:
             places = [at(values) for at in self._places()]
         except InputError:
             return self._smooth([np.full(len(s.measured), np.inf) for s in self.signals])
-        computed = [each for model, place in zip(self.models, places, strict=True) for each in model.compute(*place)]
+        pairs = list(zip(self.models, places, strict=True))
+        by_model = in_threads(lambda pair: pair[0].compute(*pair[1]), pairs)
+        computed = [each for found in by_model for each in found]
         residuals = self._smooth([s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)])
         if not all(np.isfinite(e).all() for e in residuals):
             return [np.full(len(e), np.inf) for e in residuals]
