@@ -20,6 +20,9 @@ def identify(
     starts: Annotated[int, typer.Option(min=1, metavar="N", help="From how many points to search.")] = 3,
     seed: Annotated[int, typer.Option(min=0, metavar="S", help="Of those points.")] = 0,
     robust: Annotated[bool, typer.Option("--robust", help="Let outliers count less.")] = False,
+    profiles: Annotated[
+        bool, typer.Option(help="Whether intervals follow the likelihood, or only its curvature, which is faster.")
+    ] = True,
     output: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Where results go; default results/identify-<bench>.")
     ] = None,
@@ -49,6 +52,7 @@ def identify(
                 starts=starts,
                 seed=seed,
                 loss="soft_l1" if robust else "linear",
+                profiles=profiles,
                 restart=restart,
                 progress=progress,
                 stop=token,

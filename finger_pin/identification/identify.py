@@ -43,6 +43,7 @@ def identify(
     starts: int = 3,
     seed: int = 0,
     loss: str = "linear",
+    profiles: bool = True,
     restart: bool = False,
     progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
@@ -69,6 +70,8 @@ def identify(
         seed: Of those points.
         loss: ``linear``, or where outliers are to count less ``soft_l1``, ``huber``, ``cauchy`` or ``arctan``, as of
             `scipy.optimize.least_squares`.
+        profiles: Whether intervals follow the likelihood; without, they are those of its curvature at the estimate,
+            which of long motions takes a part of the time.
         restart: Whether to forget what the folder holds of this.
         progress: Called with what is being done, how much of it is finished, and how much there is.
         stop: Asked now and then; when it returns true the best so far is returned, attribute ``unfinished``.
@@ -102,7 +105,8 @@ def identify(
     asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
     with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
         work = FitPipeline(problem, ledger, loss, progress)
-        result = _work(problem, settings, starting_points(problem, starts, seed), starts, work)
+        result = _work(problem, settings, starting_points(problem, starts, seed), starts, work, profiles)
+        result.attrs["profiles"] = int(profiles)
         result.attrs["custom_finger"] = int(own is not None)
         result.update(predictions(result, scenario, held_out, taken, own))
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
@@ -112,12 +116,17 @@ def identify(
 
 
 def _work(
-    problem: Problem, settings: IdentifySettings, places: Sequence[Array], starts: int, work: FitPipeline
+    problem: Problem,
+    settings: IdentifySettings,
+    places: Sequence[Array],
+    starts: int,
+    work: FitPipeline,
+    profiles: bool,
 ) -> xr.Dataset:
     unfinished = ""
     try:
         work.search(work.screen_starts(places, starts))
-        work.profile_all(work.best)
+        (work.profile_all if profiles else work.linearise)(work.best)
         work.compare(settings)
     except Stopped:
         unfinished = "interrupted: the best so far, and the intervals that are finished"

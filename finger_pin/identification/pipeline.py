@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeVar
@@ -16,7 +17,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.identification.checkpoint import Checkpoint
 from finger_pin.identification.comparison import LawComparison, compare_laws
 from finger_pin.identification.estimate import Fit, best_of, fit
-from finger_pin.identification.intervals import ProfileBound, covariance, profile
+from finger_pin.identification.intervals import LEVEL, ProfileBound, covariance, profile
 from finger_pin.identification.misfit import sandwich
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.identification.scenario_parameters import entry_of
@@ -150,8 +151,8 @@ class FitPipeline:
         """Whether a recording is of a motion."""
         return any(signal.ordered for signal in self.problem.signals)
 
-    def profile_all(self, place: Fit, turn: int = 0) -> None:
-        """Compute all profiles; restart from a lower minimum if one is found."""
+    def _settle(self, place: Fit) -> tuple[Problem, Fit, Array]:
+        """Return the problem computed finely, the minimum near a place, and its covariance by the likelihood alone."""
         fine, number = self.problem.fine(), self.fits.index(self.best)
         best = self.fits[number] = self.middle = fit(fine, place.z, loss=self.loss, slopes=place.slopes)
         naive = covariance(fine, best)
@@ -159,6 +160,21 @@ class FitPipeline:
         naive_variance = np.diag(naive)
         self.inflation = np.where(naive_variance > 0.0, np.diag(self.spread) / np.maximum(naive_variance, 1e-300), 1.0)
         self.problem.join(fine)
+        return fine, best, naive
+
+    def linearise(self, place: Fit) -> None:
+        """Compute intervals from slopes alone; a side that they take beyond the bounds is open."""
+        fine, best, _ = self._settle(place)
+        low, high = fine.box
+        assert self.spread is not None
+        for k, way in itertools.product(range(self.problem.asked), (-1, 1)):
+            end = best.z[k] + way * np.sqrt(LEVEL * max(self.spread[k, k], 0.0))
+            path = np.array([[best.z[k], 0.0]])
+            self.sides[k, way] = ProfileBound(float(end) if low[k] < end < high[k] else math.inf * way, path)
+
+    def profile_all(self, place: Fit, turn: int = 0) -> None:
+        """Compute all profiles; restart from a lower minimum if one is found."""
+        fine, best, naive = self._settle(place)
         ends = [(k, way) for k in range(self.problem.asked) for way in (-1, 1)]
 
         def one(item: tuple[int, Problem]) -> Fit | None:

@@ -121,6 +121,8 @@ def _words(result: xr.Dataset) -> list[str]:
         words.append(f"{'The' if _borne_out(result) else 'Near this place the'} recordings determine every parameter.")
     if _borne_out(result):
         words.append(_agreement(result))
+    if not result.attrs.get("profiles", 1):
+        words.append("The intervals are those of slopes at the estimate: where they are wide, profiles are surer.")
     words += _misses(result)
     if "law" in result.dims:
         order = np.argsort(result["law_bic"].values)

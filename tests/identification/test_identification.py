@@ -74,6 +74,19 @@ def test_intervals_are_those_of_linear_regression_where_the_law_is_a_line():
     np.testing.assert_allclose([result.lower[0], result.upper[0]], ends, rtol=2e-3)
 
 
+def test_intervals_without_profiles_are_those_of_the_variance_of_a_regression():
+    """Of a line's slope s = exp(-mu phi), with mu sought as its logarithm: mu exp(-+1.96 sd(s) / (s phi mu))."""
+    data = readings(np.random.default_rng(3))
+    result = found(data, profiles=False)
+    design = np.stack([data["in"], np.ones(30)], axis=1)
+    (slope, _), rest, *_ = np.linalg.lstsq(design, data["out"], rcond=None)
+    deviation = np.sqrt(np.linalg.inv(design.T @ design)[0, 0] * rest[0] / 30)
+    estimate = -np.log(slope) / 2.5
+    ends = estimate * np.exp(np.array([-1.96, 1.96]) * deviation / (slope * 2.5 * estimate))
+    np.testing.assert_allclose([result.lower[0], result.upper[0]], ends, rtol=2e-3)
+    assert "those of slopes at the estimate" in summarize_identification(result)
+
+
 def test_95_percent_intervals_hold_the_truth_that_often():
     rng, held = np.random.default_rng(11), []
     for _ in range(40):
