@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from finger_pin.description.caching import memoised
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
@@ -154,7 +155,7 @@ class ClosedLoop:
             tension = planned.tension[: self.finger.routing.actuated]
         x = self.finger.rest_state(position, velocity, tension)
         if self.palm is not None:
-            return self.palm.put(self.finger, x)
+            return self.palm.place_world(self.finger, x)
         return x if self.guides is None else self.guides.place(self.finger, x)
 
     def compiled(self) -> ClosedLoop:
@@ -198,19 +199,12 @@ class ClosedLoop:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
         return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST)
 
-    def evaluate(self, time: Array | float, x: Array, *, accelerated: bool = True) -> LoopSignals:
-        """Return all signals at one time and state, or at times (m,) and states (m, size); maybe no accelerations."""
-        return self._signals(time, x, self.dynamics.evaluate if accelerated else self.dynamics.exerted)
-
-    def pulls(self, time: Array, x: Array) -> LoopSignals:
-        """Return the signals at times (m,) and states (m, size), of the finger's maybe no more than forces."""
-        return self._signals(time, x, self.dynamics.forces)
-
-    def _signals(self, time: Array | float, x: Array, evaluate: Callable[..., FingerSignals]) -> LoopSignals:
+    def evaluate(self, time: Array | float, x: Array, outputs: Outputs = "all") -> LoopSignals:
+        """Return the signals at one time and state, or at times (m,) and states (m, size); see `Finger.evaluate`."""
         reference, control, acting = self._acting(time, x)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        return LoopSignals(reference, control, evaluate(x, *acting))
+        return LoopSignals(reference, control, self.dynamics.evaluate(x, *acting, outputs))
 
     def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
         """Return reference, plan, inputs of the mechanism, F, and the motion of palm or objects.

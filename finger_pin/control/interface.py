@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.core.inputs import InputTable
 from finger_pin.description.routing import Routing
+from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
@@ -52,19 +53,14 @@ class Dynamics(Protocol):
     """An evaluator of a finger: `Finger`, or the compiled core."""
 
     def evaluate(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+        self,
+        x: Array,
+        command: Array,
+        fingertip_force: Array | None = None,
+        base: Array | None = None,
+        outputs: Outputs = "all",
     ) -> FingerSignals:
-        """Return all signals at packed states under given tensions, on a base that moves or rests."""
-
-    def exerted(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the same signals; accelerations may be left out."""
-
-    def forces(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the same signals; all but forces may be left out."""
+        """Return the signals at packed states under given tensions, on a base that moves or rests."""
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

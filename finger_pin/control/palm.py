@@ -57,7 +57,7 @@ class PalmPath:
         ]
         return at[..., :3], np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
-    def put(self, finger: Finger, x: Array) -> Array:
+    def place_world(self, finger: Finger, x: Array) -> Array:
         """Return a packed state with the world's placement at the start, seen from the palm."""
         if self.carries:
             state = finger.layout.unpack(x)

@@ -44,15 +44,15 @@ class SignalBuffer(NamedTuple):
     column: int
     torques: Array
     externals: Array
-    booked: Array
+    energy_terms: Array
     touches: Array
 
     def part(self, at: slice) -> SignalBuffer:
         """Return the buffer of some of the states, the same memory."""
         first = self.first + at.indices(len(self.packed))[0]
-        own = (self.packed, self.rates, self.torques, self.externals, self.booked, self.touches)
-        packed, rates, torques, externals, booked, touches = (values[at] for values in own)
-        return SignalBuffer(packed, rates, self.rows, first, self.column, torques, externals, booked, touches)
+        own = (self.packed, self.rates, self.torques, self.externals, self.energy_terms, self.touches)
+        packed, rates, torques, externals, energy_terms, touches = (values[at] for values in own)
+        return SignalBuffer(packed, rates, self.rows, first, self.column, torques, externals, energy_terms, touches)
 
     def states(
         self, at: slice, model: int, states: Array, commands: Array, forces: Array, bases: Array, attitudes: Array
@@ -70,7 +70,7 @@ class SignalBuffer(NamedTuple):
             column=own.column,
             torques=own.torques,
             externals=own.externals,
-            booked=own.booked,
+            energy_terms=own.energy_terms,
             bases=bases[at],
             attitudes=attitudes[at],
             touches=own.touches,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
 from finger_pin.laws.contact import CONTACT
-from finger_pin.mechanism.evaluation import ContactPoints, Evaluation
+from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.mechanism import Mechanism
@@ -49,41 +49,34 @@ class CompiledMechanism:
         return CompiledMechanism, (self.mechanism,)
 
     def evaluate(
-        self,
-        x: Array,
-        command: Array,
-        force: Array | None = None,
-        base: Array | None = None,
-        *,
-        accelerated: bool = True,
-        forces_only: bool = False,
+        self, x: Array, command: Array, force: Array | None = None, base: Array | None = None, outputs: Outputs = "all"
     ) -> Evaluation:
-        """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`.
+        """Return the signals at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`.
 
         Without accelerations, which take most of the time, they and the rate are NaN. Of many states the rows' forces
-        alone take less again.
+        alone take less again; all but them and their sums is then missing.
         """
-        buffer = self.allocate(len(np.atleast_2d(x)), accelerated=accelerated, forces_only=forces_only)
+        buffer = self.allocate(len(np.atleast_2d(x)), outputs)
         self.fill(buffer, x, command, force, base)
         return self.to_evaluation(buffer, slice(None) if np.ndim(x) > 1 else 0)
 
-    def allocate(
-        self, count: int, *, accelerated: bool = True, booked_only: bool = False, forces_only: bool = False
-    ) -> SignalBuffer:
-        """Return buffers for the signals of m states: all, or powers and J^T F, or the rows' forces."""
+    def allocate(self, count: int, outputs: Outputs | Literal["powers"] = "all") -> SignalBuffer:
+        """Return buffers for the signals of m states; "powers" come with J^T F."""
         mechanism, (columns, rows) = self.mechanism, self.models.model().model.work.rows.shape
-        width, kept, booked = mechanism.coordinates, 0 if booked_only else count, 0 if forces_only else count
+        forces_only, width = outputs == "row_forces", mechanism.coordinates
+        # Of states whose rows are kept, and of those whose sums are.
+        kept, summed = 0 if outputs == "powers" else count, 0 if forces_only else count
         return SignalBuffer(
             packed=np.empty((count, mechanism.size)),
-            rates=np.empty((min(kept, booked) if accelerated else 0, self.charts.size)),
+            rates=np.empty((count if outputs == "all" else 0, self.charts.size)),
             rows=np.empty((1 if forces_only else columns, kept, rows)),
             first=0,
             column=FORCE if forces_only else 0,
-            torques=np.empty((booked, width)),
-            externals=np.empty((booked, width)),
-            booked=np.empty((booked, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
+            torques=np.empty((summed, width)),
+            externals=np.empty((summed, width)),
+            energy_terms=np.empty((summed, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
             # Of what touches, forces are added up.
-            touches=np.zeros((min(kept, booked), self.tables.contact_rows // CONTACT.arms, 9)),
+            touches=np.zeros((min(kept, summed), self.tables.contact_rows // CONTACT.arms, 9)),
         )
 
     def to_evaluation(self, buffer: SignalBuffer, at: slice | int = slice(None)) -> Evaluation:
@@ -121,8 +114,8 @@ class CompiledMechanism:
             buffer.externals[at],
             acceleration[at],
             rate[at],
-            base_power=buffer.booked[at][..., -1:] if mechanism.moved else None,
-            booked=buffer.booked[at],
+            base_power=buffer.energy_terms[at][..., -1:] if mechanism.moved else None,
+            energy_terms=buffer.energy_terms[at],
             touching=ContactPoints(*np.split(buffer.touches[at], 3, axis=-1)) if buffer.touches.size else None,
         )
 
@@ -130,9 +123,9 @@ class CompiledMechanism:
         self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return the powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, (m, N)."""
-        buffer = self.allocate(len(x), booked_only=True)
+        buffer = self.allocate(len(x), "powers")
         self.fill(buffer, x, command, force, base)
-        return buffer.booked[:, len(self.mechanism.energies.stored) :], buffer.externals
+        return buffer.energy_terms[:, len(self.mechanism.energies.stored) :], buffer.externals
 
     def fill(
         self, buffer: SignalBuffer, x: Array, command: Array, force: Array | None = None, base: Array | None = None
@@ -200,25 +193,16 @@ class CompiledFinger:
         self.mechanism = CompiledMechanism(finger.mechanism)
 
     def evaluate(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+        self,
+        x: Array,
+        command: Array,
+        fingertip_force: Array | None = None,
+        base: Array | None = None,
+        outputs: Outputs = "all",
     ) -> FingerSignals:
-        """Return all signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
-        found = self.mechanism.evaluate(x, command, fingertip_force, base)
+        """Return the signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
+        found = self.mechanism.evaluate(x, command, fingertip_force, base, outputs)
         return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
-
-    def exerted(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the same signals with accelerations NaN."""
-        found = self.mechanism.evaluate(x, command, fingertip_force, base, accelerated=False)
-        return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
-
-    def forces(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the forces of rows at many states, and their sums; other signals are missing."""
-        found = self.mechanism.evaluate(x, command, fingertip_force, base, accelerated=False, forces_only=True)
-        return self.finger.signals(x, command, fingertip_force, found)
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

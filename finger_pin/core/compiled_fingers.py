@@ -12,6 +12,7 @@ import numpy as np
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.evaluation.signals import STATES, evaluate_many
 from finger_pin.core.jit import Block, pack
+from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.mechanism import GUIDES
 from finger_pin.mechanism.rigid_body import Motion
@@ -38,7 +39,7 @@ class CompiledFingers:
         self._mover = fingers[0]
         mechanism, count = self._first.mechanism, len(fingers)
         tables = mechanism.tables
-        self._buffer = mechanism.allocate(count, accelerated=accelerated)
+        self._buffer = mechanism.allocate(count, "all" if accelerated else "no_acceleration")
         self._states = np.zeros((count, mechanism.charts.size))
         self._attitudes = np.zeros((count, len(mechanism.charts.quaternions), 4))
         self._commands = np.zeros((count, mechanism.mechanism.channels))
@@ -67,7 +68,9 @@ class CompiledFingers:
 
     def _differences(self, finger: CompiledFinger) -> tuple[bool, bool]:
         pair, joints = (finger, self._first), len(finger.finger.routing.joints)
-        rows = [[table for table in each.finger.mechanism.rows if table.group in each.finger.pulling] for each in pair]
+        rows = [
+            [table for table in each.finger.mechanism.rows if table.group in each.finger.tendon_rows] for each in pair
+        ]
         pairs = zip(*rows, strict=True)
         alike = all(own.arm is other.arm or np.array_equal(own.arm, other.arm) for own, other in pairs)
         at_home = finger is self._mover
@@ -85,9 +88,14 @@ class CompiledFingers:
         return pack(self._buffer.states(slice(index, index + 1), model.address, *given), STATES)
 
     def evaluate(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+        self,
+        x: Array,
+        command: Array,
+        fingertip_force: Array | None = None,
+        base: Array | None = None,
+        outputs: Outputs = "all",
     ) -> FingerSignals:
-        """Return all signals of (18) at packed states, shape (m, size); see `Finger.evaluate`."""
+        """Return the signals of (18) at packed states, shape (m, size); its buffers decide which outputs there are."""
         force = np.zeros(3) if fingertip_force is None else fingertip_force
         mechanism, loaded = self._first.mechanism, bool(np.any(force))
         self._buffer.packed[:], self._commands[:] = x, command
@@ -108,13 +116,11 @@ class CompiledFingers:
         if not self._differs[:, 0].any():
             return signals
 
-        def pulling() -> Array:
+        def tendon_torque() -> Array:
             own = [each.mechanism.to_evaluation(self._buffer, index).rows for index, each in enumerate(self._fingers)]
             return np.array([each.finger.tendon_torque(*at) for each, *at in zip(self._fingers, x, own, strict=True)])
 
-        return replace(signals, pulling=pulling)
-
-    exerted = forces = evaluate
+        return replace(signals, compute_tendon_torque=tendon_torque)
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -122,7 +128,7 @@ class CompiledFingers:
         """Return powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, shape (m, N)."""
         self.evaluate(x, command, fingertip_force, base)
         stored = len(self._first.finger.mechanism.energies.stored)
-        return self._buffer.booked[:, stored:], self._buffer.externals
+        return self._buffer.energy_terms[:, stored:], self._buffer.externals
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertips and energies of the rigid bodies at positions and velocities, shape (m, n)."""

@@ -127,7 +127,7 @@ class Tables(NamedTuple):
 
 
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
-_FORMS: WeakKeyDictionary[Topology, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
+_BY_TOPOLOGY: WeakKeyDictionary[Topology, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
 _WEIGHED: WeakKeyDictionary[RigidBody, Array] = WeakKeyDictionary()
 
 
@@ -150,10 +150,10 @@ def _read(mechanism: Mechanism) -> Tables:
         InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
     """
     body, rows = mechanism.body, mechanism.rows
-    if body.form not in _FORMS:
+    if body.topology not in _BY_TOPOLOGY:
         chains = read_chains(body.model)
-        _FORMS[body.form] = chains, tree_arrays(body, chains)
-    chains, placed = _FORMS[body.form]
+        _BY_TOPOLOGY[body.topology] = chains, tree_arrays(body, chains)
+    chains, placed = _BY_TOPOLOGY[body.topology]
     wired = _of_rows(mechanism, chains)
     if body not in _WEIGHED:
         _WEIGHED[body] = weighed(chains, body.model)
@@ -179,18 +179,20 @@ def _parameters(rows: Sequence[Rows]) -> Array:
     return found
 
 
-@memoised(lambda legs, form, chains: (legs, form))
-def _of_paths(legs: tuple[tuple[Any, ...], ...], form: Topology, chains: Chains) -> Paths:
+@memoised(lambda legs, topology, chains: (legs, topology))
+def _of_paths(legs: tuple[tuple[Any, ...], ...], topology: Topology, chains: Chains) -> Paths:
     return read_paths([path for each in legs for path in each], chains)
 
 
 # Inertias and parameters of laws change from run to run; how rows are wired seldom does.
-@memoised(lambda mechanism, chains: (mechanism.body.form, *(table.form.content for table in mechanism.rows)))
+@memoised(
+    lambda mechanism, chains: (mechanism.body.topology, *(table.structure.structure_key for table in mechanism.rows))
+)
 def _of_rows(mechanism: Mechanism, chains: Chains) -> dict[str, Any]:
     """Return laws, states, wiring, arms and paths of the rows."""
     rows, count = mechanism.rows, sum(table.count for table in mechanism.rows)
     legs = tuple(table.paths for table in rows)
-    paths = _of_paths(legs, mechanism.body.form, chains)
+    paths = _of_paths(legs, mechanism.body.topology, chains)
     return {
         "laws": np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
         "energies": _energies(mechanism),

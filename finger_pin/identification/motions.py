@@ -176,7 +176,7 @@ class RecordedMotion:
     def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
         moved = self._with_own(scenario, own)
         finger = None if self._finger is None else fitted(self._finger, self.scenario, moved)
-        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger), judged=False)
+        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger), estimate_error=False)
 
     def _made(
         self, scenario: Scenario, own: Mapping[str, float], factor: float

@@ -96,7 +96,7 @@ class Law:
         force, rate, *signals = self.value(row, p)
         return force, rate, tuple(signals)
 
-    def book(self, row: Row, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
+    def energy_terms(self, row: Row, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
         """Return stored energy, J, and powers, W, from the results of `act`."""
         return self.account(row, p, force, rate, signals)
 
@@ -166,7 +166,7 @@ class ContactLaw:
         found = self.value(touch, p)
         return _side_by_side(found[:3]), _side_by_side(found[3:5]), tuple(found[5:])
 
-    def book(self, touch: Touch, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
+    def energy_terms(self, touch: Touch, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
         """Return stored energy, J, and powers, W, from the results of `act`."""
         forces, rates = ([all_[..., each::count] for each in range(count)] for all_, count in ((force, 3), (rate, 2)))
         return self.account(touch, p, forces, rates, signals)

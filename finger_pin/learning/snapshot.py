@@ -14,6 +14,7 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.compiled_fingers import CompiledFingers
 from finger_pin.core.stepping.trajectory import Statistics, Trajectory
 from finger_pin.learning.action import Action
+from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
@@ -33,7 +34,7 @@ def snapshot(loop: ClosedLoop, time: float, x: Array) -> SampledTrajectory:
 
 
 # What a step changes in place, and views of it.
-_STAYING = {"loop", "times", "packed", "state", "_accelerated"}
+_STAYING = {"loop", "times", "packed", "state", "_outputs"}
 
 
 class BatchedSnapshot(SampledTrajectory):
@@ -41,7 +42,8 @@ class BatchedSnapshot(SampledTrajectory):
 
     def __init__(self, loop: BatchedLoop) -> None:
         """Make room for the present times, shape (w,), s, and packed states, shape (w, size)."""
-        self.loop, self._accelerated, count = loop, loop.accelerated, len(loop.loops)
+        self.loop, count = loop, len(loop.loops)
+        self._outputs = "all" if loop.accelerated else "no_acceleration"
         self.times, self.packed = np.zeros(count), np.zeros((count, loop.finger.layout.size))
 
     def forget(self) -> None:
@@ -60,7 +62,7 @@ def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
         name: each
         for name, each in variables(loop).items()
         # The account is of a whole run.
-        if each.booked is None and name not in (*_OF_CONTROLLERS, RESIDUAL)
+        if each.energy_term is None and name not in (*_OF_CONTROLLERS, RESIDUAL)
     }
 
 
@@ -123,7 +125,7 @@ class BatchedLoop(ClosedLoop):
             return super().force(time)
         return np.array([loop.force(each) for loop, each in zip(self.loops, np.asarray(time), strict=True)])
 
-    def evaluate(self, time: Array | float, x: Array, *, accelerated: bool = True) -> LoopSignals:
+    def evaluate(self, time: Array | float, x: Array, outputs: Outputs = "all") -> LoopSignals:
         """Return all signals at times (w,) and states (w, size); the base's motion counts for accelerations alone."""
         times, routing = np.asarray(time), self.finger.routing
         command = np.array([action.held for action in self.actions])
@@ -135,11 +137,11 @@ class BatchedLoop(ClosedLoop):
             voltages = [action.voltages(each) for action, each in zip(self.actions, times, strict=True)]
             command[:, self.drives.channels] = voltages
         base = None
-        if accelerated and (self.palm or self.guides):
+        if outputs == "all" and (self.palm or self.guides):
             base = np.array([loop.base(each) for loop, each in zip(self.loops, times, strict=True)])
-        evaluate = self.dynamics.evaluate if accelerated else self.dynamics.exerted
         nothing = np.zeros((len(times), len(routing.joints)))
-        return LoopSignals(ReferenceSignals(nothing, nothing), control, evaluate(x, command, self.force(time), base))
+        finger = self.dynamics.evaluate(x, command, self.force(time), base, outputs)
+        return LoopSignals(ReferenceSignals(nothing, nothing), control, finger)
 
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips, base frame, at times (w,) and states; energies are those of a palm at rest."""

@@ -255,7 +255,7 @@ class World:
         times = np.arange(round(end * sample_rate) + 1) / sample_rate
         motions = SampledTrajectory(self.loop, trajectory, times)
         found = record(self._scenario, motions, self._scenario.simulation.method)
-        found.attrs["own"] = "policy"
+        found.attrs["custom"] = "policy"
         return found
 
     def picture(self) -> NDArray[np.uint8]:

@@ -77,7 +77,7 @@ class Canals:
         routes: TendonPaths | None,
         tendons: Tendons,
         rows: Sequence[Rows],
-        pulled: Mapping[str, Array],
+        drive_matrices: Mapping[str, Array],
         width: int,
     ) -> None:
         """Find the canals.
@@ -87,7 +87,7 @@ class Canals:
             routes: The tendons of its tree; None without one.
             tendons: With the numbers of friction, those of canals after the finger's own.
             rows: Earlier rows: those of the tree, and of the finger's tendons.
-            pulled: Weights with which drives pull the actuated tendons, by table.
+            drive_matrices: Weights with which drives pull the actuated tendons, by table.
             width: Number of coordinates.
         """
         self.tables: list[Rows] = []
@@ -97,8 +97,8 @@ class Canals:
         self._joints, self._width = tuple(description.joints), width
         self._known = {table.group: table for table in rows}
         # They load the pins by themselves.
-        self._pressing = {"driven_tendons", *pulled}
-        own = [self._own(index, name, routes, pulled) for index, name in enumerate(description.actuated_names)]
+        self._pressing = {"driven_tendons", *drive_matrices}
+        own = [self._own(index, name, routes, drive_matrices) for index, name in enumerate(description.actuated_names)]
         left = {each.name: {("driven_tendons", each.name): 1.0} for each in own}
         self._rub(WRAPS, own, left, 2)
         for table in self.tables:
@@ -158,12 +158,12 @@ class Canals:
             wraps=(wrap,),
         )
 
-    def _own(self, index: int, name: str, routes: TendonPaths | None, pulled: Mapping[str, Array]) -> _Canal:
+    def _own(self, index: int, name: str, routes: TendonPaths | None, drive_matrices: Mapping[str, Array]) -> _Canal:
         """Return the canal of an actuated tendon of the finger, pulled by its drives besides what its source leaves."""
         tendon = self._description.tendons[name]
         drives = {
             (group, self._known[group].names[k]): float(weights[index, k])
-            for group, weights in pulled.items()
+            for group, weights in drive_matrices.items()
             for k in np.flatnonzero(weights[index])
         }
         route = TendonPath(-self._tendons.routing.coupling[index], ())

@@ -44,7 +44,7 @@ def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozens
     paths: list[tuple[PathTerm, ...]] = []
     for one, other in itertools.combinations(solids, 2):
         apart = one.group == other.group and frozenset((one.name, other.name)) not in within
-        if apart or (one.led and other.led) or one.never_meets(other):
+        if apart or (one.prescribed and other.prescribed) or one.never_meets(other):
             continue
         found = list(contacts_of(one, other))
         for index, (a, part, w, prism) in enumerate(found):
@@ -74,7 +74,7 @@ def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> P
 
 
 # Many runs start alike.
-@memoised(lambda contacts, body, q: (contacts, body.form, q.tobytes()))
+@memoised(lambda contacts, body, q: (contacts, body.topology, q.tobytes()))
 def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     """Refuse a configuration of shape (nq,) in which bodies are deep in each other.
 

@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rows import BASE, GUIDED, Energies, RowSignals
 from finger_pin.typing import Array
+
+#: What an evaluation is wanted for: all, all but accelerations, or the rows' forces. It may give more than that.
+Outputs = Literal["all", "no_acceleration", "row_forces"]
+
+
+def check_outputs(outputs: str) -> None:
+    """Refuse outputs that there are not.
+
+    Raises:
+        InputError: Naming those that there are.
+    """
+    if outputs not in get_args(Outputs):
+        raise InputError("outputs", f"must be one of {', '.join(get_args(Outputs))}", outputs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +53,7 @@ class Evaluation:
         rate: Time derivative of the packed state, shape (..., size).
         base_power: Power of a base that moves, shape (..., 1), W.
         prescribed_power: Power of the guides that move coordinates along paths, shape (...,), W.
-        booked: Energies and powers in the order of `Energies`, shape (..., energies), J and W, where they are known.
+        energy_terms: Energies and powers in the order of `Energies`, shape (..., energies), J and W, if known.
         touching: Contacts in space, where they are known.
     """
 
@@ -50,14 +65,14 @@ class Evaluation:
     rate: Array
     base_power: Array | None = None
     prescribed_power: Array | None = None
-    booked: Array | None = None
+    energy_terms: Array | None = None
     touching: ContactPoints | None = None
 
     def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Return the energies that the rows store, J, and their powers, W, by name; shapes (...,)."""
         stored, flows = ([each.name for each in entries] for entries in (self.energies.stored, self.energies.powers))
-        if self.booked is not None:
-            columns = np.moveaxis(self.booked, -1, 0)
+        if self.energy_terms is not None:
+            columns = np.moveaxis(self.energy_terms, -1, 0)
             return (
                 dict(zip(stored, columns[: len(stored)], strict=True)),
                 dict(zip(flows, columns[len(stored) :], strict=True)),

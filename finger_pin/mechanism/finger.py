@@ -14,7 +14,7 @@ from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.validation import finite_vector, suggestion
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.evaluation import Evaluation
+from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
 from finger_pin.mechanism.finger_parts import Parts, state_layout
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
@@ -44,9 +44,9 @@ class Finger:
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
         paths: The tendons of a tree as functions of the posture; None without a tree.
-        further: Tables of rows that were added, those of a tree first.
+        extra_rows: Tables of rows that were added, those of a tree first.
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
-        pulled: Weights with which drives and passive tendons' hysteresis pull the strands, by table, shape (s, k).
+        drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
         constructor_args: The rigid body, the rows and the objects that it was given.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
         scene: Objects and contacts; None without any.
@@ -93,11 +93,11 @@ class Finger:
         # What pulls tendons comes before their friction.
         before = tuple(table for table in of_tree if table.group != "tendon_dry_friction")
         drives = parts.drives(description, rows)
-        self.pulled = self.tendons.pulled(drives)
-        tables, canals = parts.tables(description, self.paths, before, drives, self.pulled)
+        self.drive_matrices = self.tendons.drive_matrices(drives)
+        tables, canals = parts.tables(description, self.paths, before, drives, self.drive_matrices)
         last = (*parts.hysteresis_rows(), *(table for table in of_tree if table not in before), *rows)
         self.wraps = canals.wraps
-        self.further = (*before, *canals.tables, *last)
+        self.extra_rows = (*before, *canals.tables, *last)
         mechanism = Mechanism(
             self.rigid_body,
             [*tables, *(table for table in last if not table.pulls)],
@@ -226,8 +226,8 @@ class Finger:
         """Names of the inputs u: the actuated tendons, of winches what is wound, then the actuators of a tree."""
         tree, routing = self.description.tree, self.routing
         names = zip(routing.tendons, routing.winched, strict=False)
-        pulled = (f"tendon_winding.{name}" if winched else name for name, winched in names)
-        return (*pulled, *(tree.actuators if tree is not None else ()))
+        inputs = (f"tendon_winding.{name}" if winched else name for name, winched in names)
+        return (*inputs, *(tree.actuators if tree is not None else ()))
 
     def packed_inputs(self, given: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
         """Return inputs u, shape (u,), from a sequence or from a table by name, 0 if left out.
@@ -248,7 +248,12 @@ class Finger:
         return np.array(finite_vector(name, values, len(values)))
 
     def evaluate(
-        self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
+        self,
+        x: Array,
+        inputs: Array,
+        fingertip_force: Array | None = None,
+        base: Array | None = None,
+        outputs: Outputs = "all",
     ) -> FingerSignals:
         """Return all signals of (18) at a packed state.
 
@@ -259,40 +264,39 @@ class Finger:
             fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
                 default.
             base: Motion of a hand's palm, the numbers of `base_motion`, shape (27,) or (m, 27); at rest by default.
+            outputs: "all", "no_acceleration" or "row_forces": others need not be computed; here all are.
+
+        Raises:
+            InputError: If there are no such outputs.
         """
+        check_outputs(outputs)
         return self.signals(x, inputs, fingertip_force, self.mechanism.evaluate(x, inputs, fingertip_force, base))
-
-    def exerted(
-        self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the same; an evaluation that is faster without accelerations may leave them out."""
-        return self.evaluate(x, inputs, fingertip_force, base)
-
-    forces = exerted
 
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        bodies, pulling = int(self.mechanism.body.model.nv), partial(self.tendon_torque, x, found.rows)
-        return FingerSignals(self.layout.unpack(x), inputs, force, found, bodies, self.pulled, self.wraps, pulling)
+        bodies, torque = int(self.mechanism.body.model.nv), partial(self.tendon_torque, x, found.rows)
+        return FingerSignals(
+            self.layout.unpack(x), inputs, force, found, bodies, self.drive_matrices, self.wraps, torque
+        )
 
     @property
     def wrap_names(self) -> tuple[str, ...]:
         """Names of the places of tendons that rub at several: all first ones, all second ones, and so on."""
         own = list(zip(self.routing.tendons, self.tendons.wraps, strict=False))
         first = [f"{name}.{places[0].name}" for name, places in own if len(places) > 1]
-        return (*first, *(name for table in self.further if table.group in self.wraps for name in table.names))
+        return (*first, *(name for table in self.extra_rows if table.group in self.wraps for name in table.names))
 
     @property
-    def pulling(self) -> tuple[str, ...]:
+    def tendon_rows(self) -> tuple[str, ...]:
         """The tables of rows that are tendons."""
-        return "passive_halves", "driven_tendons", *self.pulled, *self.wraps
+        return "passive_halves", "driven_tendons", *self.drive_matrices, *self.wraps
 
     def tendon_torque(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
         """Return H_c2^T f, the torque of the tendons (11), at packed states, shape (..., n), N m."""
-        pulling = [rows[group] for group in self.pulling]
-        torque = self._excursions.torque(x, pulling[0])
-        for each in pulling[1:]:
+        tables = [rows[group] for group in self.tendon_rows]
+        torque = self._excursions.torque(x, tables[0])
+        for each in tables[1:]:
             torque = torque + self._excursions.torque(x, each)
         return torque
 

@@ -13,7 +13,7 @@ from finger_pin.description.routing import Routing
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.canals import Canals
 from finger_pin.mechanism.joints import JointFriction, JointSprings, StrokeLimiter
-from finger_pin.mechanism.rows import Rows, further_states
+from finger_pin.mechanism.rows import Rows, state_scales
 from finger_pin.mechanism.scene import Scene
 from finger_pin.mechanism.state import BLOCKS, Layout
 from finger_pin.mechanism.tendon_paths import TendonPaths
@@ -66,18 +66,18 @@ class Parts(NamedTuple):
         paths: TendonPaths | None,
         of_tree: tuple[Rows, ...],
         drives: tuple[Rows, ...],
-        pulled: dict[str, Array],
+        drive_matrices: dict[str, Array],
     ) -> tuple[list[Rows], Canals]:
         """Return the tables of rows in the order of evaluation, and the canals."""
         joints, width = self.routing.joints, self.width
-        pulling: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.inertias))
+        tendon_rows: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.inertias))
         if paths:
-            pulling = [along_paths(description, paths, table) for table in pulling]
-        canals = Canals(description, paths, self.tendons, [*of_tree, *pulling], pulled, width)
-        pins = _pins(self, drives, pulled, canals.loads)
+            tendon_rows = [along_paths(description, paths, table) for table in tendon_rows]
+        canals = Canals(description, paths, self.tendons, [*of_tree, *tendon_rows], drive_matrices, width)
+        pins = _pins(self, drives, drive_matrices, canals.loads)
         return [
             *of_tree,
-            *pulling,
+            *tendon_rows,
             *canals.tables,
             pins,
             _made(self.stroke_limiter.rows, joints, width),
@@ -128,9 +128,9 @@ def _wired(parts: Parts, drives: tuple[Rows, ...], _: object, loads: Mapping[str
 
 
 @memoised(_wired)
-def _pins(parts: Parts, drives: tuple[Rows, ...], pulled: dict[str, Array], loads: Mapping[str, Array]) -> Rows:
+def _pins(parts: Parts, drives: tuple[Rows, ...], drive_matrices: dict[str, Array], loads: Mapping[str, Array]) -> Rows:
     routing = parts.routing
-    return parts.joint_friction.rows(routing.joints, pulled, routing.actuated, parts.width, loads)
+    return parts.joint_friction.rows(routing.joints, drive_matrices, routing.actuated, parts.width, loads)
 
 
 def state_layout(
@@ -144,7 +144,7 @@ def state_layout(
 ) -> Layout:
     """Return the layout of tendons, joints, motors, extra rows, drives among them, and a scene."""
     routing = tendons.routing
-    drives, further = (further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
+    drives, of_others = (state_scales([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
 
     def each(names: Sequence[str], parts: str) -> list[str]:
         return [f"{name}.{part}" for name in names for part in parts.split()]
@@ -171,14 +171,14 @@ def state_layout(
         "canal_stiction": [name for table in canals if table.states for name in table.names],
         "joint_stiction": () if friction.law.scale is None else routing.joints,
         "gearbox_stiction": motors.names,
-        "further": [name for name, _ in further],
+        "further": [name for name, _ in of_others],
     }
     # A lumped mass that rings has the velocity that goes with 1 % of its position.
     ringing = np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)
     scaled = {
         "passive_velocity": np.maximum(BLOCKS["passive_velocity"].scale, 1e-5 * ringing).tolist(),
         "drives": [scale for _, scale in drives],
-        "further": [scale for _, scale in further],
+        "further": [scale for _, scale in of_others],
     }
     return _same(Layout.of(labels, scaled))
 

@@ -159,9 +159,9 @@ class FingerSignals:
         fingertip_force: F, shape (3,) or (..., 3), of several fingers (f, 3) or (..., f, 3), N, base frame.
         mechanism: The same of the mechanism, with what every row does.
         bodies: Number of velocities of the rigid body, before those of passive tendons.
-        pulled: Weights with which further tables pull the strands, by table, as of `Tendons.pulled`.
+        drive_matrices: Weights with which further tables pull the strands, by table, as of `Tendons.drive_matrices`.
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
-        pulling: Returns the torque of the tendons, as `Finger.tendon_torque`.
+        compute_tendon_torque: Returns the torque of the tendons, as `Finger.tendon_torque`.
     """
 
     state: State
@@ -169,9 +169,9 @@ class FingerSignals:
     fingertip_force: Array
     mechanism: Evaluation
     bodies: int
-    pulled: Mapping[str, Array]
+    drive_matrices: Mapping[str, Array]
     wraps: Mapping[str, Array]
-    pulling: Callable[[], Array]
+    compute_tendon_torque: Callable[[], Array]
 
     @cached_property
     def tendons(self) -> TendonForces:
@@ -179,7 +179,7 @@ class FingerSignals:
         found, masses = self.mechanism, self.state.passive_position.shape[-1]
         driven, passive = found.rows["driven_tendons"], found.rows["passive_tendons"]
         strands = np.concatenate([driven.force, found.rows["passive_halves"].force], axis=-1)
-        for table, weights in self.pulled.items():
+        for table, weights in self.drive_matrices.items():
             strands = strands + combined(found.rows[table].force, weights.T)
         beyond = [(found.rows[table], weights) for table, weights in self.wraps.items()]
         for wraps, weights in beyond:
@@ -220,7 +220,7 @@ class FingerSignals:
     @cached_property
     def tendon_torque(self) -> Array:
         """H_c2^T f, shape (..., n), N m, (11)."""
-        return self.pulling()
+        return self.compute_tendon_torque()
 
     @property
     def external_torque(self) -> Array:

@@ -116,7 +116,7 @@ class JointFriction:
 
         Args:
             names: Of the joints.
-            drives: Weights with which further tables pull the strands, as of `Tendons.pulled`; all of it adds up.
+            drives: Weights with which further tables pull the strands, `Tendons.drive_matrices`; all of it adds up.
             actuated: Number of driven tendons.
             width: Number of coordinates.
             canals: Weights with which canals of a tree, and what pulls through them, load the pins, shape (n, rows).

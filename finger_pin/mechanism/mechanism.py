@@ -96,7 +96,7 @@ class Mechanism:
             for table in part.rows:
                 rows.append(
                     replace(
-                        table.spread(places, width),
+                        table.embed_coordinates(places, width),
                         group=f"{name}.{table.group}",
                         channels=np.where(table.channels >= 0, table.channels + channel, -1),
                         pins=np.where(table.pins >= 0, table.pins + joint, -1),
@@ -193,11 +193,11 @@ class Mechanism:
             [self.body.forward_dynamics(turning, v[..., :joints], net[..., :joints]), net[..., joints:] / self.inertia],
             axis=-1,
         )
-        led, prescribed_power = np.flatnonzero(self.prescribed >= 0), None
-        if len(led):
-            given = self.prescribed[led] + GUIDES
-            acceleration[..., led] = 0.0 if base is None else base[..., given]
-            prescribed_power = -np.sum(torque[..., led] * v[..., led], axis=-1)
+        prescribed, prescribed_power = np.flatnonzero(self.prescribed >= 0), None
+        if len(prescribed):
+            given = self.prescribed[prescribed] + GUIDES
+            acceleration[..., prescribed] = 0.0 if base is None else base[..., given]
+            prescribed_power = -np.sum(torque[..., prescribed] * v[..., prescribed], axis=-1)
         if base is not None and self.moved:
             power = self._base_power(turning, v[..., :joints], acceleration[..., :joints], base)
             if prescribed_power is not None:

@@ -71,7 +71,7 @@ class RigidBody:
         joints: Names of the joints, in the order of the model.
         proximal_axes: e_j of (17) of every joint of the model, the base first, in the frame of the body that has it.
         parent_links: Index of the joint that carries that body, 0 for the base.
-        form: Shared by all bodies that differ in inertias and gravity alone.
+        topology: Shared by all bodies that differ in inertias and gravity alone.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class RigidBody:
         for row, tip in enumerate(self.tips):
             self.supports[row, [each - 1 for each in model.supports[model.frames[tip].parentJoint] if each]] = 1.0
         self.joints: tuple[str, ...] = tuple(model.names[1:])
-        self.form, self._own = Topology(), threading.local()
+        self.topology, self._own = Topology(), threading.local()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
         self.parent_links: list[int] = [0]
         for index in range(1, model.njoints):

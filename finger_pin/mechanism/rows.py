@@ -122,7 +122,7 @@ class Rows:
     powers: tuple[Energy, ...] = ()
     unit: str = ""
     pulls: tuple[str, ...] = ()
-    _form = None
+    _structure = None
 
     def __post_init__(self) -> None:
         """Fill in defaults, and check the sizes."""
@@ -148,9 +148,9 @@ class Rows:
         if self.pulls and len(self.pulls) != count:
             raise InputError(f"rows.{self.group}.pulls", f"must be {count} tendons, not {len(self.pulls)}")
         object.__setattr__(self, "stored", energy(self.stored or self.group))
-        object.__setattr__(self, "powers", self._booked())
+        object.__setattr__(self, "powers", self._named_powers())
 
-    def _booked(self) -> tuple[Energy, ...]:
+    def _named_powers(self) -> tuple[Energy, ...]:
         """Return the powers with their kinds, from the law."""
         law = self.law
         kinds = dict.fromkeys(law.supplies, SUPPLIED) | dict.fromkeys(law.losses, LOST)
@@ -176,27 +176,27 @@ class Rows:
         return any(self.paths)
 
     @property
-    def form(self) -> Rows:
-        """The table that this one differs from in the law's numbers alone; itself unless `numbered` has made it."""
-        return self._form or self
+    def structure(self) -> Rows:
+        """The table that this one differs from in parameters alone; itself unless made by `with_parameters`."""
+        return self._structure or self
 
     @cached_property
-    def content(self) -> tuple[Any, ...]:
+    def structure_key(self) -> tuple[Any, ...]:
         """Everything but the parameters of the law, to be compared by value."""
         arrays = (self.arm, self.measure, self.offset, self.channels, self.pins, self.bends, self.curvature_offset)
         weighted = [(*each, *(matrix.tobytes() for matrix in each.values())) for each in (self.inputs, self.loads)]
         named = (self.group, self.law, self.paths, self.stored, self.powers)
         return (*named, *self.arm.shape, *weighted, *(each.tobytes() for each in arrays))
 
-    def numbered(self, parameters: Array) -> Rows:
+    def with_parameters(self, parameters: Array) -> Rows:
         """Return the same rows with other numbers of their law, shape (len(law.parameters), k)."""
         if parameters.shape != self.parameters.shape:
             raise InputError(f"rows.{self.group}.parameters", f"must have shape {self.parameters.shape}")
         twin = copy.copy(self)
-        vars(twin).update(parameters=parameters, _form=self.form)
+        vars(twin).update(parameters=parameters, _structure=self.structure)
         return twin
 
-    def spread(self, places: NDArray[np.int64], width: int) -> Rows:
+    def embed_coordinates(self, places: NDArray[np.int64], width: int) -> Rows:
         """Return the same rows with their coordinates at some places among more."""
 
         def wide(matrix: Array) -> Array:
@@ -236,7 +236,7 @@ class RowSignals:
     def account(self) -> tuple[Array, dict[str, Array]]:
         """Return the stored energy of all rows together, J, and their powers by the names of the table, W."""
         rows = self.rows
-        stored, *powers = rows.law.book(self.row, rows.parameters, self.force, self.rate, self.signals)
+        stored, *powers = rows.law.energy_terms(self.row, rows.parameters, self.force, self.rate, self.signals)
         return np.sum(stored, axis=-1), {
             each.name: np.sum(power, axis=-1) for each, power in zip(rows.powers, powers, strict=True)
         }
@@ -250,7 +250,7 @@ def combined(force: Array, weights: Array) -> Array:
     return np.asarray(np.einsum("...k,kn->...n", force, weights))
 
 
-def pulled(tables: Sequence[Rows], tendons: Sequence[str]) -> dict[str, Array]:
+def drive_matrices(tables: Sequence[Rows], tendons: Sequence[str]) -> dict[str, Array]:
     """Return the weights with which the rows of drives pull t tendons, by table, shape (t, k).
 
     Raises:
@@ -268,7 +268,7 @@ def pulled(tables: Sequence[Rows], tendons: Sequence[str]) -> dict[str, Array]:
     }
 
 
-def further_states(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:
+def state_scales(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:
     """Return name and scale of every state of tables of rows."""
     found: list[tuple[str, float]] = []
     for table in rows:

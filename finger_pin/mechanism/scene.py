@@ -39,7 +39,7 @@ def _links(description: FingerDescription) -> dict[str, Link]:
 
 
 def _touching(
-    form: Topology,
+    topology: Topology,
     objects: Mapping[str, Object],
     description: FingerDescription,
     _: RigidBody,
@@ -47,7 +47,7 @@ def _touching(
     placed: object,
 ) -> tuple[object, ...]:
     """Return all that contacts depend on: how heavy objects are, and where they move, is nothing to them."""
-    forms = (
+    shapes = (
         (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.surface, *place)
         for name, each in objects.items()
         for place in [(each.position, each.orientation)]
@@ -56,12 +56,12 @@ def _touching(
     links = ((link.length, link.width, link.offset) for link in carried if link)
     hand = description.hand
     pairs = hand and hand.fingers_touch, frozenset(pairs_within(description))
-    return (form, *pairs, width, *links, *forms)
+    return (topology, *pairs, width, *links, *shapes)
 
 
-@memoised(lambda form, places, width: (form, places.tobytes(), width), most=1024)
-def _spread(form: Rows, places: Indices, width: int) -> Rows:
-    return form.spread(places, width)
+@memoised(lambda structure, places, width: (structure, places.tobytes(), width), most=1024)
+def _embedded(structure: Rows, places: Indices, width: int) -> Rows:
+    return structure.embed_coordinates(places, width)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +106,13 @@ class Scene:
             if each.path and mechanism.moved:
                 raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
         width = int(extended.model.nv) + len(mechanism.lumps)
-        contacts = cls._contacts(mechanism.body.form, objects, description, extended, width, placed)
+        contacts = cls._contacts(mechanism.body.topology, objects, description, extended, width, placed)
         return cls(objects, free, extended, contacts)
 
     @staticmethod
     @memoised(_touching)
     def _contacts(
-        form: Topology,
+        topology: Topology,
         objects: Mapping[str, Object],
         description: FingerDescription,
         extended: RigidBody,
@@ -143,13 +143,13 @@ class Scene:
         width = bodies + lumps
         rows = []
         for table in mechanism.rows:
-            form = _spread(table.form, places, width)
-            rows.append(form if table.form is table else form.numbered(table.parameters))
+            structure = _embedded(table.structure, places, width)
+            rows.append(structure if table.structure is table else structure.with_parameters(table.parameters))
         lumps_of = mechanism.lumps, mechanism.inertia
         prescribed = np.full(bodies + lumps, -1)
         prescribed[bodies - len(self.world) : bodies] = np.arange(len(self.world))
-        led = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
-        for number, first in enumerate(led):
+        on_paths = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
+        for number, first in enumerate(on_paths):
             prescribed[first : first + VELOCITY] = VELOCITY * number + np.arange(VELOCITY)
         return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, prescribed)
 

@@ -48,7 +48,7 @@ class Solid:
         home: Centre of a ball, base frame, shape (3,), m, that it never leaves.
         range: Radius of that ball, m; infinite for what is free.
         joined: Whether it is a capsule whose near end lies in another one, which stands for it on a plane.
-        led: Whether nothing moves it but a path, if that: it is fixed, or moved.
+        prescribed: Whether nothing moves it but a path, if that: it is fixed, or moved.
         surface: Its surface; None for links and where it is left out, which touch with that of what they touch.
     """
 
@@ -61,7 +61,7 @@ class Solid:
     home: Array = field(default_factory=lambda: np.zeros(3))
     range: float = np.inf
     joined: bool = False
-    led: bool = False
+    prescribed: bool = False
     surface: Surface | None = None
 
     @property
@@ -86,7 +86,7 @@ class Solid:
     def kept_near(self, body: RigidBody) -> Solid:
         """Return it with the ball about the first joint that carries it, in which joints that turn keep it."""
         if not self.joint:
-            return replace(self, home=np.array(self.place.translation), range=self.reach, led=True)
+            return replace(self, home=np.array(self.place.translation), range=self.reach, prescribed=True)
         first, *others = [each for each in body.model.supports[self.joint] if each]
         radius = float(np.linalg.norm(self.place.translation)) + self.reach
         radius += sum(float(np.linalg.norm(body.model.jointPlacements[each].translation)) for each in others)
@@ -171,7 +171,7 @@ def object_solid(name: str, described: Object, joint: int) -> Solid:
         described.shape,
         described.sizes,
         np.array(place.translation),
-        led=described.mass is None,
+        prescribed=described.mass is None,
         surface=described.surface,
     )
     return solid if joint else replace(solid, range=solid.reach)
@@ -193,21 +193,21 @@ def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm 
     return _weighing(_extended(body, moved, world), body, [objects[name] for name in moved])
 
 
-@memoised(lambda form, body, moved: (form, body, *((each.mass, each.inertia) for each in moved)))
-def _weighing(form: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
+@memoised(lambda extended, body, moved: (extended, body, *((each.mass, each.inertia) for each in moved)))
+def _weighing(extended: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
     """Return an extended body with the inertias of the body itself, and those of objects that move."""
-    # Of what is led any inertia will do, if it is too little to count.
+    # Any inertia that is too little to count will do for what moves on a path.
     slight, none = _inertia(_SLIGHT, np.full(3, _SLIGHT)), pin.Inertia.Zero()
     inertias = body.inertias
     for each in moved:
         inertias += [none, slight if each.mass is None else _inertia(each.mass, each.inertia)]
     # Of the joints of the world the last one carries all.
-    further = form.model.njoints - 1 - len(inertias)
-    inertias += [*[none] * (further - 1), slight][-further:] if further else []
-    return form.weighing(inertias, body.model.gravity.linear)
+    more = extended.model.njoints - 1 - len(inertias)
+    inertias += [*[none] * (more - 1), slight][-more:] if more else []
+    return extended.weighing(inertias, body.model.gravity.linear)
 
 
-@memoised(lambda body, moved, world: (body.form, *moved, world))
+@memoised(lambda body, moved, world: (body.topology, *moved, world))
 def _extended(body: RigidBody, moved: Sequence[str], world: Sequence[float]) -> RigidBody:
     """Return a rigid body with further joints for moving objects and for the world seen by a palm."""
     model, place = pin.Model(body.model), pin.SE3.Identity()

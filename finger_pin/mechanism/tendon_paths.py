@@ -295,14 +295,14 @@ class Excursions:
             coupling[..., [*self._along], :] = -self._paths.arms(position)[..., [*self._along.values()], :]
         return coupling
 
-    def torque(self, x: Array, pulling: RowSignals) -> Array:
+    def torque(self, x: Array, tendons: RowSignals) -> Array:
         """Return the torque of driven or elastic tendons at packed states, shape (..., size): shape (..., n), N m."""
-        joints, rows = self._coupling.shape[1], pulling.rows
+        joints, rows = self._coupling.shape[1], tendons.rows
         if not rows.routed or self._paths is None:
-            return combined(pulling.force, rows.arm)[..., :joints]
+            return combined(tendons.force, rows.arm)[..., :joints]
         body, width = self._paths.body, rows.arm.shape[1]
         found = np.zeros((*x.shape[:-1], joints))
         for at in np.ndindex(x.shape[:-1]):
             arm = path_kinematics(body, x[at][:joints], rows.paths, width).arm + rows.arm
-            found[at] = (pulling.force[at] @ arm)[:joints]
+            found[at] = (tendons.force[at] @ arm)[:joints]
         return found

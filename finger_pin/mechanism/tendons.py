@@ -16,7 +16,7 @@ from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coefficient
 from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.joints import OF_TENDONS, bristles, hysteresis_rows
-from finger_pin.mechanism.rows import Energy, Rows, pulled
+from finger_pin.mechanism.rows import Energy, Rows, drive_matrices
 from finger_pin.mechanism.tendon_paths import Wrap, find_wraps
 from finger_pin.typing import Array, Number
 
@@ -177,10 +177,10 @@ class Tendons:
             found.append(Rows(group, ACTUATOR, pulls, law, arm, channels=places, powers=(supplied,), pulls=pulls))
         return found
 
-    def pulled(self, drives: Sequence[Rows]) -> dict[str, Array]:
+    def drive_matrices(self, drives: Sequence[Rows]) -> dict[str, Array]:
         """Return the weights with which drives and halves' hysteresis pull the s strands, by table, shape (s, k)."""
         actuated, strands = self.routing.actuated, np.eye(len(self.routing.strand_coupling))
-        by_drives = pulled(drives, self.routing.tendons[:actuated])
+        by_drives = drive_matrices(drives, self.routing.tendons[:actuated])
         found = {group: strands[:, :actuated] @ weights for group, weights in by_drives.items()}
         if self.held:
             found["passive_hysteresis"] = strands[:, actuated:][:, np.repeat(self.hysteresis > 0.0, 2)]
@@ -221,13 +221,13 @@ class Tendons:
         halves, *_, driven, passive = tables
         taken, actuated = driven.parameters[-1:], self.routing.actuated
         return [
-            halves.numbered(np.repeat(self.half_stiffness, 2)[None]),
+            halves.with_parameters(np.repeat(self.half_stiffness, 2)[None]),
             *drives,
-            driven.numbered(np.concatenate([friction[:, :actuated], taken])),
-            passive.numbered(friction[:, actuated:]),
+            driven.with_parameters(np.concatenate([friction[:, :actuated], taken])),
+            passive.with_parameters(friction[:, actuated:]),
         ]
 
-    @memoised(lambda self, drives, motors: (self.routing, self.wraps, *(each.form for each in drives), motors))
+    @memoised(lambda self, drives, motors: (self.routing, self.wraps, *(each.structure for each in drives), motors))
     def _wired(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
         return self._rows(drives, motors)
 
@@ -258,7 +258,7 @@ class Tendons:
                 # `Canals` has the others.
                 bends[k, :joints], offset[k], _ = _places(routing, k, places)[0]
         friction, names = self._friction, routing.passive_names
-        wired = pulled(drives, routing.tendons[:actuated])
+        wired = drive_matrices(drives, routing.tendons[:actuated])
         taken = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
         halves = self._halves(motors)
         # What loads a canal is what its tendon's halves pull with, and what they hold.

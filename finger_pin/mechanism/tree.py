@@ -142,8 +142,8 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
         arm = np.zeros((len(along), width))
         arm[:, : len(joints)] = [route.coefficients for route in along.values()]
         paths = tuple(route.legs for route in along.values())
-        booked = {"stored": _STORED.get(group), "powers": _EXCHANGED.get(group, ())}
-        return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **(booked | more))
+        wiring = {"stored": _STORED.get(group), "powers": _EXCHANGED.get(group, ())}
+        return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **(wiring | more))
 
     tables: list[Rows] = []
     for group, law, along, numbers in (

@@ -111,7 +111,7 @@ def _build(description: FingerDescription) -> RigidBody:
     model.gravity.linear[:] = description.gravity
     body = RigidBody(model, TIP_FRAME)
     places = [(name, each.length, each.offset, each.twist) for name, each in _links(description).items()]
-    body.form = _topology(*places)
+    body.topology = _topology(*places)
     return body
 
 
@@ -141,7 +141,7 @@ def _weighed_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping
     return joined.weighing([each for part in parts.values() for each in part.inertias], hand.gravity)
 
 
-@memoised(lambda hand, placed, parts: (*placed, *(part.form for part in parts.values())))
+@memoised(lambda hand, placed, parts: (*placed, *(part.topology for part in parts.values())))
 def _joined_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping[str, RigidBody]) -> RigidBody:
     places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
     return join_bodies(parts, places)

@@ -64,13 +64,13 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
         signals: The signals at those times.
         motion: Fingertip and energies of the rigid body at those times.
     """
-    booked = powers(signals.finger)
+    flows = powers(signals.finger)
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
-    parts, done = _parts(loop, trajectory), np.zeros((len(times), len(booked.booked)))
+    parts, done = _parts(loop, trajectory), np.zeros((len(times), len(flows.energy_terms)))
     for ends, power in parts:
         done += _works(power, ends[:-1], np.diff(ends), times, done.shape[1])
-    works = Flows(done, booked.booked)
+    works = Flows(done, flows.energy_terms)
     gained = total - total[0]
     residual = gained - works.net
     allowed = max(_CLOSED * float(np.sum(np.max(np.abs(done), axis=0, initial=0.0))), _NOTHING)
@@ -84,11 +84,11 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
                 coarse, fine = _halved(power, ends[steps], np.diff(ends)[steps], _SMALL * allowed)
                 if len(coarse[0]):
                     done += _works(power, *fine, times, done.shape[1]) - _works(power, *coarse, times, done.shape[1])
-            works = Flows(done, booked.booked)
+            works = Flows(done, flows.energy_terms)
             residual = gained - works.net
             if np.sum(np.abs(np.diff(residual))[spans]) > 0.5 * np.sum(opened[spans]):
                 break
-    return Account(stored=stored, powers=booked, works=works, residual=residual)
+    return Account(stored=stored, powers=flows, works=works, residual=residual)
 
 
 def _worst(opened: Array, allowed: float) -> Iterator[NDArray[np.int64]]:

@@ -20,7 +20,8 @@ from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
-from finger_pin.simulation.initial_state import own_parts
+from finger_pin.simulation.initial_state import custom_parts
+from finger_pin.simulation.recording import custom_of
 from finger_pin.simulation.simulate import simulate
 from finger_pin.typing import Array
 
@@ -158,9 +159,9 @@ def check_convergence(
     if result is not None and result.attrs["scenario"] != to_toml(scenario):
         raise InputError("result", "is of another scenario")
     finger = resolve_finger(finger, scenario)
-    own = own_parts(controller, reference, fingertip_force, initial, finger)
-    if result is not None and result.attrs.get("own", "") != own:
-        raise InputError("result", f"had {result.attrs.get('own') or 'nothing'} of its own: give the same here")
+    custom = custom_parts(controller, reference, fingertip_force, initial, finger)
+    if result is not None and custom_of(result) != custom:
+        raise InputError("result", f"had {custom_of(result) or 'nothing'} of its own: give the same here")
 
     def run(each: Scenario) -> xr.Dataset:
         return simulate(

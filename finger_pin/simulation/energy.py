@@ -33,11 +33,11 @@ class Flows:
 
     Attributes:
         values: By name, shape (..., f).
-        booked: Energies and powers of the f of them.
+        energy_terms: Energies and powers of the f of them.
     """
 
     values: Array
-    booked: tuple[Energy, ...]
+    energy_terms: tuple[Energy, ...]
 
     @classmethod
     def of(cls, energies: Energies, rows: Array, fingertip: Array) -> Flows:
@@ -47,13 +47,13 @@ class Flows:
 
     def __getitem__(self, name: str) -> Array:
         """Return one of them, shape (...,)."""
-        value: Array = self.values[..., [each.name for each in self.booked].index(name)]
+        value: Array = self.values[..., [each.name for each in self.energy_terms].index(name)]
         return value
 
     @property
     def net(self) -> Array:
         """Supplied less lost, shape (...,)."""
-        return np.asarray(self.values @ [1.0 if each.kind == SUPPLIED else -1.0 for each in self.booked])
+        return np.asarray(self.values @ [1.0 if each.kind == SUPPLIED else -1.0 for each in self.energy_terms])
 
 
 def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics) -> dict[str, Array]:
@@ -84,8 +84,8 @@ def stores(finger: Finger) -> tuple[Energy, ...]:
 def powers(signals: FingerSignals) -> Flows:
     """Return the powers supplied and lost at the given signals."""
     found = signals.mechanism
-    if found.booked is not None:
-        rows = found.booked[..., len(found.energies.stored) :]
+    if found.energy_terms is not None:
+        rows = found.energy_terms[..., len(found.energies.stored) :]
     else:
         rows = np.stack(list(found.account()[1].values()), axis=-1)
     return Flows.of(found.energies, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))

@@ -1,4 +1,4 @@
-"""The start of a simulation: a packed state, or the last saved state of a result; and the parts of a user's own."""
+"""The start of a simulation: a packed state, or the last saved state of a result; and the names of custom parts."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from finger_pin.simulation.contact_variables import last_touching
 from finger_pin.typing import Array
 
 
-def own_parts(
+def custom_parts(
     controller: object, reference: object, fingertip_force: object, initial: object, finger: object = None
 ) -> str:
-    """Return the parts of a simulation that are a user's own, such as ``controller, reference``; empty for none.
+    """Return the custom parts of a simulation, such as ``controller, reference``; empty for none.
 
     Args:
         controller: As for `simulate`.
@@ -81,7 +81,7 @@ def _last_states(finger: Finger, last: xr.Dataset, sizes: dict[str, Array]) -> d
     Raises:
         InputError: If a result lacks them.
     """
-    tables = [table for table in finger.further if table.states and not table.pulls]
+    tables = [table for table in finger.extra_rows if table.states and not table.pulls]
     actuators, canals = (STATEFUL, MUSCLES), [table.group for table in tables if is_canal(table.group)]
     others = [table.group for table in tables if table.group not in (*actuators, *canals)]
     found = {}
@@ -95,7 +95,7 @@ def _last_states(finger: Finger, last: xr.Dataset, sizes: dict[str, Array]) -> d
     return found
 
 
-def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+def as_finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Return an argument as finite numbers of a shape; a copy.
 
     Raises:

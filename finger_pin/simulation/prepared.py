@@ -21,7 +21,7 @@ from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import with_tighter
-from finger_pin.simulation.initial_state import own_parts, packed_state
+from finger_pin.simulation.initial_state import custom_parts, packed_state
 from finger_pin.simulation.recording import RunArrays, attributes_of, record, recorded, refuse_unknown
 from finger_pin.simulation.running import interruptible, run
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
@@ -160,7 +160,7 @@ class Prepared:
         return add_slopes(found, base, numbers, runs, changes)
 
     def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
-        return Setup.of(scenario, self._loop(scenario, initial), judged=False)
+        return Setup.of(scenario, self._loop(scenario, initial), estimate_error=False)
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
         motions = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
@@ -199,8 +199,8 @@ class Prepared:
             stop: Asked now and then; when it returns true the run ends there.
         """
         scenario = self.scenario(values)
-        own, loop = own_parts(None, None, None, initial, self._given), self._loop(scenario, initial)
-        return interruptible(lambda asked: run(scenario, loop, own, progress=progress, stop=asked), stop)
+        custom, loop = custom_parts(None, None, None, initial, self._given), self._loop(scenario, initial)
+        return interruptible(lambda asked: run(scenario, loop, custom, progress=progress, stop=asked), stop)
 
     def _loop(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None = None) -> ClosedLoop:
         """Return the loop of one of the family."""

@@ -99,9 +99,14 @@ def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> di
     }
 
 
+def custom_of(result: xr.Dataset) -> str:
+    """Return the names of a result's custom parts, empty for none; results before 0.6 call them ``own``."""
+    return str(result.attrs.get("custom", result.attrs.get("own", "")))
+
+
 def is_tracking(result: xr.Dataset) -> bool:
     """Return whether joints were to follow a reference; under given tensions only one that moves counts."""
-    given = result.attrs.get("controller") == "tensions" and "own" not in result.attrs
+    given = result.attrs.get("controller") == "tensions" and not custom_of(result)
     return not given or bool(np.ptp(result["joint_reference"].values, axis=0).any())
 
 

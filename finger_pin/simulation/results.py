@@ -14,9 +14,10 @@ import xarray as xr
 from finger_pin.exceptions import InputError
 from finger_pin.files import NEW, publish
 from finger_pin.simulation.netcdf import save
+from finger_pin.simulation.recording import custom_of
 
 _MARK = "# The input that led to the results in this folder, complete: running it again gives the same trajectory.\n"
-_MARK_OF_OWN = (
+_MARK_OF_CUSTOM = (
     "# The scenario of the results in this folder, run with a {} of its own: alone it gives another motion.\n"
 )
 _FILES = ("scenario.toml", "trajectory.nc", "animation.html")
@@ -75,8 +76,8 @@ class ResultFolder:
         """
         self.stage.mkdir(parents=True, exist_ok=True)
         self._whole.touch()
-        own = result.attrs.get("own")
-        mark = _MARK_OF_OWN.format(own) if own else _MARK
+        custom = custom_of(result)
+        mark = _MARK_OF_CUSTOM.format(custom) if custom else _MARK
         (self.stage / "scenario.toml").write_text(mark + result.attrs["scenario"], encoding="utf-8", newline="\n")
         save(result, self.stage / "trajectory.nc")
 
@@ -131,6 +132,6 @@ def _is_marked(folder: Path) -> bool:
     try:
         with open(folder / "scenario.toml", "rb") as file:
             line = file.readline(1000).decode("utf-8", "replace")
-            return any(line.startswith(mark.split("{")[0]) for mark in (_MARK, _MARK_OF_OWN))
+            return any(line.startswith(mark.split("{")[0]) for mark in (_MARK, _MARK_OF_CUSTOM))
     except OSError:
         return False

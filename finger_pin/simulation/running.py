@@ -38,7 +38,7 @@ Found = TypeVar("Found", xr.Dataset, RunArrays)
 def run(
     scenario: Scenario,
     loop: ClosedLoop | None = None,
-    own: str = "",
+    custom: str = "",
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
@@ -49,7 +49,7 @@ def run(
     Args:
         scenario: The scenario to simulate.
         loop: Its loop, where something in it is a user's own.
-        own: Names of the parts given in place of the scenario's, from `own_parts`.
+        custom: Names of the parts given in place of the scenario's, from `custom_parts`.
         control_period: As for `simulate`, like what follows.
         progress: Called with the simulated time, s.
         observe: Called with the simulated time, s, and all signals.
@@ -60,7 +60,7 @@ def run(
     driving = micro_damping_advice(scenario.finger)
     if driving:
         warnings.warn(driving, MicroDampingWarning, stacklevel=5)
-    setup = Setup.of(scenario, loop, own, control_period)
+    setup = Setup.of(scenario, loop, custom, control_period)
     loop = setup.loop
 
     def watch(time: float, x: Array) -> None:
@@ -71,7 +71,7 @@ def run(
 
     watched = progress is not None or observe is not None
     trajectory = setup.integrate(watch if watched else None, stop, chunk=CHUNK if observe is None else CHUNK_OBSERVED)
-    margin = _margin(scenario, loop, own)
+    margin = _margin(scenario, loop, custom)
     close = locking_advice(math.inf if margin is None else margin)
     if close:
         warnings.warn(close, SelfLockingWarning, stacklevel=5)
@@ -90,13 +90,13 @@ def run(
     if np.isfinite(error):
         result.attrs["estimated_error"] = error
     gap = "" if trajectory.failure else open_account(result, left_open(result))
-    told = {"self_locking": close, "micro_damping": driving, "accuracy": inaccurate, "account": gap, "ringing": slow}
-    told["own"] = own
-    result.attrs |= {name: text for name, text in told.items() if text}
-    return _whole(setup, trajectory, result, slow)
+    warned = {"self_locking": close, "micro_damping": driving, "accuracy": inaccurate, "account": gap, "ringing": slow}
+    notes = {**warned, "custom": custom}
+    result.attrs |= {name: text for name, text in notes.items() if text}
+    return _raise_if_incomplete(setup, trajectory, result, slow)
 
 
-def _whole(setup: Setup, trajectory: Trajectory, result: xr.Dataset, slow: str) -> xr.Dataset:
+def _raise_if_incomplete(setup: Setup, trajectory: Trajectory, result: xr.Dataset, slow: str) -> xr.Dataset:
     """Return the result of a run that reached its end; raise with the partial result of any other."""
     reached = float(trajectory.breakpoints[-1])
     result, excess = finite_part(result)
@@ -112,13 +112,13 @@ def _whole(setup: Setup, trajectory: Trajectory, result: xr.Dataset, slow: str) 
     return result
 
 
-def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
+def _margin(scenario: Scenario, loop: ClosedLoop, custom: str) -> float | None:
     """Return the margin of the joints' friction to self-locking, or None without a planned reference.
 
     The margin is that of the paper's controller on the scenario's reference.
     """
     planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
-    if not planned or {"controller", "reference"} & set(own.split(", ")):
+    if not planned or {"controller", "reference"} & set(custom.split(", ")):
         return None
     if not loop.finger.routing.force_closure().holds:
         return None

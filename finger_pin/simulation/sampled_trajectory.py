@@ -9,7 +9,7 @@ from typing import NamedTuple
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import ControlSignals
 from finger_pin.core.stepping.trajectory import Trajectory
-from finger_pin.mechanism.evaluation import ContactPoints
+from finger_pin.mechanism.evaluation import ContactPoints, Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import Energy
@@ -49,8 +49,6 @@ class SampledTrajectory:
         times: Shape (m,), s, as far as the trajectory goes.
     """
 
-    _forces_only = False
-
     def __init__(
         self, loop: ClosedLoop, trajectory: Trajectory, times: Array, names: Sequence[str] | None = None
     ) -> None:
@@ -62,8 +60,9 @@ class SampledTrajectory:
             times: Shape (m,), in order, s.
             names: Names of `variables` that will be asked for; by default all.
         """
-        self._accelerated = names is None or "joint_acceleration" in names
-        self._forces_only = names is not None and _OF_FORCES.issuperset(names)
+        self._outputs: Outputs = "all" if names is None or "joint_acceleration" in names else "no_acceleration"
+        if names is not None and _OF_FORCES.issuperset(names):
+            self._outputs = "row_forces"
         self.loop, self.trajectory = loop, trajectory
         self.times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
 
@@ -90,9 +89,7 @@ class SampledTrajectory:
     @cached_property
     def signals(self) -> LoopSignals:
         """All signals of the finger."""
-        if self._forces_only:
-            return self.loop.pulls(self.times, self.packed)
-        return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
+        return self.loop.evaluate(self.times, self.packed, self._outputs)
 
     @property
     def finger(self) -> FingerSignals:
@@ -137,7 +134,7 @@ class Quantity(NamedTuple):
         long_name: In words.
         equation: Number of its equation in the paper; empty for none.
         frame: Whose axes its components are along, `BASE_FRAME` or `WORLD_FRAME`; empty for what has none.
-        booked: Its part in the energy account, if any.
+        energy_term: Its part in the energy account, if any.
     """
 
     dims: tuple[str, ...]
@@ -146,12 +143,12 @@ class Quantity(NamedTuple):
     long_name: str
     equation: str = ""
     frame: str = ""
-    booked: Energy | None = None
+    energy_term: Energy | None = None
 
     @property
     def attributes(self) -> dict[str, str]:
         """Unit, name, frame and equation, and its part in the account."""
         found = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
-        if self.booked is not None:
-            found |= {"account": self.booked.kind, "label": self.booked.label}
+        if self.energy_term is not None:
+            found |= {"account": self.energy_term.kind, "label": self.energy_term.label}
         return found | {"equation": f"({self.equation})"} if self.equation else found

@@ -43,37 +43,37 @@ class Setup:
         scenario: The scenario.
         loop: Finger, controller and reference, with what is sampled for this one motion.
         method: The integrator; not the scenario's where its controller is Python and acts continuously.
-        answers: The controller itself, where the loop samples it.
+        controller: The controller itself, where the loop samples it.
         sampled: Its sampled controller, if it has one.
         control: Inputs that are compiled; None where they are sampled or Python.
-        judged: Whether the error of its motion will be asked for.
+        estimate_error: Whether the error of its motion will be asked for.
     """
 
     scenario: Scenario
     loop: ClosedLoop
     method: str
-    answers: LoopController
+    controller: LoopController
     sampled: SampledController | None
     control: InputTable | None = None
-    judged: bool = True
+    estimate_error: bool = True
 
     @classmethod
     def of(
         cls,
         scenario: Scenario,
         loop: ClosedLoop | None = None,
-        own: str = "",
+        custom: str = "",
         control_period: float | None = None,
-        judged: bool = True,
+        estimate_error: bool = True,
     ) -> Setup:
         """Make a scenario ready.
 
         Args:
             scenario: The scenario to simulate.
             loop: Its loop, where something in it is a user's own.
-            own: Names of the parts given in place of the scenario's, from `own_parts`.
+            custom: Names of the parts given in place of the scenario's, from `custom_parts`.
             control_period: As for `simulate`.
-            judged: Whether the error of its motion will be asked for, which takes a tenth of its time.
+            estimate_error: Whether the error of its motion will be asked for, which takes a tenth of its time.
 
         Raises:
             InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
@@ -102,7 +102,7 @@ class Setup:
             method = _CONTINUOUS
         if scenario.simulation.method not in METHODS_IN_NUMPY:
             loop = loop.compiled()
-        answers = loop.controller
+        controller = loop.controller
         sampled = None if sampling is None else SampledController(loop, sampling)
         if positioned:
             duration, start = scenario.simulation.duration, scenario.simulation.start_time
@@ -112,10 +112,10 @@ class Setup:
             loop = replace(loop, drives=drives)
         if sampled is not None:
             loop = replace(loop, controller=sampled)
-        elif own:
+        elif custom:
             # A wrong answer of a user's own controller is refused before anything is computed.
             loop.evaluate(0.0, loop.initial_state())
-        return cls(scenario, loop, method, answers, sampled, control, judged)
+        return cls(scenario, loop, method, controller, sampled, control, estimate_error)
 
     def integrate(
         self,
@@ -193,7 +193,7 @@ class Setup:
             rtol=given.rtol,
             atol_scale=given.atol_scale,
             # Of controllers that are sampled the linearised flow knows nothing.
-            estimate_error=self.judged and self.sampled is None and loop.drives is None,
+            estimate_error=self.estimate_error and self.sampled is None and loop.drives is None,
         )
 
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:
@@ -203,9 +203,9 @@ class Setup:
             trajectory: One that failed.
             slow: Cause of its slowness, if that is known.
         """
-        answers, settings = self.answers, self.scenario.simulation
-        if answers.problem_time >= trajectory.breakpoints[-1]:
-            return answers.problem, "another controller"
+        controller, settings = self.controller, self.scenario.simulation
+        if controller.problem_time >= trajectory.breakpoints[-1]:
+            return controller.problem, "another controller"
         advice = _ADVICE_TIGHT if min(settings.rtol, settings.atol_scale) < _TIGHT else ADVICE
         if "physical range" in trajectory.failure:
             advice = _ADVICE_RUNAWAY

@@ -15,7 +15,7 @@ from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.references.reference import Reference
-from finger_pin.simulation.initial_state import own_parts, packed_state
+from finger_pin.simulation.initial_state import custom_parts, packed_state
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.simulation.running import interruptible, run
 
@@ -89,7 +89,7 @@ def simulate(
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
         if loop.palm is not None and loop.start is not None:
-            loop.palm.put(loop.finger, loop.start)
-    own = own_parts(controls, reference, fingertip_force, initial, given)
+            loop.palm.place_world(loop.finger, loop.start)
+    custom = custom_parts(controls, reference, fingertip_force, initial, given)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
-    return interruptible(lambda asked: run(scenario, loop, own, control_period, progress, observe, asked), stop)
+    return interruptible(lambda asked: run(scenario, loop, custom, control_period, progress, observe, asked), stop)

@@ -25,7 +25,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
-from finger_pin.simulation.initial_state import check_motors, numbers
+from finger_pin.simulation.initial_state import as_finite_array, check_motors
 from finger_pin.simulation.step_log import StepLog
 from finger_pin.typing import Array
 
@@ -79,7 +79,7 @@ class Simulator:
         self._build(as_finger(finger))
         self._posture = 0.5 * (self.finger.stroke_limiter.lower + self.finger.stroke_limiter.upper)
         if position is not None:
-            self._posture = numbers("position", position, self._posture.shape)
+            self._posture = as_finite_array("position", position, self._posture.shape)
         self._begin(self._at(self._posture), 0.0)
 
     def __repr__(self) -> str:
@@ -108,7 +108,7 @@ class Simulator:
         """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
         finger, x = self.finger, self.finger.rest_state(position)
         if self._palm is not None:
-            x = self._palm.put(finger, x)
+            x = self._palm.place_world(finger, x)
         if self._guides is not None:
             x = self._guides.place(finger, x)
         if finger.scene is not None:
@@ -141,9 +141,9 @@ class Simulator:
         if initial is None:
             x = self._at(self._posture)
         elif np.shape(initial) == self._posture.shape:
-            x = self._at(numbers("initial", initial, self._posture.shape))
+            x = self._at(as_finite_array("initial", initial, self._posture.shape))
         else:
-            x = numbers("initial", initial, (self.finger.layout.size,))
+            x = as_finite_array("initial", initial, (self.finger.layout.size,))
             check_motors(self.finger, x)
         self._begin(x, 0.0)
         return self.state
@@ -184,7 +184,7 @@ class Simulator:
 
     @x.setter
     def x(self, value: ArrayLike) -> None:
-        x = numbers("x", value, (self.finger.layout.size,))
+        x = as_finite_array("x", value, (self.finger.layout.size,))
         check_motors(self.finger, x, "x")
         self._stepper.restart(x)
         self._log = StepLog(self._stepper)
@@ -215,13 +215,13 @@ class Simulator:
         return self._reached(status)
 
     def _checked(self, inputs: ArrayLike, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
-        command, force = numbers("inputs", inputs, self._tension.shape), self._unloaded
+        command, force = as_finite_array("inputs", inputs, self._tension.shape), self._unloaded
         if min(command.tolist(), default=0.0) < 0.0 and (command[self._pulling] < 0.0).any():
             raise InputError("inputs", "a tension must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
         if fingertip_force is not None:
-            force = numbers("fingertip_force", fingertip_force, force.shape)
+            force = as_finite_array("fingertip_force", fingertip_force, force.shape)
         return command, force
 
     def _hold(self, command: Array, force: Array) -> None:
@@ -240,7 +240,7 @@ class Simulator:
         """Return the Dataset of all steps so far, as `simulate` does: for figures, the viewer and `save`.
 
         The record begins at the start, or where `x` was last set. It takes about as long as the steps did: they are
-        kept as what was held during them, and repeated bit by bit. The attribute ``own`` marks the result.
+        kept as what was held during them, and repeated bit by bit. The attribute ``custom`` marks the result.
 
         Args:
             sample_rate: Of the signals, Hz.

@@ -118,7 +118,7 @@ class StepLog:
         near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]
         times = np.where(np.abs(near - times) < _SAME, near, times)
         result = record(scenario, SampledTrajectory(loop, trajectory, times), str(settings["method"]))
-        result.attrs["own"] = "loop"
+        result.attrs["custom"] = "loop"
         if trajectory.failure:
             reached = float(trajectory.breakpoints[-1])
             raise IntegrationError(reached, trajectory.failure, "fewer steps", result)

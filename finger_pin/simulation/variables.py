@@ -169,7 +169,7 @@ def _more(loop: ClosedLoop) -> dict[str, Quantity]:
         name: Quantity(dims, partial(_contact, name), units, text)
         for name, (dims, units, text) in contact_variables(loop.finger).items()
     }
-    return table | _of_further(loop.finger.further) | _of_account(loop)
+    return table | _of_further(loop.finger.extra_rows) | _of_account(loop)
 
 
 def _contact(name: str, of: SampledTrajectory) -> Array:
@@ -311,14 +311,14 @@ def _of_account(loop: ClosedLoop) -> dict[str, Quantity]:
     table = {}
     for each in stores(loop.finger):
         table[f"energy_{each.name}"] = Quantity(
-            _TIME, partial(stored, name=each.name), "J", f"energy stored: {each.label}", booked=each
+            _TIME, partial(stored, name=each.name), "J", f"energy stored: {each.label}", energy_term=each
         )
     # What comes in before what is lost.
     for each in sorted(flows(loop.finger.mechanism.energies), key=lambda each: each.kind == LOST):
         name, text = each.name, f"{each.kind}: {each.label}"
-        table[f"power_{name}"] = Quantity(_TIME, partial(power, name=name), "W", f"power {text}", booked=each)
+        table[f"power_{name}"] = Quantity(_TIME, partial(power, name=name), "W", f"power {text}", energy_term=each)
         table[f"energy_exchanged_{name}"] = Quantity(
-            _TIME, partial(work, name=name), "J", f"energy {text}", booked=each
+            _TIME, partial(work, name=name), "J", f"energy {text}", energy_term=each
         )
     text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
     table[RESIDUAL] = Quantity(_TIME, lambda of: of.account.residual, "J", text)
@@ -334,7 +334,7 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
         "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
         "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
     }
-    found |= {table.group: list(table.names) for table in finger.further} | contact_coordinates(finger)
+    found |= {table.group: list(table.names) for table in finger.extra_rows} | contact_coordinates(finger)
     found |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
         found["finger"] = list(scenario.hand.fingers)

@@ -14,7 +14,7 @@ from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
 from finger_pin.simulation.accuracy import NOT_JUDGED
 from finger_pin.simulation.energy import entries
-from finger_pin.simulation.recording import is_tracking
+from finger_pin.simulation.recording import custom_of, is_tracking
 from finger_pin.typing import Array
 
 _SETTLING = 1.0
@@ -57,8 +57,8 @@ def _head(result: xr.Dataset) -> list[str]:
 
 
 def _own(result: xr.Dataset) -> list[str]:
-    own = result.attrs.get("own")
-    return [f"Not what the scenario alone gives: {own} of one's own"] if own else []
+    custom = custom_of(result)
+    return [f"Not what the scenario alone gives: {custom} of one's own"] if custom else []
 
 
 def _warnings(result: xr.Dataset) -> list[str]:

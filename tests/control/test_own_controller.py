@@ -159,7 +159,7 @@ def test_a_wrong_reference_is_refused_in_one_line(reference, said):
 def test_a_result_of_one_s_own_controller_says_so_and_its_folder_promises_no_repetition(tmp_path):
     given = {"controller": fixed(PULL), "reference": Path([0.0, 0.5, 0.5, 0.346])}
     result, plain = fp.simulate(scenario(), **given), fp.simulate(scenario())
-    assert result.attrs["own"] == "controller, reference" and "own" not in plain.attrs
+    assert result.attrs["custom"] == "controller, reference" and "custom" not in plain.attrs
     assert "Not what the scenario alone gives: controller, reference" in summarize(result)
     assert "alone gives" not in summarize(plain)
     for run, promised in ((plain, True), (result, False), (plain, True)):

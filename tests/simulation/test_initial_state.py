@@ -27,7 +27,7 @@ def test_joints_start_where_the_scenario_says_and_the_others_on_their_reference(
     # Both halves of T5 alike: p = (r35 theta3 + r45 theta4) / 2, and its mass moves so that they stay alike.
     assert float(result.passive_position[0]) == pytest.approx(0.5 * (3.5e-3 * reference[2] + 5e-3 * 0.2), rel=1e-12)
     assert float(result.passive_velocity[0]) == pytest.approx(0.5 * (3.5e-3 * -1.0 + 5e-3 * 0.5), rel=1e-12)
-    assert "own" not in result.attrs
+    assert "custom" not in result.attrs
 
 
 def test_a_scenario_with_a_start_is_written_and_read_back(tmp_path):
@@ -48,7 +48,7 @@ def test_a_packed_state_is_where_the_run_starts():
         )
     np.testing.assert_allclose(result.tendon_stiction[0], state.tendon_stiction)
     assert float(result.passive_position[0]) == pytest.approx(state.passive_position[0])
-    assert result.attrs["own"] == "initial state"
+    assert result.attrs["custom"] == "initial state"
 
 
 def test_a_run_continued_from_a_result_is_the_run_that_did_not_stop():

@@ -36,7 +36,7 @@ def test_held_tensions_give_the_dataset_of_an_open_loop_scenario(finger: fp.Fing
         simulator.step(TENSION, 1e-3)
     found = simulator.result()
     assert list(found.variables) == list(expected.variables)
-    assert set(found.attrs) == {*expected.attrs, "own"} - {"estimated_error"}
+    assert set(found.attrs) == {*expected.attrs, "custom"} - {"estimated_error"}
     for name, variable in expected.variables.items():
         assert found[name].dims == variable.dims
         assert found[name].attrs == variable.attrs
@@ -88,7 +88,7 @@ def test_a_copy_keeps_its_result_when_the_other_one_is_given_other_numbers(finge
 def test_a_result_is_marked_and_drawn_and_saved_like_any_other(finger: fp.Finger, tmp_path: Path) -> None:
     reference = (np.array([0.0, 1.0]), np.array([START[:3], START[:3] + 0.1]))
     result = pushed(fp.Simulator(finger, START), 10, seed=5).result(reference=reference)
-    assert result.attrs["own"] == "loop"
+    assert result.attrs["custom"] == "loop"
     np.testing.assert_allclose(result.joint_reference[-1, :3], START[:3] + 0.1 * 0.02, atol=1e-4)
     with ResultFolder(tmp_path / "run") as folder:
         folder.write(result)

@@ -151,7 +151,7 @@ class Charts:
     size: int
 
     @classmethod
-    @memoised(lambda cls, mechanism: (mechanism.body.form, mechanism.coordinates, mechanism.state_count))
+    @memoised(lambda cls, mechanism: (mechanism.body.topology, mechanism.coordinates, mechanism.state_count))
     def of(cls, mechanism: Mechanism) -> Charts:
         """Read a mechanism."""
         model, width = mechanism.body.model, mechanism.coordinates

@@ -44,8 +44,8 @@ class States(NamedTuple):
         column: The first column of the table that is wanted.
         torques: Filled with the sum of A^T phi, shape (m, N), or (0, N) if only rows are wanted.
         externals: Filled with J^T F, likewise.
-        booked: Filled with energies and powers, shape (m, energies) or (0, energies); the last is that of a base that
-            moves.
+        energy_terms: Filled with energies and powers, shape (m, energies) or (0, energies); the last is that of a base
+            that moves.
         bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
             (m, 15 + g), or (0, 15 + g) at rest.
         attitudes: Quaternions of free bodies, shape (m, f, 4).
@@ -63,7 +63,7 @@ class States(NamedTuple):
     column: int
     torques: Matrix
     externals: Matrix
-    booked: Matrix
+    energy_terms: Matrix
     bases: Matrix
     attitudes: Layers
     touches: Layers
@@ -97,7 +97,7 @@ STATES, MOTIONS = StructType(States), StructType(Motions)
 
 
 @njit_inline
-def book(tables: Tables, work: Work, totals: Vector) -> None:
+def fill_energy_terms(tables: Tables, work: Work, totals: Vector) -> None:
     """Sum up stored energies and powers of all rows after an evaluation."""
     for c in range(totals.size):
         totals[c] = 0.0
@@ -185,16 +185,16 @@ def _keep(many: States, model: Model, m: int) -> None:
                 rows[c, many.first + m, k] = work.rows[many.column + c, k]
     if many.touches.shape[0] > 0 and tables.contact_rows:
         _touch(tables.paths, work, many.touches[m])
-    if many.booked.shape[0] > 0:
+    if many.energy_terms.shape[0] > 0:
         for j in range(many.torques.shape[1]):
             many.torques[m, j] = work.torque[j]
             many.externals[m, j] = work.external[j]
-        book(tables, work, many.booked[m])
-        book_moved(model, many.model, many.bases.shape[0] > 0, many.booked[m])
+        fill_energy_terms(tables, work, many.energy_terms[m])
+        fill_base_power(model, many.model, many.bases.shape[0] > 0, many.energy_terms[m])
 
 
 @njit_inline
-def book_moved(model: Model, address: int, moving: bool, totals: Vector) -> None:
+def fill_base_power(model: Model, address: int, moving: bool, totals: Vector) -> None:
     """Record the power of a moving base or of prescribed coordinates after an evaluation."""
     work, width, last = model.work, model.work.torque.size, totals.size - 1
     if model.base_power != 0 and moving:

@@ -89,8 +89,9 @@ class IslandMotion:
 
         def fill(thread: int) -> None:
             own = slice(thread * count // parts, (thread + 1) * count // parts)
-            between, booked = self._between(np.array(times[own])), np.zeros(len(energies.stored) + len(energies.powers))
-            call(power_many, Powers(self._models[thread].address, between, booked, found[own]), POWERS)
+            between = self._between(np.array(times[own]))
+            energy_terms = np.zeros(len(energies.stored) + len(energies.powers))
+            call(power_many, Powers(self._models[thread].address, between, energy_terms, found[own]), POWERS)
 
         in_threads(fill, range(parts))
         return found

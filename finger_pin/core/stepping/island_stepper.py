@@ -111,7 +111,7 @@ class IslandIntegrator:
         # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
         self.work = build_work(tables, laws, len(control.tension))
         self.model = BoundModel(tables, control, self.work)
-        of_objects, led = object_coordinates(tables), tables.prescribed[: len(tables.parents)] < 0
+        of_objects, free = object_coordinates(tables), tables.prescribed[: len(tables.parents)] < 0
         self._bound = core.Integration(
             model=self.model.address,
             tableau=tableau,
@@ -127,8 +127,8 @@ class IslandIntegrator:
             dense=np.zeros((len(tableau.dense), len(x))),
             global_error=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
-            joints=np.flatnonzero(~of_objects & led & estimate_error),
-            objects=np.flatnonzero(of_objects & led & estimate_error),
+            joints=np.flatnonzero(~of_objects & free & estimate_error),
+            objects=np.flatnonzero(of_objects & free & estimate_error),
             cut=cut_step.address,
             detect_missed_contacts=find_missed_contacts.address if tables.contact_rows else 0,
             propagate_error=propagate_error.address if estimate_error else 0,

@@ -8,7 +8,7 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.inputs import inputs
-from finger_pin.core.evaluation.signals import book, book_moved, exert_alone
+from finger_pin.core.evaluation.signals import exert_alone, fill_base_power, fill_energy_terms
 from finger_pin.core.jit import (
     CompiledFunction,
     Matrix,
@@ -30,13 +30,13 @@ class Powers(NamedTuple):
     Attributes:
         model: Address of a bound `Model` with the island's inputs.
         between: The steps, of which there must be one.
-        booked: Scratch, energies and powers of the rows, shape (energies,).
+        energy_terms: Scratch, energies and powers of the rows, shape (energies,).
         powers: Filled with the powers, and that of the forces at the tips, shape (k, powers + 1).
     """
 
     model: int
     between: Between
-    booked: Vector
+    energy_terms: Vector
     powers: Matrix
 
 
@@ -50,11 +50,11 @@ def _attitude(b: Any, step: int) -> Any:
 
 
 @njit_always_inline
-def _keep(tables: Tables, work: Work, state: Vector, booked: Any, out: Vector) -> None:
+def _keep(tables: Tables, work: Work, state: Vector, energy_terms: Any, out: Vector) -> None:
     """Fill the powers of the rows and of the forces at the tips."""
     count, width = out.size - 1, work.torque.size
     for i in range(count):
-        out[i] = booked[booked.size - count + i]
+        out[i] = energy_terms[energy_terms.size - count + i]
     out[count] = 0.0
     if tables.has_tip_force:
         for j in range(tables.parents.size):
@@ -84,10 +84,10 @@ def power_many(address: int, _time: float) -> int:
                 activate_since(tables, work, _attitude(b, last), _attitude(b, step), model.rate, state)
             inputs(model.control, time, state[:width], state[width : 2 * width], work.command)
             exert_alone(model, asked.model, time)
-        book(tables, work, asked.booked)
+        fill_energy_terms(tables, work, asked.energy_terms)
         if moving:
-            book_moved(model, asked.model, True, asked.booked)
+            fill_base_power(model, asked.model, True, asked.energy_terms)
         elif tables.contact_rows > 0:
             cull_distant(tables, work, state, model.rate)
-        _keep(tables, work, state, asked.booked, asked.powers[k])
+        _keep(tables, work, state, asked.energy_terms, asked.powers[k])
     return 1
