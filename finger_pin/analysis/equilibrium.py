@@ -74,10 +74,8 @@ def equilibrium(
     """
     finger = as_finger(finger)
     _refuse_restless(finger)
-    layout, actuated = finger.layout, finger.routing.actuated
     command = finger.packed_inputs(inputs)
-    tense = ~finger.routing.winched
-    if np.any(command[:actuated][tense] < 0.0):
+    if np.any(command[: finger.routing.actuated][~finger.routing.winched] < 0.0):
         raise InputError("inputs", "a tension must not be negative", command.tolist())
     pushed = np.array(finite_vector("fingertip_force", fingertip_force, 3))
     joints = len(finger.routing.joints)
@@ -87,52 +85,86 @@ def equilibrium(
         if position is None
         else np.array(finite_vector("position", position, joints))
     )
-    rest = finger.rest_state(start)
-    held = layout.unpack(rest).actuator_state
-    for table in finger.mechanism.rows:
-        if table.group in (STATEFUL, MUSCLES):
-            # What comes late has come; the input's limits are those of an activation as well.
-            limits = [4, 5, -2, -1] if table.group == STATEFUL else [-2, -1, -2, -1]
-            least, most, lowest, highest = table.parameters[limits]
-            held[: table.count] = np.clip(np.clip(command[table.channels], least, most), lowest, highest)
-            held = held[table.count :]
+    problem = _Statics.of(finger, command, pushed, start)
+    y = problem.start
+    begun = float(np.max(np.abs(problem.acceleration(y))))
+    if begun >= _REST:
+        y = _downhill(problem.energy, problem.slope, problem.acceleration, y)
+    if not float(np.max(np.abs(problem.acceleration(y)))) < max(_REST, 1e-9 * begun):
+        raise InputError("inputs", "the finger comes to no rest under it", command.tolist())
+    places, x = problem.scale * y, problem.packed(y)
+    torque = finger.evaluate(x, command, pushed).tendon_torque
+    return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)
 
-    def placed(places: Array) -> Array:
-        x = rest.copy()
-        state = layout.unpack(x)
+
+@dataclass(frozen=True, eq=False)
+class _Statics:
+    """Energy and acceleration of a finger at rest under constant inputs, over places y in parts of their scales.
+
+    Attributes:
+        finger: The finger.
+        command: Its inputs, shape (u,).
+        pushed: F, shape (3,), N.
+        rest: The packed state at the start, with actuators that have settled.
+        scale: Of joints and passive tendons, shape (k,), rad and m.
+    """
+
+    finger: Finger
+    command: Array
+    pushed: Array
+    rest: Array
+    scale: Array
+
+    @classmethod
+    def of(cls, finger: Finger, command: Array, pushed: Array, position: Array) -> _Statics:
+        """Return the problem that starts at a posture, shape (n,)."""
+        rest, passive = finger.rest_state(position), finger.routing.passive
+        held = finger.layout.unpack(rest).actuator_state
+        for table in finger.mechanism.rows:
+            if table.group in (STATEFUL, MUSCLES):
+                # What comes late has come; the input's limits are those of an activation as well.
+                limits = [4, 5, -2, -1] if table.group == STATEFUL else [-2, -1, -2, -1]
+                least, most, lowest, highest = table.parameters[limits]
+                held[: table.count] = np.clip(np.clip(command[table.channels], least, most), lowest, highest)
+                held = held[table.count :]
+        return cls(finger, command, pushed, rest, np.concatenate([np.ones(len(position)), np.full(passive, 1e-3)]))
+
+    @property
+    def start(self) -> Array:
+        """The places at the start, shape (k,)."""
+        state = self.finger.layout.unpack(self.rest)
+        return np.asarray(np.concatenate([state.position, state.passive_position]) / self.scale)
+
+    def packed(self, y: Array) -> Array:
+        """Return the packed state at rest there."""
+        x, joints, places = self.rest.copy(), len(self.finger.routing.joints), self.scale * y
+        state = self.finger.layout.unpack(x)
         state.position[:], state.passive_position[:] = places[:joints], places[joints:]
         return x
 
-    def energy(y: Array) -> float:
-        theta = (scale * y)[:joints]
-        found = finger.evaluate(placed(scale * y), command, pushed)
+    def energy(self, y: Array) -> float:
+        """Return what is stored less what inputs and force have given, J."""
+        finger, joints, actuated = self.finger, len(self.finger.routing.joints), self.finger.routing.actuated
+        theta = (self.scale * y)[:joints]
+        found = finger.evaluate(self.packed(y), self.command, self.pushed)
         stored, _ = found.mechanism.account()
         raised = finger.motion(theta, np.zeros(joints)).potential_energy
-        given = (tense * found.tendons.entering[:actuated]) @ finger.excursion(theta)
-        given += pushed @ finger.rigid_body.tip_position(theta) + _given_by_actuators(found)
+        given = (~finger.routing.winched * found.tendons.entering[:actuated]) @ finger.excursion(theta)
+        given += self.pushed @ finger.rigid_body.tip_position(theta) + _given_by_actuators(found)
         return float(sum(stored.values()) + raised - given)
 
-    def acceleration(y: Array) -> Array:
-        rates = layout.unpack(finger.rhs(0.0, placed(scale * y), command, pushed))
-        return np.asarray(np.concatenate([rates.velocity, rates.passive_velocity]) / scale)
+    def acceleration(self, y: Array) -> Array:
+        """Return the acceleration from rest there, shape (k,)."""
+        rates = self.finger.layout.unpack(self.finger.rhs(0.0, self.packed(y), self.command, self.pushed))
+        return np.asarray(np.concatenate([rates.velocity, rates.passive_velocity]) / self.scale)
 
-    def slope(y: Array) -> Array:
+    def slope(self, y: Array) -> Array:
+        """Return the derivative of the energy, shape (k,), with the digits that light joints need."""
+        body, scale = self.finger.rigid_body, self.scale
         inertia = scipy.linalg.block_diag(
-            finger.rigid_body.mass_matrix((scale * y)[:joints]), np.diag(finger.tendons.mass)
+            body.mass_matrix((scale * y)[: len(self.finger.routing.joints)]), np.diag(self.finger.tendons.mass)
         )
-        return np.asarray(-scale * (inertia @ (scale * acceleration(y))))
-
-    state = layout.unpack(rest)
-    places = np.concatenate([state.position, state.passive_position])
-    scale = np.concatenate([np.ones(joints), np.full(len(places) - joints, 1e-3)])
-    begun = float(np.max(np.abs(acceleration(places / scale))))
-    y = places / scale if begun < _REST else _downhill(energy, slope, acceleration, places / scale)
-    if not float(np.max(np.abs(acceleration(y)))) < max(_REST, 1e-9 * begun):
-        raise InputError("inputs", "the finger comes to no rest under it", command.tolist())
-    places = scale * y
-    x = placed(places)
-    torque = finger.evaluate(x, command, pushed).tendon_torque
-    return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)
+        return np.asarray(-scale * (inertia @ (scale * self.acceleration(y))))
 
 
 def _refuse_restless(finger: Finger) -> None:

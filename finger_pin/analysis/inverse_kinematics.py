@@ -121,12 +121,21 @@ def inverse_kinematics(
         near_enough = np.linalg.norm(misses(best.x)[: 3 + len(followers)]) < 0.01 * _THERE
         if near_enough and np.linalg.norm(held(moved @ best.x)[0]) < 0.01 * _THERE:
             break
-    theta = min(found, key=lambda each: each[0])[1]
+    theta = _onto_couplings(min(found, key=lambda each: each[0])[1], held, low, high)
+    tip = np.asarray(body.tip_position(theta))
+    return TipPosture(theta, tip, float(np.linalg.norm(tip - target)))
+
+
+def _onto_couplings(theta: Array, held: Callable[[Array], tuple[Array, Array]], low: Array, high: Array) -> Array:
+    """Return the posture within the ranges that keeps to a tree's couplings and loops, next to one that nearly does.
+
+    Raises:
+        InputError: If there is none.
+    """
     for _ in range(_LAST_STEPS):
         off, by_theta = held(theta)
         if off.size:
             theta = np.clip(theta - np.linalg.pinv(by_theta) @ off, low, high)
     if held(theta)[0].size and np.linalg.norm(held(theta)[0]) > _THERE:
         raise InputError("finger.tree", "no posture within the joints' ranges keeps to its couplings and loops")
-    tip = np.asarray(body.tip_position(theta))
-    return TipPosture(theta, tip, float(np.linalg.norm(tip - target)))
+    return theta

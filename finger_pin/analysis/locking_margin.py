@@ -17,7 +17,7 @@ from finger_pin.description.validation import expand
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.references.reference import LoopReference, SignalReference
-from finger_pin.typing import Array
+from finger_pin.typing import Array, Indices
 
 #: Below this margin a simulation warns: friction then multiplies tensions about sixfold.
 CLOSE_TO_LOCKING = 1.2
@@ -87,11 +87,7 @@ def self_locking_margin(
     # What stands still but for rounding does not move.
     speed = np.where(np.abs(motion.velocity) > 1e-12, motion.velocity, 0.0)
     directions = np.sign(np.hstack([speed, sliding_velocity(tendons, speed)]))
-    bend = (np.abs(motion.position) @ routing.curvature_matrix.T).sum(axis=1)
-    # Ordered by directions, then by bend: the first and the last of every combination.
-    order = np.lexsort((bend, *directions.T))
-    steps = np.flatnonzero(np.any(np.diff(directions[order], axis=0) != 0.0, axis=1))
-    chosen = order[np.unique(np.concatenate([[0], steps, steps + 1, [samples - 1]]))]
+    chosen = _extremes(directions, (np.abs(motion.position) @ routing.curvature_matrix.T).sum(axis=1))
     signs, sliding = directions[chosen, :size], directions[chosen, size:]
     weights = signs * expand(scenario.finger.joint_friction.break_away, size)
     gain = expand(scenario.controller.gain, size)
@@ -110,6 +106,14 @@ def self_locking_margin(
     worst = int(np.argmin(kappa))
     where = chosen[worst]
     return SelfLockingMargin(float(kappa[worst]), float(times[where]), motion.position[where], signs[worst])
+
+
+def _extremes(directions: Array, bend: Array) -> Indices:
+    """Return the samples, one or two for every combination of directions, (m, k), with its least and greatest bend."""
+    # Ordered by directions, then by bend: the first and the last of every combination.
+    order = np.lexsort((bend, *directions.T))
+    steps = np.flatnonzero(np.any(np.diff(directions[order], axis=0) != 0.0, axis=1))
+    return np.asarray(order[np.unique(np.concatenate([[0], steps, steps + 1, [len(order) - 1]]))])
 
 
 def _within_reach(

@@ -45,6 +45,9 @@ _Constraint = Annotated[
         help="NAME>=VALUE or NAME<=VALUE; repeatable; default self_locking_margin>=1.5 and fingertip_force>=0.8.",
     ),
 ]
+_Output = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Where results go; default results/optimise-<scenario, goals>.")
+]
 
 
 def optimise(
@@ -58,9 +61,7 @@ def optimise(
     generations: Annotated[int | None, typer.Option(metavar="N", help="Default 20.")] = None,
     seed: Annotated[int | None, typer.Option(metavar="S", help="Of the search; default 0.")] = None,
     settings: Settings = [],  # noqa: B006
-    output: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Where results go; default results/optimise-<scenario, goals>.")
-    ] = None,
+    output: _Output = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     restart: Restart = False,
@@ -87,10 +88,9 @@ def optimise(
     from finger_pin.studies import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
     from finger_pin.studies.keys import BaseScenario
 
-    name = BaseScenario.load(scenario, changed).scenario.name
-    goals = [*over, *minimise, *(f"max.{each}" for each in maximise), *constraint]
-    goals += ["no-constraints"] * no_constraints + [f"{name}={value}" for name, value in effort.items()]
-    folder = output or Path("results", folder_name(f"optimise-{name}", *settings, *goals))
+    goals = [*over, *minimise, *(f"max.{each}" for each in maximise), *constraint, *["no-constraints"] * no_constraints]
+    study = f"optimise-{BaseScenario.load(scenario, changed).scenario.name}"
+    folder = output or Path("results", folder_name(study, *settings, *goals, *(f"{k}={v}" for k, v in effort.items())))
 
     def run(progress: Progress | None, stop: Stop) -> xr.Dataset:
         with crew as executor:
@@ -109,7 +109,11 @@ def optimise(
                 stop=stop,
             )
 
-    result = conduct("search", run, summary, "pareto", folder, figures=figures, format=format, quiet=quiet)
+    _require_feasible(conduct("search", run, summary, "pareto", folder, figures=figures, format=format, quiet=quiet))
+
+
+def _require_feasible(result: xr.Dataset) -> None:
+    """Raise unless a design keeps all constraints."""
     if not result["feasible"].any():
         raise Unsuccessful("no design keeps all constraints")
 

@@ -75,8 +75,7 @@ def sweep(
     sweep fig6 --design latin --samples 50 --over controller.gain=0.5:2 --over finger.tendon_friction.coulomb=0.02:0.3
     """
     if listed:
-        print_text(listing())
-        return
+        return print_text(listing())
     _check(design, over, samples, seed)
     changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.exceptions import StudyError
@@ -104,12 +103,15 @@ def sweep(
                     stop=stop,
                 )
             except StudyError as error:
-                # The summary says why runs failed.
-                return error.result
+                return error.result  # the summary says why runs failed
 
-    result = conduct(
-        "sweep", run, summary, "sweep", folder, figures=figures, format=format, quiet=quiet, unfinished=misses
+    _require_done(
+        conduct("sweep", run, summary, "sweep", folder, figures=figures, format=format, quiet=quiet, unfinished=misses)
     )
+
+
+def _require_done(result: xr.Dataset) -> None:
+    """Raise if every run failed."""
     if (result["status"] == "failed").all():
         raise Unsuccessful(f"every run failed; the first one: {result['reason'].values.flat[0]}")
 

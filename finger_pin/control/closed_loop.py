@@ -108,15 +108,7 @@ class ClosedLoop:
         """
         start, acting = scenario.simulation.start_time, scenario.environments()
         finger = finger or _finger(scenario)
-        for kind, own, described in (
-            ("joints", finger.routing.joints, scenario.finger.joints),
-            ("tendons", finger.routing.tendons, scenario.finger.tendons),
-        ):
-            if own != tuple(described):
-                raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(own))
-        for name, winched in zip(finger.routing.tendons, finger.routing.winched, strict=False):
-            if winched != (scenario.finger.tendons[name].winch is not None):
-                raise InputError(f"finger.tendons.{name}.winch", "must be that of the scenario's finger")
+        _refuse_other(finger, scenario)
         alone = len(acting) == 1
         loop = cls(
             finger=finger,
@@ -157,6 +149,10 @@ class ClosedLoop:
         if self.palm is not None:
             return self.palm.place_world(self.finger, x)
         return x if self.guides is None else self.guides.place(self.finger, x)
+
+    def started(self, x: Array) -> ClosedLoop:
+        """Return the same loop that starts at a packed state; a palm on a path has the world where it is then."""
+        return replace(self, start=x if self.palm is None else self.palm.place_world(self.finger, x))
 
     def compiled(self) -> ClosedLoop:
         """Return the same loop on the compiled core."""
@@ -249,6 +245,19 @@ class ClosedLoop:
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""
         return self.evaluate(time, x).finger.rate
+
+
+def _refuse_other(finger: Finger, scenario: Scenario) -> None:
+    """Refuse a finger that has other joints, tendons or winches than a scenario's."""
+    for kind, own, described in (
+        ("joints", finger.routing.joints, scenario.finger.joints),
+        ("tendons", finger.routing.tendons, scenario.finger.tendons),
+    ):
+        if own != tuple(described):
+            raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(own))
+    for name, winched in zip(finger.routing.tendons, finger.routing.winched, strict=False):
+        if winched != (scenario.finger.tendons[name].winch is not None):
+            raise InputError(f"finger.tendons.{name}.winch", "must be that of the scenario's finger")
 
 
 def compiled_control(loop: ClosedLoop) -> InputTable | None:

@@ -85,8 +85,7 @@ def to_mjcf(
             stretched alike; all joints at zero by default.
         timestep: Of MuJoCo, s; by default a step that the lumped masses are stable with.
         integrator: One of MuJoCo's.
-        massless: Replace each passive tendon by one spring K_t without a mass (5): coarser, but with time steps of
-            0.1 ms instead of some microseconds.
+        massless: Replace each passive tendon by one spring K_t (5): coarser, with steps of 0.1 ms, not microseconds.
         shapes: Whether to write the shapes.
         friction: Whether to write law (9) of tendons and joints, with which the model loads only where
             `finger_pin.mujoco` has been imported.
@@ -105,23 +104,13 @@ def to_mjcf(
     if not step > 0.0:
         raise InputError("timestep", "must be above 0", timestep)
     root = ET.Element("mujoco", model=description.name)
-    notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
-    notes |= {"friction": _ROUGH, "rough": ""} if friction else {"friction": "", "rough": _SMOOTH}
-    springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
-    notes["held"] = _HELD if any(springs) or tendons.hysteresis.any() else ""
-    notes["servos"] = _SERVOS if description.actuators else ""
-    if tendons.routing.passive:
-        notes["passive"] = _MASSLESS if massless else _MASSIVE
-    root.append(ET.Comment(_NOTES.format(**notes).replace("--", "- -")))
+    root.append(ET.Comment(_notes(description, tendons, massless, friction)))
     ET.SubElement(root, "compiler", angle="radian", eulerseq="XYZ")
     option = {"timestep": _numbers(step), "gravity": _numbers(*description.gravity), "integrator": integrator}
     ET.SubElement(root, "option", option)
-    world = ET.SubElement(root, "worldbody")
     if shapes:
-        assets = ET.Element("asset")
-        for name, colour in MATERIALS.items():
-            ET.SubElement(assets, "material", name=name, rgba=_numbers(*colour))
-        root.insert(list(root).index(world), assets)
+        root.append(_materials())
+    world = ET.SubElement(root, "worldbody")
     if description.hand is not None:
         _add_hand(world, description.hand, shapes)
     else:
@@ -132,10 +121,29 @@ def to_mjcf(
     if friction:
         add_friction_elements(root, description, tendons, massless)
     passive = np.zeros(0) if massless else tendons.rest_position(position)
-    keyframe = ET.SubElement(root, "keyframe")
-    ET.SubElement(keyframe, "key", name="start", qpos=_numbers(*position, *passive))
+    ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="start", qpos=_numbers(*position, *passive))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _notes(description: FingerDescription, tendons: Tendons, massless: bool, friction: bool) -> str:
+    """Return the comment that says what of the description the model has and lacks."""
+    notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
+    notes |= {"friction": _ROUGH, "rough": ""} if friction else {"friction": "", "rough": _SMOOTH}
+    springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
+    notes["held"] = _HELD if any(springs) or tendons.hysteresis.any() else ""
+    notes["servos"] = _SERVOS if description.actuators else ""
+    if tendons.routing.passive:
+        notes["passive"] = _MASSLESS if massless else _MASSIVE
+    return _NOTES.format(**notes).replace("--", "- -")
+
+
+def _materials() -> ET.Element:
+    """Return the materials of the shapes."""
+    assets = ET.Element("asset")
+    for name, colour in MATERIALS.items():
+        ET.SubElement(assets, "material", name=name, rgba=_numbers(*colour))
+    return assets
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:

@@ -19,8 +19,9 @@ from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
+from finger_pin.simulation.row_variables import RESIDUAL
 from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory
-from finger_pin.simulation.variables import RESIDUAL, variables
+from finger_pin.simulation.variables import variables
 from finger_pin.typing import Array
 
 _NOTHING, _EVER = Statistics(0, 0, 0, 0, 0.0), np.array([np.inf])

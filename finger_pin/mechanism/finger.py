@@ -80,11 +80,7 @@ class Finger:
             self.rigid_body = rigid_body or build_rigid_body(description)
         else:
             self.rigid_body, self.paths = build_tree(description)
-        if len(self.rigid_body.joints) != len(description.joints):
-            raise InputError("finger.joints", f"the rigid body's joints are {', '.join(self.rigid_body.joints)}")
-        for name, joint in zip(self.rigid_body.joints, self.rigid_body.model.joints[1:], strict=True):
-            if joint.nv != 1:
-                raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
+        _check_joints(self.rigid_body, description)
         parts = Parts.of(description)
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self._excursions = Excursions(self.routing, description, self.paths)
@@ -112,17 +108,10 @@ class Finger:
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
         placed = None if self.paths is None else self.paths.placed
-        hand, tree = description.hand, description.tree
-        if tree is not None and tree.objects:
-            objects = {**tree.objects, **(objects or {})}
-        if objects is None and (description.touches_itself or (hand is not None and hand.fingers_touch)):
-            objects = {}
-        around = None if objects is None else Scene.of(objects, description, mechanism, placed)
-        self.scene = around
-        self.mechanism = mechanism if around is None else around.around(mechanism)
-        self.layout = state_layout(
-            self.tendons, self.joint_friction, self.actuators, last, around, before, canals.tables
-        )
+        self.scene = Scene.around(mechanism, objects, description, placed)
+        self.mechanism = mechanism if self.scene is None else self.scene.joined(mechanism)
+        layers = self.tendons, self.joint_friction, self.actuators
+        self.layout = state_layout(*layers, last, self.scene, before, canals.tables)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -330,6 +319,15 @@ class Finger:
     def rhs(self, time: float, x: Array, inputs: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for custom solvers; ``time`` is not used."""
         return self.mechanism.evaluate(x, inputs, fingertip_force).rate
+
+
+def _check_joints(body: RigidBody, description: FingerDescription) -> None:
+    """Refuse a rigid body whose joints are not those of a description, or that has one with several coordinates."""
+    if len(body.joints) != len(description.joints):
+        raise InputError("finger.joints", f"the rigid body's joints are {', '.join(body.joints)}")
+    for name, joint in zip(body.joints, body.model.joints[1:], strict=True):
+        if joint.nv != 1:
+            raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
 
 
 #: A hand is a finger whose joints form a tree.

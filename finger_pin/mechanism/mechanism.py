@@ -158,33 +158,12 @@ class Mechanism:
             base: Motion of the base, the numbers of `base_motion`, shape (12 or more,) or (m, 12 or more), at rest by
                 default; after `GUIDES` of them the accelerations of what is moved along paths, zero by default.
         """
-        q, v, z = self.split(x)
-        joints, turning = int(self.body.model.nv), q[..., : self.body.model.nq]
-        linear, lead = self.linear_positions(q), x.shape[:-1]
+        q, v, _ = self.split(x)
+        joints, turning, lead = int(self.body.model.nv), q[..., : self.body.model.nq], x.shape[:-1]
         forces = self._forces(force, lead)
-        pressed = bool(np.any(forces))
-        command = np.asarray(command, dtype=float)
-        found: dict[str, RowSignals] = {}
-        touching: list[tuple[Paths, Array]] = []
-        torque = np.zeros((*lead, self.coordinates))
-        for table, part in zip(self.rows, self.states, strict=True):
-            routed = self._routed(table, turning)
-            arm = table.arm + routed.arm
-            row: Any = table.law.sees(
-                linear @ table.measure.T + table.offset + routed.length,
-                (arm @ v[..., None])[..., 0],
-                z[..., part] if table.states else np.zeros((*lead, table.count)),
-                self._load(table, found, turning, forces, touching),
-                self._input(table, found, command, lead),
-                np.abs(linear) @ table.bends.T + table.curvature_offset + routed.turn,
-            )
-            exerted, rate, signals = table.law.act(row, table.parameters)
-            found[table.group] = RowSignals(table, row, exerted, rate, signals)
-            if table.law.arms > 1:
-                touching.append((table.paths[:: table.law.arms], _touching(exerted, routed.force, table.law.arms)))
-            torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
+        found, torque = self._rows(x, np.asarray(command, dtype=float), forces)
         external = np.zeros_like(torque)
-        if pressed:
+        if np.any(forces):
             external[..., :joints] = self.body.external_torque(turning, forces)
         net, power = torque + external, None
         if base is not None:
@@ -215,6 +194,31 @@ class Mechanism:
             prescribed_power=prescribed_power,
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
+
+    def _rows(self, x: Array, command: Array, forces: Array) -> tuple[dict[str, RowSignals], Array]:
+        """Return the signals of all tables under inputs and forces at tips, and the sum of A^T phi, shape (..., N)."""
+        q, v, z = self.split(x)
+        turning, linear, lead = q[..., : self.body.model.nq], self.linear_positions(q), x.shape[:-1]
+        found: dict[str, RowSignals] = {}
+        touching: list[tuple[Paths, Array]] = []
+        torque = np.zeros((*lead, self.coordinates))
+        for table, part in zip(self.rows, self.states, strict=True):
+            routed = self._routed(table, turning)
+            arm = table.arm + routed.arm
+            row: Any = table.law.sees(
+                linear @ table.measure.T + table.offset + routed.length,
+                (arm @ v[..., None])[..., 0],
+                z[..., part] if table.states else np.zeros((*lead, table.count)),
+                self._load(table, found, turning, forces, touching),
+                self._input(table, found, command, lead),
+                np.abs(linear) @ table.bends.T + table.curvature_offset + routed.turn,
+            )
+            exerted, rate, signals = table.law.act(row, table.parameters)
+            found[table.group] = RowSignals(table, row, exerted, rate, signals)
+            if table.law.arms > 1:
+                touching.append((table.paths[:: table.law.arms], _touching(exerted, routed.force, table.law.arms)))
+            torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
+        return found, torque
 
     def _forces(self, force: Array | None, lead: tuple[int, ...]) -> Array:
         """Return the forces at all tips, shape (..., t, 3)."""

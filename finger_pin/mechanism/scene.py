@@ -81,6 +81,22 @@ class Scene:
     contacts: Rows
 
     @classmethod
+    def around(
+        cls,
+        mechanism: Mechanism,
+        objects: Mapping[str, Object] | None,
+        description: FingerDescription,
+        placed: Mapping[str | None, Placed] | None,
+    ) -> Scene | None:
+        """Return the scene of a finger with a tree's own objects and given ones; None if nothing can touch anything."""
+        hand, tree = description.hand, description.tree
+        if tree is not None and tree.objects:
+            objects = {**tree.objects, **(objects or {})}
+        if objects is None and (description.touches_itself or (hand is not None and hand.fingers_touch)):
+            objects = {}
+        return None if objects is None else cls.of(objects, description, mechanism, placed)
+
+    @classmethod
     def of(
         cls,
         objects: Mapping[str, Object],
@@ -133,8 +149,8 @@ class Scene:
                     raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
         return contact_rows([*own, *object_solids(objects, extended)], width, pairs_within(description))
 
-    def around(self, mechanism: Mechanism) -> Mechanism:
-        """Return the finger with its surroundings: free objects after the joints, contacts before all other rows.
+    def joined(self, mechanism: Mechanism) -> Mechanism:
+        """Return a mechanism with the scene: free objects after the joints, contacts before all other rows.
 
         What contacts exert loads the pins of joints, so they are evaluated first.
         """

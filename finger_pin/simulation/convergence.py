@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -156,31 +157,37 @@ def check_convergence(
     tighter = tightened(scenario, factor)
     if not 0.0 < limit < math.inf:
         raise InputError("limit", "must be above 0 and finite", limit)
-    if result is not None and result.attrs["scenario"] != to_toml(scenario):
-        raise InputError("result", "is of another scenario")
     finger = resolve_finger(finger, scenario)
-    custom = custom_parts(controller, reference, fingertip_force, initial, finger)
-    if result is not None and custom_of(result) != custom:
+    if result is not None:
+        _refuse_other(result, scenario, custom_parts(controller, reference, fingertip_force, initial, finger))
+
+    run = partial(
+        simulate,
+        controller=controller,
+        reference=reference,
+        fingertip_force=fingertip_force,
+        finger=finger,
+        initial=initial,
+        control_period=control_period,
+        progress=progress,
+        stop=stop,
+    )
+    first = run(scenario) if result is None else result
+    # The first run has given the warnings of both.
+    with warnings.catch_warnings(action="ignore", category=ScenarioWarning):
+        return _compared(first, run(tighter), limit, tighter)
+
+
+def _refuse_other(result: xr.Dataset, scenario: Scenario, custom: str) -> None:
+    """Refuse the result of another scenario, or one with other custom parts."""
+    if result.attrs["scenario"] != to_toml(scenario):
+        raise InputError("result", "is of another scenario")
+    if custom_of(result) != custom:
         raise InputError("result", f"had {custom_of(result) or 'nothing'} of its own: give the same here")
 
-    def run(each: Scenario) -> xr.Dataset:
-        return simulate(
-            each,
-            controller=controller,
-            reference=reference,
-            fingertip_force=fingertip_force,
-            finger=finger,
-            initial=initial,
-            control_period=control_period,
-            progress=progress,
-            stop=stop,
-        )
 
-    first = run(scenario) if result is None else result
-    with warnings.catch_warnings():
-        # The first run has said it.
-        warnings.simplefilter("ignore", ScenarioWarning)
-        second = run(tighter)
+def _compared(first: xr.Dataset, second: xr.Dataset, limit: float, tighter: Scenario) -> Convergence:
+    """Return the difference of two runs, the second at the tolerances of ``tighter``, as far as both go."""
     count = min(first.sizes["time"], second.sizes["time"])
     angles = [each["joint_position"].transpose("time", "joint").values[:count] for each in (first, second)]
     return Convergence(

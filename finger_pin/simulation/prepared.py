@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -207,4 +206,4 @@ class Prepared:
         # Where nothing of it changes in a run all share it, also in threads.
         finger = fitted(self._finger, self.family.scenario, scenario)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
-        return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
+        return loop if initial is None else loop.started(packed_state(initial, loop.finger))

@@ -11,10 +11,10 @@ import pinocchio as pin
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.rows import LOST, Rows, RowSignals
+from finger_pin.mechanism.rows import RowSignals
 from finger_pin.mechanism.state import BLOCKS
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
-from finger_pin.simulation.energy import flows, stores
+from finger_pin.simulation.row_variables import account_variables, extra_row_variables
 from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory
 from finger_pin.typing import Array
 
@@ -22,7 +22,6 @@ _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "pas
 _MOTOR, _TIME = ("time", "motor"), ("time",)
 #: A variable that is left out of a whole result where nothing limits tensions.
 SHORTFALL = "torque_shortfall"
-RESIDUAL = "energy_residual"
 
 
 def variables(loop: ClosedLoop) -> dict[str, Quantity]:
@@ -39,26 +38,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     tip = ("time", "axis") if len(loop.finger.rigid_body.tips) == 1 else ("time", "finger", "axis")
     table |= {
         "fingertip_position": Quantity(tip, lambda of: of.motion.tip, "m", "fingertip position", "1"),
-        "tendon_command": Quantity(_TENDON, _tension, "N", "commanded or planned tension", "21b"),
-        "tendon_tension": Quantity(
-            _TENDON,
-            lambda of: of.loop.finger.routing.tendon_tension(of.finger.tendons.strands),
-            "N",
-            "delivered tension; distal half of a passive tendon",
-            "12",
-        ),
-        "tendon_velocity": Quantity(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
-        "tendon_friction": Quantity(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
-        "tendon_stiction": _of_state("tendon_stiction"),
-        "tendon_normal_force": Quantity(
-            _TENDON, lambda of: of.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
-        ),
-        "tendon_friction_coefficient": Quantity(
-            _TENDON, lambda of: of.finger.tendons.coefficient, "1", "Coulomb coefficient", "16"
-        ),
-        "tendon_curvature": Quantity(
-            _TENDON, lambda of: of.finger.tendons.curvature, "rad", "total curvature of the path", "15"
-        ),
+        **_of_tendons(),
         "joint_torque_command": Quantity(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
         "joint_torque": Quantity(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
         "joint_friction": Quantity(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
@@ -86,6 +66,31 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         if frame := _frame(name, each):
             table[name] = each._replace(frame=frame)
     return table
+
+
+def _of_tendons() -> dict[str, Quantity]:
+    return {
+        "tendon_command": Quantity(_TENDON, _tension, "N", "commanded or planned tension", "21b"),
+        "tendon_tension": Quantity(
+            _TENDON,
+            lambda of: of.loop.finger.routing.tendon_tension(of.finger.tendons.strands),
+            "N",
+            "delivered tension; distal half of a passive tendon",
+            "12",
+        ),
+        "tendon_velocity": Quantity(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
+        "tendon_friction": Quantity(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
+        "tendon_stiction": _of_state("tendon_stiction"),
+        "tendon_normal_force": Quantity(
+            _TENDON, lambda of: of.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
+        ),
+        "tendon_friction_coefficient": Quantity(
+            _TENDON, lambda of: of.finger.tendons.coefficient, "1", "Coulomb coefficient", "16"
+        ),
+        "tendon_curvature": Quantity(
+            _TENDON, lambda of: of.finger.tendons.curvature, "rad", "total curvature of the path", "15"
+        ),
+    }
 
 
 def _tension(of: SampledTrajectory) -> Array:
@@ -169,7 +174,7 @@ def _more(loop: ClosedLoop) -> dict[str, Quantity]:
         name: Quantity(dims, partial(_contact, name), units, text)
         for name, (dims, units, text) in contact_variables(loop.finger).items()
     }
-    return table | _of_further(loop.finger.extra_rows) | _of_account(loop)
+    return table | extra_row_variables(loop.finger.extra_rows) | account_variables(loop.finger)
 
 
 def _contact(name: str, of: SampledTrajectory) -> Array:
@@ -266,63 +271,6 @@ def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
         )
         for each in loop.controller.sensors
     }
-
-
-def _of_further(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
-    """Return the signals of rows of a user's own, by table."""
-
-    def seen(of: SampledTrajectory, group: str, name: str) -> Array:
-        found = of.finger.mechanism.rows[group]
-        return np.asarray(getattr(found.row, name))
-
-    def exerted(of: SampledTrajectory, group: str) -> Array:
-        return of.finger.mechanism.rows[group].force
-
-    def shown(of: SampledTrajectory, group: str, index: int) -> Array:
-        return of.finger.mechanism.rows[group].signals[index]
-
-    found: dict[str, Quantity] = {}
-    for table in tables:
-        group = table.group
-        units = {"length": table.unit, "speed": f"{table.unit}/s", "force": "N m" if table.unit == "rad" else "N"}
-        values: dict[str, Callable[[SampledTrajectory], Array]] = {"force": partial(exerted, group=group)}
-        values |= {name: partial(seen, group=group, name=name) for name in ("length", "speed")}
-        values |= {name: partial(shown, group=group, index=i) for i, name in enumerate(table.law.signals)}
-        if np.any(table.channels >= 0):
-            values["input"] = partial(seen, group=group, name="command")
-        if table.law.scale is not None:
-            values["state"] = partial(seen, group=group, name="state")
-        for name, value in values.items():
-            unit = units.get(name, "SI") if table.unit else "SI"
-            found[f"{group}_{name}"] = Quantity(("time", group), value, unit, f"{name} of {table.law.name}")
-    return found
-
-
-def _of_account(loop: ClosedLoop) -> dict[str, Quantity]:
-    def stored(of: SampledTrajectory, name: str) -> Array:
-        return of.stored[name]
-
-    def power(of: SampledTrajectory, name: str) -> Array:
-        return of.powers[name]
-
-    def work(of: SampledTrajectory, name: str) -> Array:
-        return of.account.works[name]
-
-    table = {}
-    for each in stores(loop.finger):
-        table[f"energy_{each.name}"] = Quantity(
-            _TIME, partial(stored, name=each.name), "J", f"energy stored: {each.label}", energy_term=each
-        )
-    # What comes in before what is lost.
-    for each in sorted(flows(loop.finger.mechanism.energies), key=lambda each: each.kind == LOST):
-        name, text = each.name, f"{each.kind}: {each.label}"
-        table[f"power_{name}"] = Quantity(_TIME, partial(power, name=name), "W", f"power {text}", energy_term=each)
-        table[f"energy_exchanged_{name}"] = Quantity(
-            _TIME, partial(work, name=name), "J", f"energy {text}", energy_term=each
-        )
-    text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
-    table[RESIDUAL] = Quantity(_TIME, lambda of: of.account.residual, "J", text)
-    return table
 
 
 def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str, Any]:

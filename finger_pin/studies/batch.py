@@ -49,16 +49,14 @@ def simulate_many(
         finger: Replaces the finger of all, as for `fp.simulate`.
         executor: Any of `concurrent.futures`, for controllers in Python, which threads would do one after the other.
         workers: Number of threads; by default one for each core that this process may use.
-        variables: Names of the variables to keep; all by default. Fewer need less memory and less time: then only what
-            is kept is computed, and nothing is judged, as by `fp.prepare`.
-        progress: Called with the numbers of finished and of all runs;
-            in a notebook there is a bar by default.
+        variables: Names of the variables to keep; all by default. Others are not computed then, and neither are
+            warnings, as by `fp.prepare`.
+        progress: Called with the numbers of finished and of all runs; in a notebook there is a bar by default.
 
     Returns:
         The variables of `simulate` with a leading dimension ``run``. A run that could not be finished is NaN from
-        where it stopped; ``failure`` says why, and is empty for the others. What only some runs have, such as motors
-        or contacts, is NaN in the others, and its attribute ``comment`` names them. ``scenario`` holds every run's
-        TOML.
+        where it stopped; ``failure`` says why. What only some runs have, such as motors, is NaN in the others, and its
+        attribute ``comment`` names them. ``scenario`` holds every run's TOML.
 
     Raises:
         InputError: If there are no scenarios, they cannot be stacked, or a variable does not exist.
@@ -68,10 +66,7 @@ def simulate_many(
     Warns:
         SelfLockingWarning: Once, if runs come close to self-locking; ``self_locking_margin`` says which.
     """
-    runs = [load_scenario(each) for each in scenarios]
-    if not runs:
-        raise InputError("scenarios", "at least one is needed")
-    runs = _sharing(runs)
+    runs = _sharing([load_scenario(each) for each in scenarios])
     finger = resolve_finger(finger, runs[0])
     _check_alike(runs)
     _check_kept(runs, variables or (), finger)
@@ -95,14 +90,18 @@ def simulate_many(
         raise Interrupted(math.nan, stacked, f"after {len(found)} of {len(runs)} runs")
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
-    margins = stacked["self_locking_margin"].values
-    # Tensions in open loop, and controllers of one's own, have no margin.
+    _warn_of_locking(stacked["self_locking_margin"].values)
+    return stacked
+
+
+def _warn_of_locking(margins: np.ndarray) -> None:
+    """Warn once of all runs that come close to self-locking."""
+    # Tensions in open loop, and custom controllers, have no margin.
     advice = locking_advice(float(np.nanmin(margins, initial=np.inf)))
     if advice:
         close = sum(bool(locking_advice(float(margin))) for margin in margins)
-        message = f"{close} of {len(runs)} runs come close to self-locking; in the closest {advice}"
-        warnings.warn(message, SelfLockingWarning, stacklevel=2)
-    return stacked
+        message = f"{close} of {len(margins)} runs come close to self-locking; in the closest {advice}"
+        warnings.warn(message, SelfLockingWarning, stacklevel=3)
 
 
 def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None) -> xr.Dataset:
@@ -132,6 +131,8 @@ def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...]) 
 
 def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:
     """Return scenarios whose equal fingers are one object, so that it is built once."""
+    if not runs:
+        raise InputError("scenarios", "at least one is needed")
     first = runs[0]
     return [
         run.updated(finger=first.finger, environment=first.environment)

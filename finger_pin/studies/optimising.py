@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.cancellation import CancelToken
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.exceptions import InputError
@@ -21,7 +19,6 @@ from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import PointList
-from finger_pin.studies.executor import open_executor
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric
 from finger_pin.studies.problem import (
@@ -34,9 +31,9 @@ from finger_pin.studies.problem import (
     radii,
     start_of,
 )
-from finger_pin.studies.records import Progress, evaluate
+from finger_pin.studies.records import Progress, evaluate, open_study
 from finger_pin.studies.search import HOPELESS, Search, nondominated
-from finger_pin.studies.store import DONE, RunRecord, Store, describe_study, open_store, write
+from finger_pin.studies.store import DONE, RunRecord, Store, describe_study, write
 from finger_pin.typing import Array
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]
@@ -85,9 +82,7 @@ def optimise(
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> xr.Dataset:
-    """Search for nondominated designs.
-
-        fp.optimise("fig6", ["controller.gain=0.5:4"], minimise=["tracking_rms", "tension_peak"], constraints=[])
+    """Search for nondominated designs, such as by ``fp.optimise("fig6", ["controller.gain=0.5:4"], constraints=[])``.
 
     A design without force closure, or whose run fails, does not count; it is recorded with its reason. With an
     ``output`` every finished run is on disk at once, and the same search again continues where it ended.
@@ -101,13 +96,11 @@ def optimise(
         effort: Effort of the search.
         overrides: Entries of the scenario that hold for all designs.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
-        output: Folder for ``study.toml``, ``runs.jsonl``, ``optimise.nc``, ``front.csv`` and ``front``, which has every
-            design of the front as a scenario; by default nothing is kept.
+        output: Folder for ``study.toml``, ``runs.jsonl``, ``optimise.nc``, ``front.csv``, ``front/*.toml``; or nothing.
         executor: Executor of the runs, any of `concurrent.futures`; by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
-        progress: Called with the numbers of finished, failed and all runs;
-            in a notebook there is a bar by default.
-        stop: Asked now and then; when it returns true the search ends there.
+        progress: Called with the numbers of finished, failed and all runs; in a notebook there is a bar by default.
+        stop: Asked now and then; true ends the search there.
 
     Returns:
         Along ``sample``, which begins with the scenario's own design and follows the search: every key, metric,
@@ -123,27 +116,24 @@ def optimise(
     effort = effort or Effort()
     goals = Goals.from_metrics(minimise, maximise, constraints)
     base = BaseScenario.load(scenario, overrides, finger)
+    variables = _variables(over, base)
+    own = start_of(variables, base)
+    described = {**goals.describe(), **vars(effort), "variables": [variable.describe() for variable in variables]}
+    asked = {} if output is None else describe_study(base, goals.metrics, {"optimise": described})
+    with open_study(output, asked, PRODUCTS, executor, stop, restart) as (store, pool, token):
+        course = _Course(base, goals, variables, store, pool, effort, progress or notebook_bar("runs"), token)
+        result = _assembled(base, goals, *course.follow(own))
+        if output is not None:
+            _write(result, base, Path(output))
+    return checked(result, token.cancelled)
+
+
+def _variables(over: Iterable[Variable | str] | None, base: BaseScenario) -> list[Variable]:
+    """Return the variables of a search, by default the winding radii of the finger."""
     given = radii(base.scenario.finger) if over is None else over
     variables = [parse_variable(each) if isinstance(each, str) else each for each in given]
     check_variables(variables, base)
-    own = start_of(variables, base)
-    search = Search(len(variables), len(goals.objectives), effort.population, effort.seed, _shares(variables, own))
-    with ExitStack() as stack:
-        token = stack.enter_context(CancelToken(stop))
-        pool = stack.enter_context(open_executor(executor))
-        store = Store()
-        if output is not None:
-            described = [variable.describe() for variable in variables]
-            asked = {"optimise": {**goals.describe(), **vars(effort), "variables": described}}
-            described_study = describe_study(base, goals.metrics, asked)
-            store = stack.enter_context(open_store(output, described_study, PRODUCTS, restart=restart))
-        bar = progress or notebook_bar("runs")
-        course = _Course(base, goals, variables, store, pool, effort, bar, token)
-        result = _assembled(base, goals, *course.follow(own, search))
-        if output is not None:
-            write(result, Path(output) / "optimise.nc")
-            _write_front(result, base, Path(output))
-    return checked(result, token.cancelled)
+    return variables
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,9 +149,12 @@ class _Course:
     progress: Progress | None
     stop: Stop | None
 
-    def follow(self, own: Point, search: Search) -> tuple[list[Point], list[RunRecord | None]]:
+    def follow(self, own: Mapping[str, float]) -> tuple[list[Point], list[RunRecord | None]]:
         """Return all points with their records, the scenario's own first."""
-        points, records = [own], self._evaluate([own], [])
+        sizes = len(self.variables), len(self.goals.objectives), self.effort.population
+        search = Search(*sizes, self.effort.seed, _shares(self.variables, own))
+        points: list[Point] = [own]
+        records = self._evaluate(points, [])
         for _ in range(self.effort.generations):
             if records[-1] is None or (self.stop is not None and self.stop()):
                 break
@@ -232,12 +225,13 @@ def _assembled(base: BaseScenario, goals: Goals, points: list[Point], records: l
     return result.assign_attrs({name: ", ".join(listed) for name, listed in goals.describe().items()})
 
 
-def _write_front(result: xr.Dataset, base: BaseScenario, folder: Path) -> None:
-    """Write ``front.csv`` and a scenario per design, ``front/01.toml`` and so on in the order of the table.
+def _write(result: xr.Dataset, base: BaseScenario, folder: Path) -> None:
+    """Write ``optimise.nc``, ``front.csv`` and its scenarios, ``front/01.toml`` and so on in the order of the table.
 
     Raises:
         OSError: If they cannot be written.
     """
+    write(result, folder / "optimise.nc")
     keys = [str(key) for key in result.coords]
     columns = [*(str(name) for name in result.data_vars if "units" in result[name].attrs), *keys]
     scenarios = folder / "front"

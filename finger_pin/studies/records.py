@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import time
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import ExitStack, contextmanager
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import joblib
 
+from finger_pin.cancellation import CancelToken
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import to_toml
 from finger_pin.exceptions import FingerPinError
-from finger_pin.studies.executor import FailedTask, compile_for, run_tasks
+from finger_pin.studies.executor import FailedTask, compile_for, open_executor, run_tasks
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, finger_digest, source_digest, versions
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric
 from finger_pin.studies.response import Run
-from finger_pin.studies.store import DONE, FAILED, RunRecord, Store
+from finger_pin.studies.store import DONE, FAILED, RunRecord, Store, open_store
 
 #: Called with the numbers of finished, failed and all runs.
 Progress = Callable[[int, int, int], None]
@@ -30,6 +34,32 @@ class ExecutorError(FingerPinError):
 
 class VersionError(FingerPinError):
     """A worker has another version of the package than the process that asks."""
+
+
+@contextmanager
+def open_study(
+    output: str | Path | None,
+    asked: Mapping[str, Any],
+    products: Sequence[str],
+    executor: Executor | None,
+    stop: Stop | None,
+    restart: bool,
+) -> Iterator[tuple[Store, Executor, CancelToken]]:
+    """Open the store of a study, its executor, and a token that Ctrl-C and a `Stop` cancel.
+
+    Args:
+        output: Its folder; without one its records are in memory alone.
+        asked: From `describe_study`.
+        products: Patterns of the files that a study with other settings replaces.
+        executor: By default one thread for each core.
+        stop: Asked now and then.
+        restart: Whether to drop what the folder holds of a study.
+    """
+    with ExitStack() as stack:
+        token = stack.enter_context(CancelToken(stop))
+        pool = stack.enter_context(open_executor(executor))
+        store = Store() if output is None else stack.enter_context(open_store(output, asked, products, restart=restart))
+        yield store, pool, token
 
 
 def evaluate(

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from finger_pin.cancellation import CancelToken
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
-from finger_pin.studies.executor import open_executor
 from finger_pin.studies.keys import BaseScenario, Value
 from finger_pin.studies.metrics import DEFAULT_METRICS, Metric, resolve_metrics
-from finger_pin.studies.records import Progress, evaluate
-from finger_pin.studies.store import Store, describe_study, open_store, write
+from finger_pin.studies.records import Progress, evaluate, open_study
+from finger_pin.studies.store import describe_study, write
 
 PRODUCTS = ["sweep.nc", "figures/sweep.png"]
 
@@ -43,11 +40,9 @@ def sweep(
     """Run a scenario at many points and measure every run.
 
         fp.sweep("fig6", {"controller.gain": [0.5, 1.0, 2.0]}, metrics=["tracking_rms"])
-        fp.sweep("fig6", {"simulation.method": ["Rodas4", "Rodas5P"], "simulation.rtol": [1e-4, 1e-6]})
 
-    With an ``output`` every finished run is on disk at once: after a kill the same call continues
-    where it ended; runs that depend on code that has changed since, such as that of a metric, are done anew. A run that
-    fails, or a point at which there is no valid scenario, is NaN, with its reason.
+    With an ``output`` every finished run is on disk at once: after a kill the same call continues where it ended; runs
+    whose code has changed since, such as that of a metric, are repeated. A run that fails is NaN, with its reason.
 
     Args:
         scenario: The scenario to be varied, its name, or the path of a file.
@@ -60,10 +55,8 @@ def sweep(
         executor: Executor of the runs, any of `concurrent.futures`; by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         retry_failed: Whether to repeat runs that failed before.
-        progress: Called with the numbers of finished, failed and all runs, first with those found;
-            in a notebook there is a bar by default.
-        stop: Asked now and then; when it returns true the sweep ends there, with ``status`` missing where it has not
-            been.
+        progress: Called with the numbers of finished, failed and all runs; in a notebook there is a bar by default.
+        stop: Asked now and then; true ends the sweep there, with ``status`` missing where it has not been.
 
     Returns:
         A variable per metric, ``status`` and ``reason``; a dimension per key of a grid, else the dimension ``sample``.
@@ -80,23 +73,10 @@ def sweep(
     base = BaseScenario.load(scenario, overrides, finger)
     for key, values in design.values.items():
         base.check(key, values, alone=len(design.values) == 1)
-    with ExitStack() as stack:
-        token = stack.enter_context(CancelToken(stop))
-        pool = stack.enter_context(open_executor(executor))
-        store = Store()
-        if output is not None:
-            asked = describe_study(base, chosen, {"sweep": design.describe()})
-            store = stack.enter_context(open_store(output, asked, PRODUCTS, restart=restart))
-        records = evaluate(
-            base,
-            design.points(),
-            chosen,
-            store,
-            pool,
-            progress=progress or notebook_bar("runs"),
-            stop=token,
-            retry_failed=retry_failed,
-        )
+    asked = {} if output is None else describe_study(base, chosen, {"sweep": design.describe()})
+    with open_study(output, asked, PRODUCTS, executor, stop, restart) as (store, pool, token):
+        shown, points = progress or notebook_bar("runs"), design.points()
+        records = evaluate(base, points, chosen, store, pool, progress=shown, stop=token, retry_failed=retry_failed)
         result = assemble(base.scenario, design, chosen, records)
         if output is not None:
             write(result, Path(output) / "sweep.nc")

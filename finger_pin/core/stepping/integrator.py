@@ -55,6 +55,8 @@ class _Recorder:
         self.room, self._chunk = part.room(_ROOM), chunk
         self.taken = 0
         self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
+        # Compiling is no part of an integration's cost.
+        part.ready(self.room)[1].compile()
 
     def advance(self, end: float, chunks: int = -1) -> int:
         """Go to a time, or until some chunks are full; return the status."""
@@ -73,10 +75,13 @@ class _Recorder:
         """The island; a stepper that is loaded on the way replaces it."""
         return self._stepper.parts[self._index]
 
-    @property
-    def full(self) -> bool:
-        """Whether no more steps can be kept."""
-        return self.taken >= self.most
+    def reason(self, status: int, duration: float, names: Sequence[str]) -> str:
+        """Return the reason not to go on after a status, empty if there is none; ``names`` are those of the state."""
+        if status > core.FULL:
+            return failure(self.part, status, [names[at] for at in self._stepper.places(self.part.island)])
+        if self.taken >= self.most and self.part.time < duration:
+            return f"after {self.taken} steps the trajectory has reached the most that is kept in memory"
+        return ""
 
     def steps(self) -> IslandMotion:
         """Return the steps that were taken."""
@@ -115,28 +120,15 @@ def integrate_compiled(
     known = held is None and not stepper.driven
     estimate_error = known and stepper.estimate_error and not stepper.repeats
     recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
-    for recorder in recorders:
-        # Compiling is no part of an integration's cost.
-        recorder.part.ready(recorder.room)[1].compile()
     began = time.perf_counter()
     alone = len(recorders) == 1
     reason, interrupted = "", False
     while stepper.time < duration and not reason and not interrupted:
-        end = duration
-        if held is not None:
-            if stepper.time >= held.instant:
-                stepper.hold(held.act(stepper.x))
-            end = min(end, held.instant)
-        elif not alone and together:
-            end = min(end, stepper.time + duration / _SLICES)
-        chunks = -1 if together and not alone else 1
+        sliced = together and not alone
+        end, chunks = _next_end(stepper, duration, held, sliced), -1 if sliced else 1
         statuses = in_threads(partial(_Recorder.advance, end=end, chunks=chunks), recorders)
         for recorder, status in zip(recorders, statuses, strict=True):
-            if status > core.FULL and not reason:
-                places = stepper.places(recorder.part.island)
-                reason = failure(recorder.part, status, [names[at] for at in places])
-            if not reason and recorder.full and recorder.part.time < duration:
-                reason = f"after {recorder.taken} steps the trajectory has reached the most that is kept in memory"
+            reason = reason or recorder.reason(status, duration, names)
         if watch is not None:
             watch(stepper.time, stepper.x)
         interrupted = stop is not None and not reason and stepper.time < duration and stop()
@@ -153,6 +145,15 @@ def integrate_compiled(
         islands=() if not known or stepper.held else tuple(steps),
         steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),
     )
+
+
+def _next_end(stepper: Stepper, duration: float, held: Held | None, sliced: bool) -> float:
+    """Return the time at which islands wait for each other, after a controller that is due has acted."""
+    if held is None:
+        return min(duration, stepper.time + duration / _SLICES) if sliced else duration
+    if stepper.time >= held.instant:
+        stepper.hold(held.act(stepper.x))
+    return min(duration, held.instant)
 
 
 def _statistics(recorders: Sequence[_Recorder], wall_time: float) -> Statistics:

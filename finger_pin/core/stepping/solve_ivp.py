@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -46,31 +47,16 @@ def integrate(
     """
     began = time.perf_counter()
     system, run = _System(rhs), _Steps([0.0], [], [])
-    kind = getattr(scipy.integrate, method)
-    options = {"jac": _Jacobian(system, atol / rtol)} if method in ("Radau", "BDF") else {}
-
-    def solver(x: Array, end: float) -> Any:
-        made = kind(system, run.times[-1], x, end, rtol=rtol, atol=atol, max_step=longest, **options)
-        run.solvers.append(made)
-        return made
-
+    options: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": longest}
+    if method in ("Radau", "BDF"):
+        options["jac"] = _Jacobian(system, atol / rtol)
+    solver = partial(run.solver, getattr(scipy.integrate, method), system, options)
     x, reason, interrupted, current = np.array(start, dtype=float), "", False, None
     while run.times[-1] < duration and not reason and not interrupted:
-        try:
-            # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
-            with np.errstate(over="ignore", invalid="ignore"):
-                if current is None or current.status == "finished":
-                    current = solver(x, duration)
-                message = current.step()
-        except (ValueError, scipy.linalg.LinAlgError) as error:
-            if error is system.error:
-                raise
-            reason = f"the state or its Jacobian is not finite ({error})"
-            break
-        reached, reason = float(current.t), _trouble(current, message, run.times[-1])
+        current, reason = _take_step(current, partial(solver, x, duration), system, run.times[-1])
         if reason:
             break
-        dense = current.dense_output()
+        reached, dense = float(current.t), current.dense_output()
         met = None if meeting is None else meeting(run.times[-1], reached, _transposed(dense))
         if met is not None:
             current = solver(x, met)
@@ -91,7 +77,21 @@ def integrate(
     )
 
 
-def _trouble(solver: Any, message: str | None, last: float) -> str:
+def _take_step(solver: Any, renewed: Callable[[], Any], system: _System, last: float) -> tuple[Any, str]:
+    """Take a step, by a new solver where there is none under way; return it, and the step's fault, empty for none."""
+    try:
+        # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
+        with np.errstate(over="ignore", invalid="ignore"):
+            if solver is None or solver.status == "finished":
+                solver = renewed()
+            return solver, _fault(solver, solver.step(), last)
+    except (ValueError, scipy.linalg.LinAlgError) as error:
+        if error is system.error:
+            raise
+        return solver, f"the state or its Jacobian is not finite ({error})"
+
+
+def _fault(solver: Any, message: str | None, last: float) -> str:
     """Return the fault of a step that scipy has made from a time, s; empty for none."""
     if solver.status == "failed":
         return str(message)
@@ -111,6 +111,11 @@ class _Steps:
     times: list[float]
     dense: list[Any]
     solvers: list[Any]
+
+    def solver(self, kind: Any, system: _System, options: Mapping[str, Any], x: Array, end: float) -> Any:
+        """Return a new solver that starts where the steps end, at a state."""
+        self.solvers.append(kind(system, self.times[-1], x, end, **options))
+        return self.solvers[-1]
 
     @property
     def exhausted(self) -> str:

@@ -111,29 +111,37 @@ def wind(
     # The two ends of a full turn lie beside each other.
     skew = {j: 0.25 * lanes.spacing * turns[j] for j in path}
     entry, leave = directions(skew)
-
     mass_link = _mass_link(description, tendon, crossed)
-    start = _start(lanes, model, path[0])
-    begin = _on_pulley(radius[path[0]], lanes.offset[tendon, path[0]] - skew[path[0]], entry[path[0]])
-    back = np.array([math.cos(entry[path[0]]), math.sin(entry[path[0]]), 0.0])
-    placement = model.jointPlacements[path[0]]
-    ends = np.array([placement.act(begin - start * back), placement.act(begin)])
-    pieces: list[WoundSpan | Arc] = [_span(path[0] - 1, ends, resolution, mass_link, whole=True)]
+    first = path[0]
+    begin = _on_pulley(radius[first], lanes.offset[tendon, first] - skew[first], entry[first])
+    ends = _lead_in(model.jointPlacements[first], begin, entry[first], _start(lanes, model, first))
+    pieces: list[WoundSpan | Arc] = [_span(first - 1, ends, resolution, mass_link, whole=True)]
     for j in path:
         offset = lanes.offset[tendon, j]
         if radius[j]:
             turn = leave[j] - entry[j] - side[j] * 2.0 * math.pi * turns[j]
-            widest = max(abs(turn + limit) for limit in ranges[j])
-            count = max(3, math.ceil(resolution * min(widest, 4.0 * math.pi)))
-            fraction = np.arange(1, count + 1) / (count if j == path[-1] else count + 1)
+            fraction = _arc_fractions(turn, ranges[j], resolution, last=j == path[-1])
             offsets = offset + skew[j] * (2.0 * fraction - 1.0)
-            pieces.append(Arc(j, radius[j], entry[j], turn, offsets, fraction, np.full(count, j > mass_link)))
+            pieces.append(Arc(j, radius[j], entry[j], turn, offsets, fraction, np.full(len(fraction), j > mass_link)))
         if j != path[-1]:
             leaving = _on_pulley(radius[j], offset + skew[j], leave[j])
             arriving = _on_pulley(radius[j + 1], lanes.offset[tendon, j + 1] - skew[j + 1], entry[j + 1])
             ends = np.array([leaving, model.jointPlacements[j + 1].act(arriving)])
             pieces.append(_span(j, ends, resolution, mass_link, whole=radius[j] != 0.0))
     return tuple(pieces)
+
+
+def _lead_in(placement: pin.SE3, begin: Array, entry: float, length: float) -> Array:
+    """Return the ends of the straight piece from the actuator to the first pulley, shape (2, 3), m."""
+    back = np.array([math.cos(entry), math.sin(entry), 0.0])
+    return np.array([placement.act(begin - length * back), placement.act(begin)])
+
+
+def _arc_fractions(turn: float, limits: tuple[float, float], resolution: int, last: bool) -> Array:
+    """Return the shares of an arc at which its points lie, shape (k,), as many as it needs within the joint's range."""
+    widest = max(abs(turn + limit) for limit in limits)
+    count = max(3, math.ceil(resolution * min(widest, 4.0 * math.pi)))
+    return np.asarray(np.arange(1, count + 1) / (count if last else count + 1))
 
 
 def _tangent(placement: pin.SE3, here: tuple[float, float], there: tuple[float, float]) -> tuple[float, float]:
