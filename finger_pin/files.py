@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all: single ones (`replacing`), and sets at one instant (`publish`).
+"""Files that appear whole or not at all: single ones (`replacing`), and sets at one instant (`publish`); texts read.
 
 A new set is complete in a hidden folder inside the one that it is for, beside hard links to the earlier set, and a
 symbolic link ``now`` says which of the two is valid. While files change places every name in the folder leads through
@@ -18,11 +18,15 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
+from finger_pin.exceptions import InputError
+
 _HIDDEN, _NOW, _OLD = ".publishing", "now", "old"
 #: Where to write the new set in a folder that is to be published.
 NEW = "new"
 # Publishing takes milliseconds: what takes longer, s, was killed.
 _PATIENCE = 5.0
+# Of a text that is read, bytes.
+_LARGEST = 100_000_000
 
 
 @contextlib.contextmanager
@@ -142,3 +146,32 @@ def _link(source: Path, target: Path) -> None:
         os.link(source.resolve(), target)
     except OSError:
         shutil.copy2(source, target)
+
+
+def read_text(what: str, path: Path) -> str:
+    """Return the text of a file in UTF-8.
+
+    Raises:
+        InputError: If it cannot be read, is too large, or is no such text.
+    """
+    try:
+        with open(path, "rb") as file:
+            data = file.read(_LARGEST + 1)
+    except FileNotFoundError:
+        raise InputError(what, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        raise InputError(what, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > _LARGEST:
+        raise InputError(what, f"is larger than {_LARGEST} bytes")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(what, "is not a text file in UTF-8") from None
+
+
+def expand(name: str) -> Path:
+    """Return a path with ~ expanded where there is a home folder."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)

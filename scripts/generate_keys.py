@@ -16,8 +16,9 @@ from pydantic_core import PydanticUndefined
 from finger_pin.commands.application import run_function
 from finger_pin.description.controller import ControllerSettings
 from finger_pin.description.finger import FingerDescription
+from finger_pin.description.objects import EnvironmentSettings
 from finger_pin.description.recordings.bench import IdentifySettings
-from finger_pin.description.scenario import EnvironmentSettings, Scenario
+from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description
 
 PAGE = Path(__file__).resolve().parents[1] / "finger_pin" / "description" / "KEYS.md"

@@ -12,7 +12,7 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.laws.muscle import active_work
-from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, as_inputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.tendons import SOURCES_WITH_END, WINCHES
@@ -74,7 +74,7 @@ def equilibrium(
     """
     finger = as_finger(finger)
     _refuse_restless(finger)
-    command = finger.packed_inputs(inputs)
+    command = as_inputs(finger, inputs)
     if np.any(command[: finger.routing.actuated][~finger.routing.winched] < 0.0):
         raise InputError("inputs", "a tension must not be negative", command.tolist())
     pushed = np.array(finite_vector("fingertip_force", fingertip_force, 3))

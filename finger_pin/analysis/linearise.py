@@ -24,7 +24,7 @@ from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import as_finger
+from finger_pin.mechanism.coerce import as_finger, as_inputs, as_packed
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
@@ -83,8 +83,8 @@ def linearise(
         raise InputError("dt", "must be above 0", dt)
     if parameters and scenario is None:
         raise InputError("parameters", "are those of a scenario: give one in place of the finger", list(parameters))
-    x = finger.packed(state, "state")
-    u = finger.packed_inputs(inputs)
+    x = as_packed(finger, state, "state")
+    u = as_inputs(finger, inputs)
     change = _rate if dt is None else _over(finger, x, u, dt)
     maps: tuple[_Map, _Map] = (change, _outputs)
     # The map is smooth on its steps, but curved where a kink is on the way: there steps are small.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger_pin.control.interface import Controller, ControlSignals, Dynamics, LoopController
-from finger_pin.control.palm import PalmPath, PrescribedObjects
+from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_paths
 from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -20,8 +20,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.rigid_body import Motion
-from finger_pin.mechanism.state import State
+from finger_pin.mechanism.state import Motion, State
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
@@ -146,9 +145,7 @@ class ClosedLoop:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
         x = self.finger.rest_state(position, velocity, tension)
-        if self.palm is not None:
-            return self.palm.place_world(self.finger, x)
-        return x if self.guides is None else self.guides.place(self.finger, x)
+        return at_start(self.finger, x, self.palm, self.guides)
 
     def started(self, x: Array) -> ClosedLoop:
         """Return the same loop that starts at a packed state; a palm on a path has the world where it is then."""
@@ -277,10 +274,7 @@ def sampled_control(loop: ClosedLoop) -> InputTable:
 
 def with_force(control: InputTable, loop: ClosedLoop) -> InputTable:
     """Return inputs with the path of the palm and the force at the fingertip, its varying and its constant part."""
-    if loop.palm is not None:
-        control = control._replace(palm=core_signal(loop.palm.signal))
-    if loop.guides is not None:
-        control = control._replace(guide=core_signal(loop.guides.signal))
+    control = with_paths(control, loop.palm, loop.guides)
     if loop.varying_force is None:
         return control
     force = core_signal(loop.varying_force)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.core.inputs import InputTable, core_signal
 from finger_pin.description.finger import HandSettings
 from finger_pin.description.objects import PATH as OBJECT_PATH
 from finger_pin.description.placement import PATH, PathSignal
@@ -135,3 +136,17 @@ class PrescribedObjects:
         rest = np.zeros((*np.shape(time), 27))
         rest[..., 9:12], rest[..., 12:15] = -self.gravity, self.gravity
         return np.concatenate([rest, acceleration], axis=-1)
+
+
+def at_start(finger: Finger, x: Array, palm: PalmPath | None, guides: PrescribedObjects | None) -> Array:
+    """Return a packed state with world and objects where paths have them at the start."""
+    if palm is not None:
+        return palm.place_world(finger, x)
+    return x if guides is None else guides.place(finger, x)
+
+
+def with_paths(control: InputTable, palm: PalmPath | None, guides: PrescribedObjects | None) -> InputTable:
+    """Return inputs with the paths of palm and objects."""
+    if palm is not None:
+        control = control._replace(palm=core_signal(palm.signal))
+    return control if guides is None else control._replace(guide=core_signal(guides.signal))

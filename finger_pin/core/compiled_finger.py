@@ -18,8 +18,8 @@ from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import RowSignals
+from finger_pin.mechanism.state import Motion
 from finger_pin.typing import Array
 
 _Asked = tuple[Motions, Array, Block]

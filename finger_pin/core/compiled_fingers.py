@@ -15,7 +15,7 @@ from finger_pin.core.jit import Block, pack
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.mechanism import GUIDES
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.state import Motion
 from finger_pin.typing import Array
 
 _MOTION = ("tip", "kinetic_energy", "potential_energy")

@@ -185,9 +185,7 @@ def _of_paths(legs: tuple[tuple[Any, ...], ...], topology: Topology, chains: Cha
 
 
 # Inertias and parameters of laws change from run to run; how rows are wired seldom does.
-@memoised(
-    lambda mechanism, chains: (mechanism.body.topology, *(table.structure.structure_key for table in mechanism.rows))
-)
+@memoised(lambda mechanism, _: (mechanism.body.topology, *(each.structure.structure_key for each in mechanism.rows)))
 def _of_rows(mechanism: Mechanism, chains: Chains) -> dict[str, Any]:
     """Return laws, states, wiring, arms and paths of the rows."""
     rows, count = mechanism.rows, sum(table.count for table in mechanism.rows)

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.tree_parts import TreeActuator
+from finger_pin.description.tree_actuators import TreeActuator
 
 # Of the motion, Hz, and of the tensions of tendons that only pull, N.
 _FREQUENCY = 0.5

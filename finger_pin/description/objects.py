@@ -7,11 +7,13 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_serializer, field_validator, model_validator
 
+from finger_pin.description.by_finger import dump_set_fields
 from finger_pin.description.placement import PathSignal
+from finger_pin.description.signals import ForceSignal, of_axes
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
-from finger_pin.description.validation import Name, choice, problem, quantity, real, vector
+from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
 
 Array = NDArray[np.float64]
 #: The coordinates of an object's path.
@@ -108,3 +110,25 @@ class Object(Shaped):
         across = middle * (3.0 * radius**2 + length**2) / 12.0
         across += ball * (0.4 * radius**2 + length**2 / 4.0 + 3.0 * length * radius / 8.0)
         return across, across, middle * radius**2 / 2.0 + ball * 0.4 * radius**2
+
+
+class EnvironmentSettings(Description):
+    """Forces and objects outside the finger; of a hand for every finger, unless ``fingers`` says otherwise.
+
+    In a file, ``fingertip_force_file`` names a CSV file: its columns are ``time`` and some of ``x``, ``y``, ``z``, and
+    become samples of ``fingertip_force_signal``.
+    """
+
+    file_keys = ("fingertip_force_file",)
+
+    fingertip_force: Annotated[tuple[float, float, float], vector(3, -1e6, 1e6)] = quantity(
+        (0.0, 0.0, 0.0), unit="N", source="(6)", doc="F, constant, base frame."
+    )
+    fingertip_force_signal: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
+        None, description="Varying part of F, added to the constant, by axis x, y, z of the base frame."
+    )
+    fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, entries that differ there.")
+
+    _sparse = field_serializer("fingers")(dump_set_fields)
+
+    objects: dict[Name, Object] | None = Field(None, description="Objects that the finger may touch, by name.")

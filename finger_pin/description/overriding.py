@@ -17,10 +17,10 @@ from finger_pin.description.reading import (
     resolve_hand,
     with_motors,
 )
-from finger_pin.description.recordings.columns import expand
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import find_field, nearest, suggestion
 from finger_pin.exceptions import InputError
+from finger_pin.files import expand
 
 # Keys that put another finger or hand in place of what there is.
 _OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?")

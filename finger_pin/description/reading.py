@@ -12,11 +12,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from finger_pin.description.recordings.columns import expand, read_signals, read_text
+from finger_pin.description.recordings.columns import read_signals
 from finger_pin.description.recordings.series import PACKED
 from finger_pin.description.validation import suggestion
 from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError
+from finger_pin.files import expand, read_text
 
 Table = dict[str, Any]
 # Sections that may name a CSV file, the key that does, where its columns go, and their unit.

@@ -2,80 +2,33 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    Field,
-    SerializerFunctionWrapHandler,
-    field_serializer,
-    field_validator,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
 
 from finger_pin.description.actuators import check_currents
-from finger_pin.description.by_finger import dump_set_fields, error_of_finger, flatten, of_finger, unflatten
+from finger_pin.description.by_finger import error_of_finger, of_finger
 from finger_pin.description.caching import memoised
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.effects import CLOSED_LOOP, OF_SCENARIO, idle, shown
 from finger_pin.description.finger import FingerDescription, HandSettings
-from finger_pin.description.objects import Object
+from finger_pin.description.objects import EnvironmentSettings
 from finger_pin.description.routing import Routing
-from finger_pin.description.signals import ForceSignal, JointReference, of_axes
+from finger_pin.description.signals import ReferenceSettings
 from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
 from finger_pin.description.tautness import Tautness
 from finger_pin.description.tree_parts import Keyframe
-from finger_pin.description.validation import Description, FullName, Name, expand, problem, quantity, suggestion, vector
+from finger_pin.description.validation import Description, Name, expand, problem, suggestion
 from finger_pin.description.winding import BY_SOURCE, check_sources, hand_with_winches, with_winches
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
 _Item = TypeVar("_Item")
 _OPEN = 'controller.kind = "tensions"'
-
-
-class ReferenceSettings(Description):
-    """References by joint; a joint without one is held at zero, a joint driven by a passive tendon follows (20).
-
-    In a hand the tables of a finger's joints stand in one of its own, such as ``joints.index.medial``.
-
-    In a file, ``file`` names a CSV file: its columns are ``time`` and joints, and become their samples.
-    """
-
-    file_keys = ("file",)
-
-    joints: dict[FullName, JointReference] = Field({}, description="By joint.")
-
-    _flat = field_validator("joints", mode="before")(flatten)
-    _nested = field_serializer("joints", mode="wrap")(unflatten)
-
-
-class EnvironmentSettings(Description):
-    """Forces and objects outside the finger; of a hand for every finger, unless ``fingers`` says otherwise.
-
-    In a file, ``fingertip_force_file`` names a CSV file: its columns are ``time`` and some of ``x``, ``y``, ``z``, and
-    become samples of ``fingertip_force_signal``.
-    """
-
-    file_keys = ("fingertip_force_file",)
-
-    fingertip_force: Annotated[tuple[float, float, float], vector(3, -1e6, 1e6)] = quantity(
-        (0.0, 0.0, 0.0), unit="N", source="(6)", doc="F, constant, base frame."
-    )
-    fingertip_force_signal: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
-        None, description="Varying part of F, added to the constant, by axis x, y, z of the base frame."
-    )
-    fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, entries that differ there.")
-
-    _sparse = field_serializer("fingers")(dump_set_fields)
-
-    objects: dict[Name, Object] | None = Field(None, description="Objects that the finger may touch, by name.")
 
 
 def _checked(scenario: Scenario) -> tuple[object, ...]:
@@ -338,9 +291,4 @@ class Scenario(Description):
 
     def sample_times(self) -> Array:
         """Return the times of the saved signals, s: multiples of the sampling period, and the end."""
-        duration, rate = self.simulation.duration, self.simulation.sample_rate
-        times = np.arange(math.floor(duration * rate * (1.0 + 1e-12)) + 1) / rate
-        if math.isclose(times[-1], duration, rel_tol=1e-9):
-            times[-1] = duration
-            return times
-        return np.append(times, duration)
+        return self.simulation.sample_times()

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription, HandSettings
-from finger_pin.description.objects import Object
-from finger_pin.description.scenario import EnvironmentSettings, Scenario
+from finger_pin.description.objects import EnvironmentSettings, Object
+from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
 

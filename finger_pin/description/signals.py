@@ -8,10 +8,20 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, field_serializer, field_validator, model_validator
 
+from finger_pin.description.by_finger import flatten, unflatten
 from finger_pin.description.recordings.series import Series, series
-from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE, Description, choice, problem, quantity, real
+from finger_pin.description.validation import (
+    IN_RADIANS,
+    MOST_ANGLE,
+    Description,
+    FullName,
+    choice,
+    problem,
+    quantity,
+    real,
+)
 
 #: The most points or samples of a signal in a file. Arrays in Python may be longer.
 MOST_POINTS = 1_000_000
@@ -174,3 +184,19 @@ def of_axes(signals: dict[str, ForceSignal] | None) -> dict[str, ForceSignal] | 
         if name not in AXES:
             raise problem(name, f"no such axis; the axes are {', '.join(AXES)}")
     return signals
+
+
+class ReferenceSettings(Description):
+    """References by joint; a joint without one is held at zero, a joint driven by a passive tendon follows (20).
+
+    In a hand the tables of a finger's joints stand in one of its own, such as ``joints.index.medial``.
+
+    In a file, ``file`` names a CSV file: its columns are ``time`` and joints, and become their samples.
+    """
+
+    file_keys = ("file",)
+
+    joints: dict[FullName, JointReference] = Field({}, description="By joint.")
+
+    _flat = field_validator("joints", mode="before")(flatten)
+    _nested = field_serializer("joints", mode="wrap")(unflatten)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_serializer, field_validator, model_validator
 
 from finger_pin.description.by_finger import flat_numbers, unflatten
@@ -69,3 +72,11 @@ class SimulationSettings(Description):
             allowed = f"duration times sample_rate must be at most {MOST_SAMPLES} samples"
             raise problem("sample_rate", allowed, self.sample_rate)
         return self
+
+    def sample_times(self) -> NDArray[np.float64]:
+        """Return the times of the saved signals, s: multiples of the sampling period, and the end."""
+        times = np.arange(math.floor(self.duration * self.sample_rate * (1.0 + 1e-12)) + 1) / self.sample_rate
+        if math.isclose(times[-1], self.duration, rel_tol=1e-9):
+            times[-1] = self.duration
+            return times
+        return np.append(times, self.duration)

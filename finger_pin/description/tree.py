@@ -15,7 +15,8 @@ from pydantic import Field, model_validator
 
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.objects import Object
-from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeActuator, TreeJoint, TreeTendon
+from finger_pin.description.tree_actuators import TreeActuator
+from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeJoint, TreeTendon
 from finger_pin.description.validation import Description, Name, problem, suggestion
 
 #: What is more is no radius that a cord winds at, as `Crossing` has it, m.

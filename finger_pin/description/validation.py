@@ -168,12 +168,6 @@ def finite_vector(name: str, value: Sequence[float] | NDArray[np.float64], size:
     return found
 
 
-def all_finite(values: NDArray[np.float64]) -> bool:
-    """Return whether all numbers of an array are finite; plain Python is faster for a few."""
-    # The sum of their squares tells in most cases.
-    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
-
-
 def check_size(value: Numbers, names: Sequence[str], entry: str, what: str) -> None:
     """Raise the error of an entry whose list does not have one number per name."""
     if isinstance(value, tuple) and len(value) != len(names):
@@ -225,10 +219,8 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
 
 
 # What people call keys whose names are not near.
-_MEANT = {"motor_position": "spool_angle", "motor_angle": "spool_angle", "winding": "tendon_winding"} | {
-    "windings": "tendon_winding",
-    "tendon_length": "tendon_winding",
-}
+_MEANT = dict.fromkeys(("motor_position", "motor_angle"), "spool_angle")
+_MEANT |= dict.fromkeys(("winding", "windings", "tendon_length"), "tendon_winding")
 _MESSAGES = {
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",

@@ -21,7 +21,7 @@ from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.exchange.mujoco_actuators import ActuatorReader
 from finger_pin.exchange.mujoco_equalities import read_equalities
 from finger_pin.exchange.mujoco_free import FreeBodies
-from finger_pin.exchange.mujoco_names import Names, Table, distinct, entry_name, quaternion
+from finger_pin.exchange.mujoco_names import Names, Table, distinct, entry_name, free_name, quaternion
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
 from finger_pin.exchange.mujoco_tendons import STOP, TendonReader
@@ -92,15 +92,13 @@ class _Reader:
     def __init__(self, mujoco: Any, model: Any, plugins: list[str]) -> None:
         self.mujoco, self.model = mujoco, apply_flags(mujoco, model)
         model = self.model
-        self.rest = Rest(mujoco, model)
-        self.names = Names.of(model, plugins)
+        self.rest, self.names = Rest(mujoco, model), Names.of(model, plugins)
         self._read = ElementReader(mujoco, model, self.names, self.rest)
         self.shapes = Shapes(self._read)
         kinds = mujoco.mjtJoint
         for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
-            raise InputError(
-                f"joint {self.names.joints[i]}", "is a ball joint; joints have to turn or slide about one axis"
-            )
+            allowed = "is a ball joint; joints have to turn or slide about one axis"
+            raise InputError(f"joint {self.names.joints[i]}", allowed)
         self.actuators = ActuatorReader(*vars(self._read).values())
         self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
         self.free = FreeBodies(self._read, self._passed())
@@ -129,7 +127,7 @@ class _Reader:
             "tree": {
                 "bodies": self._still() | {self.names.bodies[i]: self._body(i) for i in bodies},
                 "joints": moving,
-                "tendons": tendons | {_free(name, tendons): each for name, each in differences.items()},
+                "tendons": tendons | {free_name(name, tendons): each for name, each in differences.items()},
                 "couplings": couplings,
                 "loops": loops,
                 "actuators": actuators,
@@ -300,8 +298,3 @@ class _Reader:
     def _tip(self) -> Table:
         body, position = self._tip_body()
         return {**self.names.carrier(body, "body"), "position": position.tolist()}
-
-
-def _free(name: str, taken: Table) -> str:
-    """Return a name that is not taken."""
-    return _free(f"{name}_equality", taken) if name in taken else name

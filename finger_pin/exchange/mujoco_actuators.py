@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from pydantic import ValidationError
 
-from finger_pin.description.muscle import Muscle
 from finger_pin.description.tree import LARGEST_RADIUS
+from finger_pin.description.tree_actuators import Muscle
 from finger_pin.exchange.mujoco_names import Table, distinct
 from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
 from finger_pin.typing import Array

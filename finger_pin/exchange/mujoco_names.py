@@ -62,3 +62,8 @@ def distinct(what: str, given: list[str]) -> list[str]:
             name = f"{name[:56]}_{index}"
         found.append(name)
     return found
+
+
+def free_name(name: str, taken: Table) -> str:
+    """Return a name that is not taken."""
+    return free_name(f"{name}_equality", taken) if name in taken else name

@@ -15,7 +15,7 @@ from finger_pin.identification.problem import Problem, RecordingModel
 from finger_pin.identification.recordings import RecordedSignal, Recording, unit_of
 from finger_pin.identification.scenario_parameters import with_own_values
 from finger_pin.identification.steady_data import SteadyReadings
-from finger_pin.mechanism.coerce import fitted
+from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
@@ -60,7 +60,7 @@ def recording_models(
         if not parts:
             continue
         own = with_own_values(scenario, recording.name, recording.settings)
-        replacing = None if finger is None else fitted(finger, scenario, own)
+        replacing = None if finger is None else with_parameters_of(finger, scenario, own)
         if steady:
             models.append(SteadyReadings(recording, own, replacing))
         else:

@@ -20,7 +20,7 @@ from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.identification.problem import At, NuisanceParameter, own_number
 from finger_pin.identification.recordings import Recording, check_pulling
-from finger_pin.mechanism.coerce import fitted
+from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import RunArrays, recorded
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
@@ -175,7 +175,7 @@ class RecordedMotion:
 
     def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
         moved = self._with_own(scenario, own)
-        finger = None if self._finger is None else fitted(self._finger, self.scenario, moved)
+        finger = None if self._finger is None else with_parameters_of(self._finger, self.scenario, moved)
         return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger), estimate_error=False)
 
     def _made(

@@ -9,6 +9,7 @@ import numpy as np
 from finger_pin.analysis.equilibrium import equilibrium
 from finger_pin.analysis.steady import steady_state
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import as_inputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
@@ -52,7 +53,7 @@ def settled_posture(finger: Finger, load: Array, speed: float | None, near: Arra
         x = finger.rest_state((size * y)[:joints])
         state = layout.unpack(x)
         state.passive_position[:] = (size * y)[joints:]
-        rates = layout.unpack(finger.rhs(0.0, x, finger.packed_inputs(delivered(state.position)), force))
+        rates = layout.unpack(finger.rhs(0.0, x, as_inputs(finger, delivered(state.position)), force))
         return np.asarray(np.append(rates.velocity, rates.passive_velocity) / size)
 
     found = _newton(acceleration, np.append(state.position, state.passive_position) / size)

@@ -12,7 +12,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.identification.problem import At, NuisanceParameter, own_number
 from finger_pin.identification.recordings import Recording, check_pulling
 from finger_pin.identification.settled import settled_posture
-from finger_pin.mechanism.coerce import fitted
+from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
@@ -136,7 +136,7 @@ class SteadyReadings:
 
     def _finger(self, scenario: Scenario) -> Finger:
         if self._replacing is not None:
-            return fitted(self._replacing, self.scenario, scenario)
+            return with_parameters_of(self._replacing, self.scenario, scenario)
         return Finger(scenario.finger, objects=scenario.environment.objects)
 
     def _settled(self, scenario: Scenario, load: Array) -> Array:

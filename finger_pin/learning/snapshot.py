@@ -15,8 +15,7 @@ from finger_pin.core.compiled_fingers import CompiledFingers
 from finger_pin.core.stepping.trajectory import Statistics, Trajectory
 from finger_pin.learning.action import Action
 from finger_pin.mechanism.evaluation import Outputs
-from finger_pin.mechanism.rigid_body import Motion
-from finger_pin.mechanism.state import State
+from finger_pin.mechanism.state import Motion, State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.simulation.row_variables import RESIDUAL

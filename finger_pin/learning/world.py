@@ -25,7 +25,7 @@ from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.snapshot import known_variables, snapshot
 from finger_pin.learning.task import Task
-from finger_pin.mechanism.coerce import FingerLike, fitted, is_other_hand, resolve_finger, with_finger
+from finger_pin.mechanism.coerce import FingerLike, is_other_hand, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
@@ -115,7 +115,7 @@ class World:
         if origin is None:
             finger = self._given
             if self._nominal is not None:
-                finger = fitted(self._nominal[0], self._family.scenario, scenario)
+                finger = with_parameters_of(self._nominal[0], self._family.scenario, scenario)
                 if finger.layout.names != self._nominal[0].layout.names:
                     raise InputError("randomise", "must keep what the state consists of", self.sampled)
             origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled()

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from finger_pin.core.stepping.batch import IDLE, BatchStepper
 from finger_pin.description.loading import ScenarioLike
-from finger_pin.description.validation import all_finite
 from finger_pin.exceptions import InputError
 from finger_pin.learning.sensors import measurements
 from finger_pin.learning.snapshot import BatchedLoop, BatchedSnapshot, known_variables
-from finger_pin.learning.task import Task
+from finger_pin.learning.task import Task, all_finite
 from finger_pin.learning.world import World
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.typing import Array

@@ -19,7 +19,8 @@ import numpy as np
 from finger_pin.description.finger import FingerDescription
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths, Wrap, find_wraps
+from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
+from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
 from finger_pin.mechanism.tendons import BRISTLES, LOSSES, SLACK, SOURCES, Tendons
 from finger_pin.mechanism.tree import ELASTIC, table_of
 from finger_pin.typing import Array

@@ -1,16 +1,22 @@
-"""The kinds of argument that stand for a finger: one that is built, a description, a name, a file."""
+"""The kinds of argument that stand for a finger, for its state and for its inputs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import finite_vector, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.state import State
+from finger_pin.typing import Array
 
 #: Wherever a finger is taken: itself, its description, the name of one that ships, or the path of a file.
 FingerLike: TypeAlias = Finger | DescriptionLike
@@ -44,7 +50,7 @@ def is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:
     return finger is not None and scenario.hand is not None and finger.description != scenario.finger
 
 
-def fitted(finger: Finger, known: Scenario, other: Scenario) -> Finger:
+def with_parameters_of(finger: Finger, known: Scenario, other: Scenario) -> Finger:
     """Return a finger with another scenario's numbers; itself if they are the same.
 
     Raises:
@@ -56,3 +62,41 @@ def fitted(finger: Finger, known: Scenario, other: Scenario) -> Finger:
     if is_other_hand(finger, known):
         raise InputError("hand", "does not act: the hand that was given is not the scenario's", known.finger.name)
     return finger.changed(other.finger, objects)
+
+
+def as_packed(finger: Finger, state: State | ArrayLike, name: str) -> Array:
+    """Return a packed state, shape (size,), from one, from the state by name, or from theta, shape (n,), of rest.
+
+    Raises:
+        InputError: If it has another size, or a number is not finite; ``name`` names the argument.
+    """
+    given = finger.layout.pack(state) if isinstance(state, State) else state
+    try:
+        found = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        found = np.array(np.nan)
+    joints, size = len(finger.routing.joints), finger.layout.size
+    if found.shape not in ((joints,), (size,)) or not np.isfinite(found).all():
+        told = found.tolist() if found.ndim else type(state).__name__
+        allowed = f"must be {size} finite numbers, a packed state, or {joints}, angles of rest"
+        raise InputError(name, allowed, told)
+    return found if found.shape == (size,) else finger.rest_state(found)
+
+
+def as_inputs(finger: Finger, given: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
+    """Return inputs u, shape (u,), from a sequence or from a table by name, 0 if left out.
+
+    Raises:
+        InputError: If there is no such input, or the numbers are not as many as inputs and finite; ``name`` names
+            the argument.
+    """
+    if not isinstance(given, Mapping):
+        return np.array(finite_vector(name, np.asarray(given, dtype=float), finger.mechanism.channels))
+    for each in given:
+        if each not in finger.input_names:
+            hint = suggestion(each, finger.input_names)
+            allowed = f"no such input; there are {', '.join(finger.input_names)}{hint}"
+            raise InputError(f"{name}.{each}", allowed)
+    values = np.zeros(finger.mechanism.channels)
+    values[: len(finger.input_names)] = [given.get(each, 0.0) for each in finger.input_names]
+    return np.array(finite_vector(name, values, len(values)))

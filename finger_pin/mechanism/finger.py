@@ -7,22 +7,19 @@ from functools import partial
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
-from finger_pin.description.validation import finite_vector, suggestion
-from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
-from finger_pin.mechanism.finger_parts import Parts, state_layout
+from finger_pin.mechanism.finger_parts import Parts, check_joints, state_layout
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import Motion, RigidBody
+from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 from finger_pin.mechanism.scene import Scene
-from finger_pin.mechanism.state import State
+from finger_pin.mechanism.state import Motion
 from finger_pin.mechanism.tendon_paths import Excursions, TendonPaths
 from finger_pin.mechanism.tree import build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
@@ -80,7 +77,7 @@ class Finger:
             self.rigid_body = rigid_body or build_rigid_body(description)
         else:
             self.rigid_body, self.paths = build_tree(description)
-        _check_joints(self.rigid_body, description)
+        check_joints(self.rigid_body, description)
         parts = Parts.of(description)
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self._excursions = Excursions(self.routing, description, self.paths)
@@ -192,24 +189,6 @@ class Finger:
             state.object_pose[:], state.object_velocity[:] = self.scene.start()
         return x
 
-    def packed(self, state: State | ArrayLike, name: str) -> Array:
-        """Return a packed state, shape (size,), from one, from the state by name, or from theta, shape (n,), of rest.
-
-        Raises:
-            InputError: If it has another size, or a number is not finite; ``name`` names the argument.
-        """
-        given = self.layout.pack(state) if isinstance(state, State) else state
-        try:
-            found = np.array(given, dtype=float)
-        except (TypeError, ValueError):
-            found = np.array(np.nan)
-        joints, size = len(self.routing.joints), self.layout.size
-        if found.shape not in ((joints,), (size,)) or not np.isfinite(found).all():
-            told = found.tolist() if found.ndim else type(state).__name__
-            allowed = f"must be {size} finite numbers, a packed state, or {joints}, angles of rest"
-            raise InputError(name, allowed, told)
-        return found if found.shape == (size,) else self.rest_state(found)
-
     @property
     def input_names(self) -> tuple[str, ...]:
         """Names of the inputs u: the actuated tendons, of winches what is wound, then the actuators of a tree."""
@@ -217,24 +196,6 @@ class Finger:
         names = zip(routing.tendons, routing.winched, strict=False)
         inputs = (f"tendon_winding.{name}" if winched else name for name, winched in names)
         return (*inputs, *(tree.actuators if tree is not None else ()))
-
-    def packed_inputs(self, given: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
-        """Return inputs u, shape (u,), from a sequence or from a table by name, 0 if left out.
-
-        Raises:
-            InputError: If there is no such input, or the numbers are not as many as inputs and finite; ``name`` names
-                the argument.
-        """
-        if not isinstance(given, Mapping):
-            return np.array(finite_vector(name, np.asarray(given, dtype=float), self.mechanism.channels))
-        for each in given:
-            if each not in self.input_names:
-                hint = suggestion(each, self.input_names)
-                allowed = f"no such input; there are {', '.join(self.input_names)}{hint}"
-                raise InputError(f"{name}.{each}", allowed)
-        values = np.zeros(self.mechanism.channels)
-        values[: len(self.input_names)] = [given.get(each, 0.0) for each in self.input_names]
-        return np.array(finite_vector(name, values, len(values)))
 
     def evaluate(
         self,
@@ -319,15 +280,6 @@ class Finger:
     def rhs(self, time: float, x: Array, inputs: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for custom solvers; ``time`` is not used."""
         return self.mechanism.evaluate(x, inputs, fingertip_force).rate
-
-
-def _check_joints(body: RigidBody, description: FingerDescription) -> None:
-    """Refuse a rigid body whose joints are not those of a description, or that has one with several coordinates."""
-    if len(body.joints) != len(description.joints):
-        raise InputError("finger.joints", f"the rigid body's joints are {', '.join(body.joints)}")
-    for name, joint in zip(body.joints, body.model.joints[1:], strict=True):
-        if joint.nv != 1:
-            raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
 
 
 #: A hand is a finger whose joints form a tree.

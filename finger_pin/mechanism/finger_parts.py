@@ -10,9 +10,11 @@ import numpy as np
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.canals import Canals
 from finger_pin.mechanism.joints import JointFriction, JointSprings, StrokeLimiter
+from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, state_scales
 from finger_pin.mechanism.scene import Scene
 from finger_pin.mechanism.state import BLOCKS, Layout
@@ -187,3 +189,12 @@ def state_layout(
 @memoised(lambda layout: (layout,))
 def _same(layout: Layout) -> Layout:
     return layout
+
+
+def check_joints(body: RigidBody, description: FingerDescription) -> None:
+    """Refuse a rigid body whose joints are not those of a description, or that has one with several coordinates."""
+    if len(body.joints) != len(description.joints):
+        raise InputError("finger.joints", f"the rigid body's joints are {', '.join(body.joints)}")
+    for name, joint in zip(body.joints, body.model.joints[1:], strict=True):
+        if joint.nv != 1:
+            raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())

@@ -1,4 +1,4 @@
-"""The packed state vector: the only place that knows its order and sizes.
+"""The packed state vector, whose order and sizes only this module knows; kinematics and energies of a motion.
 
     | theta |  o  | p | theta_m | theta' |  o' | p' | theta_m' |  z  | F^s they hold | tendons | joints | gears |
     |   n   | 7 f | p |    m    |   n    | 6 f | p  |    m     | 2 c |       h       |    t    |   n    |   m   |
@@ -236,3 +236,40 @@ class Layout:
         for kind, own in self.scaled:
             scales[self._parts[kind]] = own
         return scales
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """Positions and velocities of the rigid body; leading dimensions such as time are kept.
+
+    Attributes:
+        tip: p, fingertip position, shape (..., 3), m; of several shape (..., t, 3).
+        tip_velocity: p', m/s, of the same shape.
+        jacobian: J of (6), shape (..., 3, n); of several (..., t, 3, n).
+        directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
+        kinetic_energy: Shape (...,), J.
+        potential_energy: Of gravity, shape (...,), J.
+    """
+
+    tip: Array
+    tip_velocity: Array
+    jacobian: Array
+    directions: Array
+    kinetic_energy: Array
+    potential_energy: Array
+
+
+class Motion(NamedTuple):
+    """Place of the fingertip and energies of the rigid body; leading dimensions are kept.
+
+    Attributes:
+        tip: p, shape (..., 3), m; of several shape (..., t, 3).
+        kinetic_energy: Shape (...,), J.
+        potential_energy: Of gravity, shape (...,), J.
+        objects: Both energies of free objects around it; None without surroundings.
+    """
+
+    tip: Array
+    kinetic_energy: Array
+    potential_energy: Array
+    objects: tuple[Array, Array] | None = None

@@ -17,7 +17,7 @@ from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coe
 from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.joints import OF_TENDONS, bristles, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows, drive_matrices
-from finger_pin.mechanism.tendon_paths import Wrap, find_wraps
+from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
 from finger_pin.typing import Array, Number
 
 #: What ideal sources of force supply.
@@ -216,10 +216,8 @@ class Tendons:
         if self.held:
             return self._rows(drives, motors)
         # How they are wired, other numbers of friction leave alone.
-        tables = self._wired(drives, motors)
-        friction = self._friction
-        halves, *_, driven, passive = tables
-        taken, actuated = driven.parameters[-1:], self.routing.actuated
+        halves, *_, driven, passive = self._wired(drives, motors)
+        friction, taken, actuated = self._friction, driven.parameters[-1:], self.routing.actuated
         return [
             halves.with_parameters(np.repeat(self.half_stiffness, 2)[None]),
             *drives,

@@ -13,7 +13,8 @@ from numpy.polynomial import Polynomial
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.tree import Tree
-from finger_pin.description.tree_parts import Coupling, TreeActuator
+from finger_pin.description.tree_actuators import TreeActuator
+from finger_pin.description.tree_parts import Coupling
 from finger_pin.exceptions import InputError
 from finger_pin.laws.actuator import ACTUATOR, ACTUATOR_WITH_STATE
 from finger_pin.laws.bristle import PIN_FRICTION
@@ -25,7 +26,8 @@ from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
-from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, find_wraps, rotation
+from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, rotation
+from finger_pin.mechanism.tendon_wraps import find_wraps
 from finger_pin.mechanism.tendons import SOURCES
 from finger_pin.typing import Array
 

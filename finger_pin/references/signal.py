@@ -294,9 +294,6 @@ def _joined(columns: Sequence[PPoly | None]) -> tuple[Array, Array]:
         since = np.clip(start, each.x[0], each.x[-1]) - each.x[piece]
         inside = (middle > each.x[0]) & (middle < each.x[-1])
         for power in range(_ORDER):
-            terms = [
-                math.comb(higher, power) * powers[higher, piece] * since ** (higher - power)
-                for higher in range(power, _ORDER)
-            ]
+            terms = [math.comb(h, power) * powers[h, piece] * since ** (h - power) for h in range(power, _ORDER)]
             coefficients[_ORDER - 1 - power, :, column] = sum(terms) * (inside | (power == 0))
     return knots, coefficients

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.stepping.trajectory import Trajectory
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.state import Motion
 from finger_pin.simulation.energy import Flows, energies, powers
 from finger_pin.typing import Array
 

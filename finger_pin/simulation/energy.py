@@ -14,8 +14,8 @@ import xarray as xr
 
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.rigid_body import Kinematics, Motion
 from finger_pin.mechanism.rows import SUPPLIED, Energies, Energy
+from finger_pin.mechanism.state import Kinematics, Motion
 from finger_pin.typing import Array
 
 FINGERTIP = Energy("fingertip", "fingertip force", SUPPLIED)

@@ -17,7 +17,7 @@ from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
-from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with_finger
+from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import with_tighter
 from finger_pin.simulation.initial_state import custom_parts, packed_state
@@ -204,6 +204,6 @@ class Prepared:
     def _loop(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None = None) -> ClosedLoop:
         """Return the loop of one of the family."""
         # Where nothing of it changes in a run all share it, also in threads.
-        finger = fitted(self._finger, self.family.scenario, scenario)
+        finger = with_parameters_of(self._finger, self.family.scenario, scenario)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
         return loop if initial is None else loop.started(packed_state(initial, loop.finger))

@@ -11,9 +11,8 @@ from finger_pin.control.interface import ControlSignals
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.mechanism.evaluation import ContactPoints, Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import Energy
-from finger_pin.mechanism.state import State
+from finger_pin.mechanism.state import Motion, State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.account import Account, account
 from finger_pin.simulation.energy import Flows, energies, powers

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.control.palm import PalmPath, PrescribedObjects
+from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_paths
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.inputs import core_signal, held_control
-from finger_pin.core.stepping.batch import BatchStepper
+from finger_pin.core.inputs import held_control
+from finger_pin.core.stepping.batch import batch_of
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.validation import suggestion
@@ -33,9 +32,7 @@ _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 
 
 class Simulator:
-    """A finger that is stepped under tensions held over each step; deterministic, and compiled.
-
-    A palm with a path moves along it.
+    """A finger that is stepped under tensions held over each step; a palm with a path moves along it.
 
         sim = Simulator(Finger(load_finger("ub")), position=[0.0, 0.3, 0.3, 0.2])
         for _ in range(1000):
@@ -93,10 +90,7 @@ class Simulator:
         control = held_control(mechanism.channels, mechanism.coordinates)
         self._guides = PrescribedObjects.of(finger, 0.0, self._settings["rtol"])
         self._palm = PalmPath.of(finger.description.hand, 0.0, finger, self._settings["rtol"])
-        if self._guides is not None:
-            control = control._replace(guide=core_signal(self._guides.signal))
-        if self._palm is not None:
-            control = control._replace(palm=core_signal(self._palm.signal))
+        control = with_paths(control, self._palm, self._guides)
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
         self._stepper = Stepper.of(finger, control, rest, **self._settings)
         self._fresh = self._stepper.state_snapshot
@@ -106,11 +100,8 @@ class Simulator:
 
     def _at(self, position: Array) -> Array:
         """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
-        finger, x = self.finger, self.finger.rest_state(position)
-        if self._palm is not None:
-            x = self._palm.place_world(finger, x)
-        if self._guides is not None:
-            x = self._guides.place(finger, x)
+        finger = self.finger
+        x = at_start(finger, finger.rest_state(position), self._palm, self._guides)
         if finger.scene is not None:
             finger.scene.check(finger.layout.unpack(x))
         return x
@@ -159,9 +150,8 @@ class Simulator:
         """
         if self._family is None or self._family.keys != tuple(values):
             self._family = ParametrisedScenario.of_finger(self.finger.description, tuple(values))
-        changed = self.finger.changed(
-            self._family.with_values([*values.values()]).finger, self.finger.constructor_args[2]
-        )
+        described = self._family.with_values([*values.values()]).finger
+        changed = self.finger.changed(described, self.finger.constructor_args[2])
         if changed.layout.names != self.finger.layout.names:
             raise InputError("values", "make a finger with another state: make another simulator of it")
         x, time = self.x, self.time
@@ -176,10 +166,7 @@ class Simulator:
 
     @property
     def x(self) -> Array:
-        """The packed state, shape (size,); a copy.
-
-        Setting it continues from there, at the same time, with a new result.
-        """
+        """The packed state, shape (size,), a copy; setting it goes on from there, with a new result."""
         return self._stepper.x.copy()
 
     @x.setter
@@ -198,9 +185,8 @@ class Simulator:
         """Advance by a time under constant tensions; return the state then.
 
         Args:
-            inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon;
-                of an ideal winch the length that is wound in, m.
-                Inputs of a tree's actuators follow.
+            inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon; of
+                an ideal winch the length that is wound in, m. Inputs of a tree's actuators follow.
             dt: s.
             fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
 
@@ -305,21 +291,9 @@ def step_many(
     acting = [one._checked(inputs, dt, own) for one, inputs, own in zip(simulators, tensions, forces, strict=True)]
     for simulator, (command, force) in zip(simulators, acting, strict=True):
         simulator._hold(command, force)
-    statuses = _together(simulators).advance([each.time + dt for each in simulators])
+    statuses = batch_of(simulators[0], [each._stepper for each in simulators]).advance(
+        [each.time + dt for each in simulators]
+    )
     for simulator in simulators:
         simulator._log.add(simulator._stepper.time, simulator._tension, simulator._force)
     return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]
-
-
-# By the first of the simulators that were stepped together: as a rule they are again.
-_TOGETHER: WeakKeyDictionary[Simulator, BatchStepper] = WeakKeyDictionary()
-
-
-def _together(simulators: Sequence[Simulator]) -> BatchStepper:
-    """Return what steps simulators side by side."""
-    steppers = [each._stepper for each in simulators]
-    found = _TOGETHER.get(simulators[0])
-    if found is None or not found.is_for(steppers):
-        found = BatchStepper(steppers)
-        _TOGETHER[simulators[0]] = found
-    return found

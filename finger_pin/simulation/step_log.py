@@ -19,6 +19,7 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, IntegrationError
@@ -88,15 +89,7 @@ class StepLog:
         inputs, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
         tension, channels = inputs.copy(), finger.actuators.voltages
         tension[:, channels] = 0.0
-        description = finger.description
-        table = {
-            "name": description.name,
-            "title": f"{description.name} in a loop of one's own",
-            "finger": description,
-            "controller": {"kind": "tensions"},
-            "simulation": {"duration": float(knots[-1] - knots[0]), **settings},
-        }
-        scenario = validate(Scenario, table, ())
+        scenario = _scenario(finger.description, {"duration": float(knots[-1] - knots[0]), **settings})
         check_memory(scenario.simulation, finger)
         if reference is None:
             posture = finger.layout.unpack(stepper.x).position
@@ -126,6 +119,18 @@ class StepLog:
         if gap:
             result.attrs["account"] = gap
         return result
+
+
+def _scenario(description: FingerDescription, settings: dict[str, Any]) -> Scenario:
+    """Return the scenario of a loop, in which tensions are given."""
+    table = {
+        "name": description.name,
+        "title": f"{description.name} in a loop of one's own",
+        "finger": description,
+        "controller": {"kind": "tensions"},
+        "simulation": settings,
+    }
+    return validate(Scenario, table, ())
 
 
 class _Repeated:

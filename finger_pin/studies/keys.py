@@ -16,7 +16,7 @@ from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import find_field, suggestion
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, fitted, resolve_finger, with_finger
+from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
 
 #: What a key may be given: a number, or a name such as that of a method, or yes or no.
@@ -61,7 +61,7 @@ class BaseScenario:
 
     def finger_at(self, scenario: Scenario) -> Finger | None:
         """Return the replacement of the finger of a point's scenario, or None."""
-        return None if self.finger is None else fitted(self.finger, self.scenario, scenario)
+        return None if self.finger is None else with_parameters_of(self.finger, self.scenario, scenario)
 
     def check(self, key: str, values: Sequence[Value], *, alone: bool = False) -> None:
         """Raise unless a key can hold values of this kind.

@@ -7,7 +7,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.analysis import equilibrium
 from finger_pin.description.loading import read_scenario, to_toml
-from finger_pin.description.muscle import Muscle
+from finger_pin.description.tree_actuators import Muscle
 from finger_pin.laws.law import Row
 from finger_pin.laws.muscle import MUSCLE
 

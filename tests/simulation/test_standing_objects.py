@@ -126,3 +126,18 @@ def test_both_evaluations_agree_on_a_world_that_turns(swept):
     for one, other in zip(compiled.mechanism.account(), readable.mechanism.account(), strict=True):
         for name in other:
             assert one[name] == pytest.approx(other[name], rel=1e-8, abs=1e-12)
+
+
+def test_a_prepared_run_from_a_given_state_has_the_world_where_the_palm_s_path_has_it(load):
+    scenario = load(HAND, TUMBLE, POST, 'frame = "world"\n', "[simulation]\nduration = 0.02\nstart_time = 0.2\n")
+    loop = ClosedLoop.from_scenario(scenario)
+    start, unplaced = loop.initial_state(), loop.initial_state()
+    state = loop.finger.layout.unpack(unplaced)
+    assert np.abs(state.world_position).max() > 0.01
+    state.world_position[:] = state.world_velocity[:] = 0.0
+    prepared = fp.prepare(scenario)
+    np.testing.assert_array_equal(
+        prepared.run(initial=unplaced)["joint_position"], prepared.run(initial=start)["joint_position"]
+    )
+    again = fp.simulate(scenario, initial=unplaced).joint_position.values
+    np.testing.assert_array_equal(prepared.run(initial=unplaced)["joint_position"], again)

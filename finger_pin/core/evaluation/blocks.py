@@ -1,4 +1,4 @@
-"""Blocks: the coupled parts of a step's linear systems, found again at every step.
+"""Blocks: the coupled parts of a step's linear systems, found again at every step, and their factors.
 
 Without contacts a mechanism falls into atoms, such as the fingers of a hand and what lies around. Contacts that are
 closed join atoms to blocks. One that is open is held open during the step: it exerts nothing, whatever moves, and
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from finger_pin.core.buffers import Blocks, Work
 from finger_pin.core.evaluation import law_code as at
-from finger_pin.core.jit import Matrix, njit_always_inline, njit_inline
+from finger_pin.core.jit import Indices, Matrix, njit_always_inline, njit_inline
 from finger_pin.core.tables import Tables
 
 
@@ -95,3 +95,48 @@ def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
                 states += 1
         blocks.coordinate_start[b + 1], blocks.row_start[b + 1] = coordinates, rows
         blocks.touch_start[b + 1], blocks.state_start[b + 1] = touches, states
+
+
+@njit_always_inline
+def factorise(matrix: Matrix, size: int, pivots: Indices) -> bool:
+    """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
+    for c in range(size):
+        best = c
+        for r in range(c + 1, size):
+            if abs(matrix[r, c]) > abs(matrix[best, c]):
+                best = r
+        pivots[c] = best
+        if not abs(matrix[best, c]) > 0.0:
+            return False
+        if best != c:
+            for k in range(size):
+                matrix[c, k], matrix[best, k] = matrix[best, k], matrix[c, k]
+        for r in range(c + 1, size):
+            factor = matrix[r, c] / matrix[c, c]
+            matrix[r, c] = factor
+            for k in range(c + 1, size):
+                matrix[r, k] -= factor * matrix[c, k]
+    return True
+
+
+@njit_always_inline
+def substitute(matrix: Matrix, size: int, pivots: Indices, right: Matrix, wide: int) -> None:
+    """Replace right-hand sides, one a column, by solutions."""
+    for r in range(size):
+        best = pivots[r]
+        if best != r:
+            for c in range(wide):
+                right[r, c], right[best, c] = right[best, c], right[r, c]
+    for r in range(size):
+        for k in range(r):
+            factor = matrix[r, k]
+            for c in range(wide):
+                right[r, c] -= factor * right[k, c]
+    for r in range(size - 1, -1, -1):
+        for k in range(r + 1, size):
+            factor = matrix[r, k]
+            for c in range(wide):
+                right[r, c] -= factor * right[k, c]
+        inverse = 1.0 / matrix[r, r]
+        for c in range(wide):
+            right[r, c] *= inverse

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from finger_pin.core.buffers import Linear
 from finger_pin.core.evaluation import law_code as at
-from finger_pin.core.evaluation.blocks import extent
+from finger_pin.core.evaluation.blocks import extent, factorise, substitute
 from finger_pin.core.jit import (
     CompiledFunction,
     Indices,
@@ -157,51 +157,6 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
             arm, target = linear.arm[e], force[place[tables.arm_at[e]]]
             for c in range(wide):
                 target[c] += arm * row[c]
-
-
-@njit_always_inline
-def factorise(matrix: Matrix, size: int, pivots: Indices) -> bool:
-    """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
-    for c in range(size):
-        best = c
-        for r in range(c + 1, size):
-            if abs(matrix[r, c]) > abs(matrix[best, c]):
-                best = r
-        pivots[c] = best
-        if not abs(matrix[best, c]) > 0.0:
-            return False
-        if best != c:
-            for k in range(size):
-                matrix[c, k], matrix[best, k] = matrix[best, k], matrix[c, k]
-        for r in range(c + 1, size):
-            factor = matrix[r, c] / matrix[c, c]
-            matrix[r, c] = factor
-            for k in range(c + 1, size):
-                matrix[r, k] -= factor * matrix[c, k]
-    return True
-
-
-@njit_always_inline
-def substitute(matrix: Matrix, size: int, pivots: Indices, right: Matrix, wide: int) -> None:
-    """Replace right-hand sides, one a column, by solutions."""
-    for r in range(size):
-        best = pivots[r]
-        if best != r:
-            for c in range(wide):
-                right[r, c], right[best, c] = right[best, c], right[r, c]
-    for r in range(size):
-        for k in range(r):
-            factor = matrix[r, k]
-            for c in range(wide):
-                right[r, c] -= factor * right[k, c]
-    for r in range(size - 1, -1, -1):
-        for k in range(r + 1, size):
-            factor = matrix[r, k]
-            for c in range(wide):
-                right[r, c] -= factor * right[k, c]
-        inverse = 1.0 / matrix[r, r]
-        for c in range(wide):
-            right[r, c] *= inverse
 
 
 @CompiledFunction

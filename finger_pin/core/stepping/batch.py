@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
+from weakref import WeakKeyDictionary
 
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.threads import in_threads
@@ -50,3 +52,15 @@ class BatchStepper:
                 row[:] = part.x
         else:
             out[:] = [stepper.x for stepper in self._steppers]
+
+
+# By who stepped them together: as a rule the same are stepped again.
+_LAST: WeakKeyDictionary[Any, BatchStepper] = WeakKeyDictionary()
+
+
+def batch_of(owner: Any, steppers: Sequence[Stepper]) -> BatchStepper:
+    """Return the batch of some steppers: that which an owner used last if it is the same, else a new one."""
+    found = _LAST.get(owner)
+    if found is None or not found.is_for(steppers):
+        found = _LAST[owner] = BatchStepper(steppers)
+    return found

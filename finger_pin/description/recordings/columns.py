@@ -17,6 +17,7 @@ from finger_pin.description.recordings.bench import Column
 from finger_pin.description.recordings.series import Series
 from finger_pin.description.validation import Description, nearest, suggestion, validate
 from finger_pin.exceptions import InputError
+from finger_pin.files import expand, read_text
 
 _POUND, _GRAVITY = 0.45359237, 9.80665
 #: By SI unit, the units that a column may have and what one of each is.
@@ -40,7 +41,6 @@ UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
 }
 
-_LARGEST = 100_000_000
 # What stands in a cell, besides nothing, where nothing was measured.
 _MISSING = ("na", "n/a", "null", "none", "-")
 # A name in a header with its unit: in brackets, or of signals after an underscore as well.
@@ -246,35 +246,6 @@ def chosen_rows(entry: str, columns: Mapping[str, Any], rows: Mapping[str, float
     if not chosen.any():
         raise InputError(f"{entry}.rows", "no row has all of them")
     return {name: [cells[k] for k in np.flatnonzero(chosen)] for name, cells in columns.items()}
-
-
-def read_text(what: str, path: Path) -> str:
-    """Return the text of a file in UTF-8.
-
-    Raises:
-        InputError: If it cannot be read, is too large, or is no such text.
-    """
-    try:
-        with open(path, "rb") as file:
-            data = file.read(_LARGEST + 1)
-    except FileNotFoundError:
-        raise InputError(what, "there is no such file") from None
-    except (OSError, ValueError) as error:
-        raise InputError(what, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(data) > _LARGEST:
-        raise InputError(what, f"is larger than {_LARGEST} bytes")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(what, "is not a text file in UTF-8") from None
-
-
-def expand(name: str) -> Path:
-    """Return a path with ~ expanded where there is a home folder."""
-    try:
-        return Path(name).expanduser()
-    except RuntimeError:
-        return Path(name)
 
 
 def _split(name: str, *patterns: re.Pattern[str]) -> tuple[str, str | None]:

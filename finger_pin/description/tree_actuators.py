@@ -1,0 +1,154 @@
+"""Actuators of a tree: affine forces, and muscles as MuJoCo's, whose law is `finger_pin.laws.muscle`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from finger_pin.description.validation import Description, Name, problem, quantity, real, vector
+
+Pair = tuple[float, float]
+_MUJOCO = "MuJoCo's default"
+_LARGE = 1e9
+
+
+class Muscle(Description):
+    """A muscle; lengths without a unit are in optimal lengths L_0, at which its active force is largest.
+
+    L_0 is that with which ``length_range`` (of the tendon or joint, times gear) is ``range``.
+    """
+
+    force: Annotated[float, real(0.0, 1e7, above=True)] = quantity(
+        ..., unit="N", source="design", doc="F, most active force at rest."
+    )
+    length_range: Annotated[Pair, vector(2, -1e3, 1e3)] = quantity(
+        ..., unit="m", source="design", doc="Lengths of what it drives at which it is as long as range says."
+    )
+    range: Annotated[Pair, vector(2, 0.0, 100.0)] = quantity(
+        (0.75, 1.05), unit="1", source=_MUJOCO, doc="Its own least and largest length."
+    )
+    lmin: Annotated[float, real(0.0, 1.0)] = quantity(
+        0.5, unit="1", source=_MUJOCO, doc="Length below which it exerts no active force."
+    )
+    lmax: Annotated[float, real(1.0, 100.0, above=True)] = quantity(
+        1.6, unit="1", source=_MUJOCO, doc="Length above which it exerts no active force."
+    )
+    vmax: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
+        1.5, unit="1/s", source=_MUJOCO, doc="Speed of shortening at which it exerts no active force."
+    )
+    fpmax: Annotated[float, real(0.0, 1e3)] = quantity(
+        1.3, unit="1", source=_MUJOCO, doc="Passive force at lmax over F."
+    )
+    fvmax: Annotated[float, real(1.0, 1e3)] = quantity(
+        1.2, unit="1", source=_MUJOCO, doc="Active force while it is lengthened fast, over that at rest."
+    )
+    time_constants: Annotated[Pair, vector(2, 1e-6, 1e3)] = quantity(
+        (0.01, 0.04), unit="s", source=_MUJOCO, doc="Of activation and of deactivation."
+    )
+    smoothing: Annotated[float, real(0.0, 1.0)] = quantity(
+        0.0, unit="1", source=_MUJOCO, doc="Width, in activation, over which one time constant passes into the other."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for entry in ("length_range", "range"):
+            low, high = getattr(self, entry)
+            if low >= high:
+                raise problem(entry, "the least length must be below the largest", [low, high])
+        if self.lmin >= 1.0:
+            raise problem("lmin", "must be below 1, the optimal length", self.lmin)
+        return self
+
+    @property
+    def optimal_length(self) -> float:
+        """L_0, m, of what it drives."""
+        return (self.length_range[1] - self.length_range[0]) / (self.range[1] - self.range[0])
+
+
+class TreeActuator(Description):
+    """The drive of a joint or a tendon: gain u + offset + by_length l + by_speed l'; l is gear times its length.
+
+    With ``time_constant`` its input comes late, T a' = u - a, and a takes the place of u; with ``integrates`` its input
+    is a rate, a' = u. With ``integral`` the force grows with the sum of the error e, e' = u - l: by integral e.
+
+    With a table ``muscle`` it is a muscle instead: its input is the excitation, and its force is against l.
+    """
+
+    joint: Name | None = Field(None, description="The joint that it drives.")
+    tendon: Name | None = Field(None, description="The tendon that it drives.")
+    gear: Annotated[float, real(-1e6, 1e6)] = quantity(1.0, unit="1", source="design", doc="gear.")
+    gain: Annotated[float, real(-_LARGE, _LARGE)] = quantity(1.0, unit="N per input", source="design", doc="gain.")
+    offset: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N", source="design", doc="b_0.")
+    by_length: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="b_1.")
+    by_speed: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N s/m", source="design", doc="b_2.")
+    input_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
+        None, unit="1", source="design", doc="Between which u is held."
+    )
+    force_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
+        None, unit="N", source="design", doc="Between which the force is held."
+    )
+    time_constant: Annotated[float, real(0.0, 1e3)] = quantity(
+        0.0, unit="s", source="design", doc="T, with which the force follows the input; 0: at once."
+    )
+    integrates: bool = Field(False, strict=True, description="Whether the input is the rate of what it holds.")
+    integral: Annotated[float, real(0.0, _LARGE)] = quantity(
+        0.0, unit="N per input and s", source="design", doc="Gain of the sum of the error, of a servo."
+    )
+    state_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
+        None, unit="1", source="design", doc="Between which a, or the sum of the error, is held."
+    )
+
+    muscle: Muscle | None = Field(None, description="A muscle in place of an affine force.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.joint is None) == (self.tendon is None):
+            raise problem("", "drives a joint or a tendon, and not both")
+        if self.muscle is not None:
+            for entry in sorted(self.model_fields_set - {"joint", "tendon", "gear", "input_range", "muscle"}):
+                if getattr(self, entry) != type(self).model_fields[entry].default:
+                    raise problem(entry, "has no effect beside muscle; leave it out", getattr(self, entry))
+            low, high = self.excitations
+            if not 0.0 <= low < high <= 1.0:
+                raise problem("input_range", "must lie within 0 and 1, those of a muscle's excitation", [low, high])
+        if (self.time_constant > 0.0) + self.integrates + (self.integral > 0.0) > 1:
+            raise problem("", "has one of time_constant, integrates and integral")
+        if self.state_range is not None and not self.has_state:
+            raise problem("state_range", "is for time_constant, integrates or integral", list(self.state_range))
+        for entry in ("input_range", "force_range", "state_range"):
+            given = getattr(self, entry)
+            if given is not None and given[0] > given[1]:
+                raise problem(entry, "the lower limit must not be above the upper one", list(given))
+        return self
+
+    def reach(self, joint: Pair | None) -> Pair | None:
+        """Return the least and the largest input: its range, or what holds a joint at the ends of its own; or None."""
+        if self.muscle is not None:
+            return self.excitations
+        if self.input_range is not None:
+            return self.input_range
+        if joint is None or not self.by_length * self.gain < 0.0 or self.integrates:
+            return None
+        ends = [-self.by_length / self.gain * self.gear * each - self.offset / self.gain for each in joint]
+        return min(ends), max(ends)
+
+    @property
+    def has_state(self) -> bool:
+        """Whether its force depends on more than input and motion of the moment."""
+        return self.time_constant > 0.0 or self.integrates or self.integral > 0.0 or self.muscle is not None
+
+    @property
+    def excitations(self) -> Pair:
+        """The least and the largest input of a muscle."""
+        return self.input_range or (0.0, 1.0)
+
+    @property
+    def only_pulls(self) -> bool:
+        """Whether it never pushes what it drives, whatever its input and motion."""
+        if self.muscle is not None:
+            return self.gear > 0.0
+        bounds = [each * self.gear for each in self.force_range or ()]
+        if not (self.by_length or self.by_speed or self.has_state) and self.input_range is not None:
+            bounds = bounds or [(self.gain * each + self.offset) * self.gear for each in self.input_range]
+        return bool(bounds) and max(bounds) <= 0.0
