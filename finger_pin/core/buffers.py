@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finger_pin.core.evaluation.law_code import SLOPES, widest
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import Indices, Layers, Matrix, Vector
-from finger_pin.core.path_tables import PathWork, build_path_work
+from finger_pin.core.path_tables import COLUMNS, PathWork, build_path_work
 from finger_pin.core.stepping.islands import find_islands
 from finger_pin.core.tables import Tables
 from finger_pin.laws.law import ContactLaw, Law
@@ -185,7 +185,7 @@ def build_blocks(tables: Tables, control: InputTable) -> Blocks:
         row_start=np.array([0, *[count] * atoms]),
         rows=np.arange(count),
         touch_start=room(atoms + 1),
-        touches=room(tables.contact_rows // 3),
+        touches=room(tables.contact_rows // COLUMNS),
         state_start=np.array([0, *[states] * atoms]),
         states=np.arange(states),
         place=np.arange(width),

@@ -99,7 +99,7 @@ def widened(path: float, turned: float, far: float) -> float:
 @njit_inline
 def set_culled(k: int, value: int, culled: Indices) -> None:
     """Set or clear the flag `culled` of a contact's rows."""
-    for m in range(k, k + 3):
+    for m in range(k, k + COLUMNS):
         culled[m] = value
 
 
@@ -146,10 +146,10 @@ def record_end_gaps(tables: Tables, own: PathWork) -> None:
 @njit_always_inline
 def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
-    for m in range(k + 1, k + 3):
+    for m in range(k + 1, k + COLUMNS):
         if not abs(states[tables.state[m]]) < _STRAIGHT:
             return False
-    for m in range(k + 1, k + 3):
+    for m in range(k + 1, k + COLUMNS):
         states[tables.state[m]] = rows[RATE, m] = 0.0
     return True
 
@@ -178,6 +178,15 @@ def update_culling(tables: Tables, rows: Matrix, own: PathWork, states: Vector) 
             changed = True
             set_culled(k, 1, own.culled)
     return changed
+
+
+@njit_always_inline
+def forget_culled(tables: Tables, own: PathWork, first: int, values: Vector) -> None:
+    """Set the states of culled contacts to zero in a vector, in which states of rows begin at a place."""
+    for k in range(0, tables.contact_rows, COLUMNS):
+        if own.culled[k]:
+            for m in range(k + 1, k + COLUMNS):
+                values[first + tables.state[m]] = 0.0
 
 
 @njit_inline

@@ -8,6 +8,7 @@ from finger_pin.core.evaluation.blocks import extent
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
 from finger_pin.core.jit import CompiledFunction, Vector, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
+from finger_pin.core.path_tables import COLUMNS
 from finger_pin.core.tables import END, FIRST, Tables
 
 
@@ -35,7 +36,7 @@ def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
             k = tables.paths.row[e]
             if not begin <= k < end:
                 continue
-            for m in range(k, k + 3):
+            for m in range(k, k + COLUMNS):
                 speed = 0.0
                 # One that is open moves nothing, and sees no speed.
                 for a in range(tables.arm_start[m], tables.arm_start[m + 1] if paths.active[e] else 0):
@@ -43,11 +44,11 @@ def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
                 rows[at.LENGTH, m], rows[at.SPEED, m] = paths.length[m], speed
                 if m > k:
                     rows[at.STATE, m] = z[tables.state[m]]
-            call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 3)
+            call_value(tables.laws[g, 0], rows, tables.parameters, k, k + COLUMNS)
     push(tables, work)
     for index in range(work.paths.closed_count[0]):
         k = tables.paths.row[work.paths.closed[index]]
-        for e in range(tables.arm_start[k], tables.arm_start[k + 3]):
+        for e in range(tables.arm_start[k], tables.arm_start[k + COLUMNS]):
             work.torque[tables.arm_at[e]] += work.arm[e] * rows[at.FORCE, tables.arm_row[e]]
 
 

@@ -12,6 +12,7 @@ from finger_pin.core.evaluation.rigid_body import factorise_mass, inverse_dynami
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
+from finger_pin.core.path_tables import COLUMNS
 from finger_pin.core.tables import END, FED, FIRST, PRESSED, Tables
 
 
@@ -126,9 +127,9 @@ def _drive(tables: Tables, work: Work, rate: Vector) -> None:
         torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
     for index in range(work.paths.active_pair_count[0]):
         k = tables.paths.row[work.paths.active_pairs[index]]
-        for m in range(k + 1, k + 3):
+        for m in range(k + 1, k + COLUMNS):
             rate[tables.state[m]] = rows[RATE, m]
-    for i in range(2 * tables.contact_rows // 3, tables.state_row.size):
+    for i in range((COLUMNS - 1) * tables.contact_rows // COLUMNS, tables.state_row.size):
         rate[i] = rows[RATE, tables.state_row[i]]
 
 

@@ -12,6 +12,7 @@ from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_d
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, call_at, call_filling, njit_always_inline, unpack
 from finger_pin.core.model import MODEL
+from finger_pin.core.path_tables import COLUMNS
 from finger_pin.core.tables import END, FIRST, Tables
 
 
@@ -113,7 +114,7 @@ def linearise(address: int, time: float) -> int:
         for index in range(work.paths.active_pair_count[0]):
             k = tables.paths.row[work.paths.active_pairs[index]]
             if begin <= k < end:
-                call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, k, k + 3)
+                call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, k, k + COLUMNS)
     for e in range(tables.bend.size):
         linear.bend[e] = tables.bend[e] * np.sign(x[tables.bend_at[e]])
     _load_slopes(tables, work, linear)

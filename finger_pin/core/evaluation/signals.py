@@ -25,7 +25,7 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.path_tables import Paths
+from finger_pin.core.path_tables import COLUMNS, Paths
 from finger_pin.core.tables import END, FIRST, Tables
 
 
@@ -107,7 +107,7 @@ def fill_energy_terms(tables: Tables, work: Work, totals: Vector) -> None:
             for index in range(work.paths.active_pair_count[0]):
                 k = tables.paths.row[work.paths.active_pairs[index]]
                 if begin <= k < end:
-                    call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, k, k + 3)
+                    call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, k, k + COLUMNS)
                     for i in range(tables.energies.shape[1]):
                         if tables.energies[g, i] >= 0:
                             totals[tables.energies[g, i]] += work.powers[i, k]
@@ -132,7 +132,7 @@ def _touch(paths: Paths, work: Work, out: Matrix) -> None:
         if work.rows[FORCE, k] == 0.0:
             continue
         # Contacts come before all other rows.
-        touch = out[k // 3]
+        touch = out[k // COLUMNS]
         turn_out(own.frame[e], own.out[e], 4, touch[3:6])
         for r in range(3):
             touch[3 + r] += own.origin[e, r]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import list_active_pairs, update_culling
+from finger_pin.core.collision.broad_phase import forget_culled, list_active_pairs, update_culling
 from finger_pin.core.collision.continuous import MISSED_BY_CULLING, NOTHING
 from finger_pin.core.evaluation.attitude_charts import rechart
 from finger_pin.core.inputs import HELD
@@ -133,7 +133,10 @@ def accept_step(args: Any, integration: Integration, model: Model, time: float) 
     first = 2 * model.linear.mass.shape[0]
     if tables.contact_rows and update_culling(tables, model.work.rows, model.work.paths, model.state[first:]):
         list_active_pairs(tables, model.work.paths)
-        _still(integration, model, first)
+        for values in (integration.start, integration.global_error, model.rate):
+            forget_culled(tables, model.work.paths, first, values)
+        for j in range(integration.k.shape[0]):
+            forget_culled(tables, model.work.paths, first, integration.k[j])
     copy(model.state, x)
     integration.memory.time[0] = time
     if taken < args.times.size:
@@ -148,19 +151,6 @@ def accept_step(args: Any, integration: Integration, model: Model, time: float) 
             for c in range(4):
                 args.attitudes[taken, f, c] = attitude[f, c]
         args.taken[0] += 1
-
-
-@njit_always_inline
-def _still(integration: Integration, model: Model, first: int) -> None:
-    """Clear the rates and errors of the states of culled contacts."""
-    tables = model.tables
-    for row in range(0, tables.contact_rows, 3):
-        if model.work.paths.culled[row]:
-            for m in range(row + 1, row + 3):
-                c = first + tables.state[m]
-                integration.start[c] = integration.global_error[c] = model.rate[c] = 0.0
-                for j in range(integration.k.shape[0]):
-                    integration.k[j, c] = 0.0
 
 
 @CompiledFunction
