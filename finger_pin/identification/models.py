@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.motions import RecordedMotion, windows
+from finger_pin.identification.motions import RecordedMotion
 from finger_pin.identification.problem import Problem, RecordingModel
 from finger_pin.identification.recordings import RecordedSignal, Recording, unit_of
 from finger_pin.identification.scenario_parameters import with_own_values
@@ -88,3 +88,18 @@ def _signal(
     return RecordedSignal(
         recording.name, name, unit_of(name), values[at], there, instant[at], load[at], alike, ordered=not steady
     )
+
+
+def windows(recording: Recording) -> Sequence[NDArray[np.intp]]:
+    """Return the rows of the windows that a recording is cut into, each with two rows at least.
+
+    A window begins before what is compared of it by the time that bristles take to follow the motion: how they are bent
+    where it begins is not recorded, and where they slide they forget it.
+    """
+    length, time = recording.settings.window, recording.time
+    if length is None:
+        return [np.arange(len(time))]
+    number = np.floor(time / length * (1.0 + 1e-12)).astype(int)
+    pieces = [time[number == k] for k in np.unique(number)]
+    begun = [(piece[0] - recording.settings.settle, piece[-1]) for piece in pieces if len(piece) > 1]
+    return [np.flatnonzero((time >= first - 1e-9) & (time <= last)) for first, last in begun]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -18,8 +18,9 @@ from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.identification.problem import At, NuisanceParameter, own_number
+from finger_pin.identification.problem import At
 from finger_pin.identification.recordings import Recording, check_pulling
+from finger_pin.identification.scenario_parameters import NuisanceParameter, own_number
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import RunArrays, recorded
@@ -295,18 +296,3 @@ def _tuned(scenario: Scenario, factor: float) -> Scenario:
         min(max(factor * each, min(each, _FINEST)), max(each, _ROUGHEST)) for each in (own.rtol, own.atol_scale)
     )
     return scenario.updated(simulation={"rtol": rtol, "atol_scale": atol})
-
-
-def windows(recording: Recording) -> Sequence[NDArray[np.intp]]:
-    """Return the rows of the windows that a recording is cut into, each with two rows at least.
-
-    A window begins before what is compared of it by the time that bristles take to follow the motion: how they are bent
-    where it begins is not recorded, and where they slide they forget it.
-    """
-    length, time = recording.settings.window, recording.time
-    if length is None:
-        return [np.arange(len(time))]
-    number = np.floor(time / length * (1.0 + 1e-12)).astype(int)
-    pieces = [time[number == k] for k in np.unique(number)]
-    begun = [(piece[0] - recording.settings.settle, piece[-1]) for piece in pieces if len(piece) > 1]
-    return [np.flatnonzero((time >= first - 1e-9) & (time <= last)) for first, last in begun]

@@ -17,21 +17,17 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.limits import Limits
 from finger_pin.identification.recordings import RecordedSignal, Recording, unit_of
-from finger_pin.identification.scenario_parameters import ScenarioPart, check_apart, is_of_scenario, owner
+from finger_pin.identification.scenario_parameters import (
+    NuisanceParameter,
+    ScenarioPart,
+    check_apart,
+    is_of_scenario,
+    owner,
+)
 from finger_pin.typing import Array
 
 # Errors of what is computed finely and roughly, of those asked for; means of every output that roughly count.
 _FINER, _ROUGHER, _MEANS = 0.1, 10.0, 40
-
-
-@dataclass(frozen=True)
-class NuisanceParameter:
-    """Nuisance parameter of one recording, such as its initial angle."""
-
-    key: str
-    low: float
-    high: float
-    start: float
 
 
 #: Maps values to a scenario, and to the numbers that belong to a recording, by key.
@@ -61,11 +57,6 @@ class RecordingModel(Protocol):
 
     def tune(self, factor: float) -> None:
         """Compute from now on with the errors asked for times a factor."""
-
-
-def own_number(own: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0) -> float:
-    """Return the offset, scale or delay of an input or output that is being found."""
-    return own.get(f"recordings.{recording}.{output}.{what}", default)
 
 
 class Stopped(Exception):
@@ -215,11 +206,8 @@ class Problem:
     def alone(self) -> Problem:
         """Return the same problem with a memory of its own, for another thread."""
         twin = copy.copy(self)
-        twin.models, twin.evaluations, twin.best = (
-            [copy.copy(model) for model in self.models],
-            0,
-            (math.inf, np.zeros(0)),
-        )
+        twin.models = [copy.copy(model) for model in self.models]
+        twin.evaluations, twin.best = 0, (math.inf, np.zeros(0))
         return twin
 
     def fine(self) -> Problem:

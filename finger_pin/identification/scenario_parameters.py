@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,16 @@ from finger_pin.typing import Array
 
 #: What may be found of a column itself, besides the scenario's numbers.
 OF_COLUMNS = ("offset", "scale", "delay")
+
+
+@dataclass(frozen=True)
+class NuisanceParameter:
+    """Nuisance parameter of one recording, such as its initial angle."""
+
+    key: str
+    low: float
+    high: float
+    start: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +63,11 @@ class ScenarioPart:
                 named = "" if error.entry == bare(key) else f"{error.entry}: "
                 raise InputError(entry_of(key), f"{named}{error.allowed}") from None
         return cls(ParametrisedScenario(scenario, [bare(keys[k]) for k in places]), np.array(places, dtype=np.intp))
+
+
+def own_number(own: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0) -> float:
+    """Return the offset, scale or delay of an input or output that is being found."""
+    return own.get(f"recordings.{recording}.{output}.{what}", default)
 
 
 def owner(key: str) -> str | None:

@@ -10,8 +10,7 @@ from finger_pin.description.loading import load_bench
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.identification.limits import Limits
-from finger_pin.identification.models import build_problem
-from finger_pin.identification.motions import windows
+from finger_pin.identification.models import build_problem, windows
 from finger_pin.identification.problem import minus_twice_likelihood
 from finger_pin.identification.recordings import read_recording
 from finger_pin.identification.scenario_parameters import ScenarioPart
