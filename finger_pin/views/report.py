@@ -137,7 +137,7 @@ def _words(result: xr.Dataset) -> list[str]:
 
 def _misses(result: xr.Dataset) -> list[str]:
     """Return sentences on what repeats and the correlation of residuals say of the model."""
-    words = []
+    words, following = [], list[str]()
     columns = ("signal", "replicate_noise", "noise", "lack_of_fit", "signal_correlation", "signal_steady")
     for name, repeated, noise, chance, correlation, steady in zip(
         *(result[each].values for each in columns), strict=True
@@ -152,10 +152,12 @@ def _misses(result: xr.Dataset) -> list[str]:
                 "what is missing may still be off."
             )
         elif math.isnan(chance) and correlation > _FOLLOWING:
-            words.append(
-                f"Residuals of {name} follow each other (correlation {correlation:.2f} of neighbours): the sensor or "
-                "the model; repeated runs would tell which. The intervals count them as noise with that correlation."
-            )
+            following.append(str(name))
+    if following:
+        words.append(
+            f"Residuals of {', '.join(following)} follow each other: the sensor or the model, and repeats would tell which. "
+            "The intervals count them as noise with that correlation."
+        )
     return words
 
 

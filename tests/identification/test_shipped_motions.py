@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.description.loading import load_bench
 from finger_pin.description.recordings.columns import read_columns
+from finger_pin.identification.models import recording_models
+from finger_pin.identification.recordings import read_recording
 
 
 def test_the_made_up_recording_that_ships_tells_the_numbers_it_was_made_with():
@@ -45,6 +48,30 @@ def test_a_cord_that_is_loose_at_first_is_found_as_an_offset_of_what_is_wound():
     found = dict(zip(result.parameter.values, result.estimate.values, strict=True))
     assert [found[key] for key in offsets] == pytest.approx([-8e-4, -8e-4], abs=2e-5)
     assert found["finger.tendon_friction.coulomb"] == pytest.approx(0.18, abs=4e-3)
+
+
+# What `identify servo_pendulum` finds from the nine recordings at lower gains.
+SERVO = {
+    "torque_constant": 0.36551,
+    "resistance": 3.4198,
+    "inertia": 2.2712e-3,
+    "friction.coulomb": 2.2573e-3,
+    "friction.by_load": 0.0,
+    "friction.stribeck_by_load": 0.33905,
+    "friction.viscous": 1.3386e-2,
+}
+
+
+@pytest.mark.parametrize("name", ["ss_kp800", "st_kp800", "ss_kp400", "st_kp400", "ss_kp200", "ud_kp100"])
+def test_a_real_servo_moves_as_is_predicted_to_what_an_independent_fit_reaches(name):
+    """A fit of them with models of Rhoban/bam leaves 30 to 105 mrad rms, with constant friction 56 to 245."""
+    scenario, settings = load_bench(
+        "servo_pendulum", {f"finger.actuators.servo.motor.{k}": v for k, v in SERVO.items()}
+    )
+    recording = read_recording(name, settings.recordings[name])
+    models, _ = recording_models(scenario, [recording], None, [np.ones(len(recording.time), dtype=bool)])
+    (computed,) = models[0].compute(models[0].scenario, {})
+    assert np.sqrt(np.mean((recording.outputs["motor_position.servo"] - computed) ** 2)) < 0.105
 
 
 def test_a_fingertip_against_a_load_cell_tells_the_friction_of_its_canals_and_the_wrong_zero():
