@@ -19,7 +19,7 @@ from finger_pin.commands.console import noted, print_text
 from finger_pin.commands.options import Output, wrong
 from finger_pin.files import write_text
 
-PACKAGES = ("finger-pin", "numpy", "scipy", "numba", "pin", "mujoco", "scikit-sundae")
+PACKAGES = ("finger-pin", "numpy", "scipy", "numba", "pin", "mujoco", "mujoco-warp", "scikit-sundae")
 #: The stages in their order, and the module of each.
 STAGES = {
     "work-precision": "work_precision",
@@ -29,6 +29,7 @@ STAGES = {
     "contact": "contacts",
     "mujoco": "mujoco_loop",
     "mujoco-friction": "mujoco_friction",
+    "mujoco-warp-friction": "mujoco_warp_friction",
     "learning": "learning",
     "prepared": "prepared",
     "identification": "identification",

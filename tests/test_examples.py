@@ -7,6 +7,7 @@ from pathlib import Path
 
 import matplotlib
 import matplotlib.pyplot as plt
+import mujoco
 import numpy as np
 import pytest
 
@@ -108,6 +109,24 @@ def test_a_policy_is_as_good_in_an_environment_of_its_own_and_better_than_none(e
             known = [1.0, *(20.0 * seen[11:14]), *(0.1 * seen[4:8])]
             seen, *_ = environment.step(low + (high - low) / (1.0 + np.exp(-names["middle"] @ known)))
         assert np.linalg.norm(seen[11:14]) == pytest.approx(names["after"][k], abs=1e-4)
+
+
+def test_what_is_trained_with_one_friction_fails_with_others_also_in_c_with_the_plugin(example):
+    pytest.importorskip("mujoco_warp")
+    names = example("warp_randomised_friction")
+    one, many = names["found"].values()
+    assert one.max() > 3.0 * many.max() and one[abs(names["coulomb"] - names["ALIKE"]).argmin()] < 1.0
+    spec = mujoco.MjSpec.from_string(names["MODEL"])
+    fp.mujoco.add_friction(spec, tendons={"flexor": names["law"] | {"coulomb": names["MOST"]}})
+    model = spec.compile()
+    data, random, angles = mujoco.MjData(model), np.random.default_rng(1), []
+    up, along, gain, damping = names["weights"]["one friction"] * names["SCALES"]
+    for goal, way in zip(names["WANTED"], names["WAYS"], strict=True):
+        measured = data.qpos[0] + names["NOISE"] * random.standard_normal(names["WORLDS"])[-1]
+        data.ctrl[0] = (up + way * along) * goal + gain * (goal - measured) - damping * data.qvel[0]
+        mujoco.mj_step(model, data, names["STEPS"])
+        angles.append(data.qpos[0])
+    np.testing.assert_allclose(names["angles"]["one friction"][:, -1], angles, atol=1e-3)
 
 
 def test_a_sweep_on_dask_is_that_of_threads(example):

@@ -19,8 +19,8 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.store import Store
 
-_LAW = {"coulomb": 0.12}
-_PLAIN, _CONSTANT = "plain", "constant losses"
+LAW = {"coulomb": 0.12}
+PLAIN, _CONSTANT = "plain", "constant losses"
 
 
 def measure(store: Store) -> dict[str, Any] | None:
@@ -35,7 +35,7 @@ def study(rounds: int, duration: float) -> dict[str, Any]:
     """Return the least time of a step of each variant, which take turns, and its counts of frictions and rows."""
     import mujoco
 
-    hands = {"Shadow hand": _shadow}
+    hands = {"Shadow hand": shadow}
     if importlib.util.find_spec("mujoco_playground") is not None:
         hands["Aero hand"] = _aero
     return {
@@ -48,10 +48,10 @@ def _hand(made: Callable[[], Any], rounds: int, duration: float) -> dict[str, An
     import mujoco
 
     plain = made().compile()
-    driven = {"tendons": {name: _LAW for name in _driven(plain)}}
-    every: dict[str, Any] = {"tendons": {"*": _LAW}}
-    variants = {"driven tendons": driven, "all tendons": every, "and all joints": every | {"joints": {"*": {}}}}
-    models, counts = {_PLAIN: plain}, {_PLAIN: {"frictions": 0, "rows": _rows(plain)}}
+    named = {"tendons": {name: LAW for name in driven(plain)}}
+    every: dict[str, Any] = {"tendons": {"*": LAW}}
+    variants = {"driven tendons": named, "all tendons": every, "and all joints": every | {"joints": {"*": {}}}}
+    models, counts = {PLAIN: plain}, {PLAIN: {"frictions": 0, "rows": _rows(plain)}}
     for name, friction in variants.items():
         spec = made()
         fp.mujoco.add_friction(spec, **friction)
@@ -96,7 +96,7 @@ def _step(model: Any, duration: float) -> float:
     return (time.process_time() - began) / (jumps * every)
 
 
-def _driven(model: Any) -> list[str]:
+def driven(model: Any) -> list[str]:
     """Return the tendons that actuators pull, or drive the only joint of."""
     import mujoco
 
@@ -120,7 +120,8 @@ def _path(package: str, *parts: str) -> str:
     return str(Path(spec.submodule_search_locations[0], *parts))
 
 
-def _shadow() -> Any:
+def shadow() -> Any:
+    """Return the spec of the Shadow hand."""
     import mujoco
 
     return mujoco.MjSpec.from_file(_path("gymnasium_robotics", "envs", "assets", "hand", "reach.xml"))
@@ -143,10 +144,10 @@ def lines(found: Mapping[str, Any]) -> Iterator[str]:
     """Yield the report."""
     for hand, study in found["hands"].items():
         yield f"our friction in a step of MuJoCo {found['version']}, {hand}: processor time"
-        plain = study["time"][_PLAIN]
+        plain = study["time"][PLAIN]
         for name, each in study["time"].items():
             count = study["counts"].get(name)
-            more = f"{100.0 * (each / plain - 1.0):+.0f} %" if name != _PLAIN else ""
+            more = f"{100.0 * (each / plain - 1.0):+.0f} %" if name != PLAIN else ""
             if count is not None:
                 more = f"{count['rows']} rows  {more}" + (f", {count['frictions']} frictions" if more else "")
             yield f"  {name:44} {1e6 * each:6.1f} us  {more}".rstrip()

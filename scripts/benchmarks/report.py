@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from benchmarks import identification, learning, mujoco_friction, prepared
+from benchmarks import identification, learning, mujoco_friction, mujoco_warp_friction, prepared
 from benchmarks.targets import Target
 from benchmarks.work_precision import OURS
 from finger_pin.views.plots.lines import series
@@ -30,6 +30,7 @@ def text(stages: Mapping[str, Any], reached: Sequence[Target], quick: bool) -> s
         ("contact", _contact),
         ("mujoco", _mujoco),
         ("mujoco-friction", mujoco_friction.lines),
+        ("mujoco-warp-friction", mujoco_warp_friction.lines),
         ("learning", learning.lines),
         ("prepared", _prepared),
         ("identification", identification.lines),

@@ -185,6 +185,12 @@ def stages():
                 }
             },
         },
+        "mujoco-warp-friction": {
+            "version": "4.0.0",
+            "device": "cpu",
+            "times": {"256": {"plain": 0.02, "all tendons": 0.024}},
+            "frictions": {"plain": 0, "all tendons": 44},
+        },
         "learning": {
             "worlds": 8,
             "kinds": {"smooth": {"times": {"one": 1.1e-4, "alone": 1e-4, "many": 5e-5}, "errors": {"one": 1e-4}}},
@@ -232,7 +238,16 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["main job, first run"] is False
     output = capsys.readouterr().out
     assert "pass" in output and "FAIL" in output and "Rodas5P" in output
+    assert "all tendons         24.00 ms  +20 %, 44 frictions" in output
     assert "2 of 3 searches end at the best" in output and "2 for 1, 1.8 for 3, 4 for 6 numbers" in output
+
+
+def test_worlds_of_mujoco_warp_are_stepped_with_and_without_friction(load):
+    for name in ("mujoco_warp", "gymnasium_robotics"):
+        pytest.importorskip(name)
+    found = load("benchmarks.mujoco_warp_friction").study((2,), 1, 1)
+    assert found["frictions"] == {"plain": 0, "driven tendons": 32, "all tendons": 44, "and all joints": 68}
+    assert found["times"]["2"].keys() == found["frictions"].keys() and min(found["times"]["2"].values()) > 0.0
 
 
 def test_a_stage_whose_needs_are_missing_is_left_out(load, tmp_path, monkeypatch, capsys):

@@ -12,6 +12,7 @@ import shutil
 import tomllib
 import webbrowser
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -50,6 +51,8 @@ LONG = '"simulation.duration": 4.0'
 #: A fenced block with its kind, or code within a line.
 SHOWN = re.compile(r"^```(\w+)\n(.*?)^```$|(?<!`)`([^`\n]+)`(?!`)", re.DOTALL | re.MULTILINE)
 COMMAND = re.compile(r"(python (-m|scripts/)|finger-pin )")
+#: Packages that tests do without: what needs them is tried where they are.
+OPTIONAL = re.compile(r"^(?:import|from) (newton|mjlab)\b", re.MULTILINE)
 EXPRESSION = re.compile(r"fp\.[\w.]+\(.*\)")
 
 
@@ -149,6 +152,8 @@ def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, ca
             for line in block.replace("\\\n", " ").splitlines():
                 for part in line.split(" && "):
                     run_command(part.strip(), shown)
+        elif kind == "python" and (needed := OPTIONAL.search(block)) and find_spec(needed[1]) is None:
+            continue
         elif kind == "python":
             # A traceback shows the line of the page.
             before = "\n" * (text.count("\n", 0, found.start()) + 1)

@@ -46,7 +46,8 @@ def in_warp(spec, worlds=1, tendons=TENDONS, joints=JOINTS, rows=200, contacts=6
     """Return MuJoCo Warp's model and data with friction, and this."""
     fp.mujoco.warp.add_branches(spec)
     model = spec.compile()
-    m, d = mjw.put_model(model), mjw.make_data(model, nworld=worlds, njmax=rows, nconmax=contacts)
+    size = {"njmax": rows, "njmax_nnz": rows * model.nv, "nconmax": contacts}
+    m, d = mjw.put_model(model), mjw.make_data(model, nworld=worlds, **size)
     return m, d, fp.mujoco.warp.add_friction(m, d, model, tendons=tendons, joints=joints)
 
 
