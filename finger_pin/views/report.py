@@ -155,7 +155,7 @@ def _misses(result: xr.Dataset) -> list[str]:
             following.append(str(name))
     if following:
         words.append(
-            f"Residuals of {', '.join(following)} follow each other: the sensor or the model, which repeats would tell. "
+            f"Residuals of {', '.join(following)} follow each other: sensor or model, which repeats would tell. "
             "The intervals count them as noise with that correlation."
         )
     return words
