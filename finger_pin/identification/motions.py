@@ -159,7 +159,10 @@ class RecordedMotion:
             if numbers == [1.0, 0.0, 0.0]:
                 continue
             (section, group), label = _INPUTS[name.partition(".")[0]], name.partition(".")[2]
-            signals = dict(getattr(getattr(scenario, section), group))
+            signals = dict(getattr(getattr(scenario, section), group) or {})
+            if label not in signals:
+                allowed = "has no scale, offset or delay to be found: it is of one finger of a hand"
+                raise InputError(f"{self._entry}.inputs.{name}", allowed)
             corrected = numbers[0] * values + numbers[1]
             if name.startswith("tendon_command."):
                 # A tendon only pulls: what a wrong zero takes below it is a slack one.
