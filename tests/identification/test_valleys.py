@@ -20,7 +20,8 @@ class Ringing:
     """Rings at 2000 rad/s times the coefficient, and rises with both."""
 
     scenario, own = fp.load_scenario("canal"), ()
-    recording = SimpleNamespace(name="pull", settings=RecordingSettings.model_construct(values={}, parameters={}))
+    settings = RecordingSettings.model_construct(values={}, parameters={})
+    recording = SimpleNamespace(name="pull", settings=settings, inputs={}, outputs={}, time=TIME)
 
     def compute(self, scenario, own):
         friction = scenario.finger.tendon_friction
