@@ -208,7 +208,7 @@ def test_an_impact_from_deep_inside_a_stiff_limiter_is_booked_to_a_hundred_thous
 
 def test_the_account_closes_where_a_limiter_that_would_have_to_pull_lets_go_of_a_joint_inside_it():
     # A limiter loses 0.8 J in the first millisecond, the last of it without a force: past the clamp of (2).
-    # Small errors grow there: whether its accuracy can be judged is a matter of rounding, and differs between processors.
+    # Small errors grow there: whether its accuracy can be judged is a matter of rounding, which processors differ in.
     assert share_left_open(fp.simulate(wild_scenario(328))) < 1e-6
 
 
