@@ -13,6 +13,7 @@ from finger_pin.cancellation import CancelToken
 from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.identification.checkpoint import Checkpoint, digest
 from finger_pin.identification.comparison import other_laws
@@ -106,6 +107,7 @@ def identify(
     with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
         work = FitPipeline(problem, ledger, loss, progress)
         result = _work(problem, settings, starting_points(problem, starts, seed), starts, work, profiles)
+        result.attrs["undamped"] = ", ".join(_undamped(scenario, problem))
         result.attrs["profiles"] = int(profiles)
         result.attrs["custom_finger"] = int(own is not None)
         result.update(predictions(result, scenario, held_out, taken, own))
@@ -135,6 +137,18 @@ def _work(
             reached = problem.best[1] if len(problem.best[1]) else problem.start
             work.fits.append(fit(problem, reached, held=dict(enumerate(reached))))
     return results(problem, work.fits, work.best, work.sides, work.spread, work.comparison, unfinished)
+
+
+def _undamped(scenario: Scenario, problem: Problem) -> list[str]:
+    """Return the joints that nothing damps in motions: where friction holds them they ring, in ten times the steps."""
+    finger, joints = scenario.finger, list(scenario.finger.joints)
+    friction = finger.joint_friction
+    damped = np.add(expand(friction.viscous, len(joints)), expand(friction.micro_damping, len(joints)))
+    damped += [0.0 if joint.spring is None else joint.spring.damping for joint in finger.joints.values()]
+    tendons_damp = bool(np.any(expand(finger.tendon_friction.viscous, len(finger.tendons)) > 0.0))
+    if tendons_damp or not any(signal.ordered for signal in problem.signals):
+        return []
+    return [name for name, value in zip(joints, damped, strict=True) if value == 0.0]
 
 
 def _plain(value: Any) -> Any:

@@ -121,6 +121,12 @@ def _words(result: xr.Dataset) -> list[str]:
         words.append(f"{'The' if _borne_out(result) else 'Near this place the'} recordings determine every parameter.")
     if _borne_out(result):
         words.append(_agreement(result))
+    undamped = result.attrs.get("undamped", "")
+    if undamped:
+        words.append(
+            f"Nothing damps {undamped}: where friction holds a joint it rings, and runs take up to ten times the steps. "
+            "A little viscous friction of joints or tendons would change that."
+        )
     if not result.attrs.get("profiles", 1):
         words.append("The intervals are those of slopes at the estimate: where they are wide, profiles are surer.")
     words += _misses(result)

@@ -8,6 +8,7 @@ import finger_pin as fp
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.validation import validate
 from finger_pin.identification.recordings import read_recording
+from finger_pin.views.report import summarize_identification
 
 BENT = {"finger.tendons.T1.curvature_offset": TURN}
 
@@ -61,6 +62,18 @@ def test_a_stop_is_found_though_where_the_search_starts_nothing_touches_it():
     data = {"t": time, "in": pull, "angle": angle + np.random.default_rng(3).normal(0.0, 1e-3, len(time))}
     found = fp.identify("canal", parameters={stop: (0.5, 4.0)}, recordings={"pull": told}, data={"pull": data})
     assert float(found.estimate[0]) == pytest.approx(1.2, abs=2e-3)
+
+
+def test_a_joint_that_nothing_damps_is_said_as_its_runs_take_long():
+    data = motion(np.random.default_rng(6), 0.15, 0.4, 0.0)
+    given = {"parameters": {COULOMB: (0.1, 0.2)}, "recordings": {"pull": {**MOTION, "settle": 0.2}}, "starts": 1}
+    given |= {"data": {"pull": {name: values[:60] for name, values in data.items()}}, "profiles": False}
+    bare = {**BENT, DRAG: 0.4, "finger.joint_friction.viscous": 0.0}
+    said = [
+        summarize_identification(fp.identify("canal", overrides=overrides, **given))
+        for overrides in (bare, {**bare, "finger.joint_friction.viscous": 2e-3})
+    ]
+    assert "Nothing damps drum" in said[0] and "Nothing damps" not in said[1]
 
 
 PWM = {
