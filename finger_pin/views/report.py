@@ -124,7 +124,7 @@ def _words(result: xr.Dataset) -> list[str]:
     undamped = result.attrs.get("undamped", "")
     if undamped:
         words.append(
-            f"Nothing damps {undamped}: where friction holds a joint it rings, and runs take up to ten times the steps. "
+            f"Nothing damps {undamped}: where friction holds a joint it rings, and runs take ten times the steps. "
             "A little viscous friction of joints or tendons would change that."
         )
     if not result.attrs.get("profiles", 1):
