@@ -65,8 +65,10 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     def led(match: re.Match[str]) -> str:
         shows, label, target, anchor = match.groups()
         target = target.replace(*PICTURES)
-        if page.file.src_uri.startswith("scripts/examples/"):
-            target = re.sub(r"^(\w+)\.(py|ipynb)$", r"\1.md", target)
+        if posixpath.normpath(posixpath.join(posixpath.dirname(page.file.src_uri), target)).startswith(
+            "scripts/examples/"
+        ):
+            target = re.sub(r"\.(py|ipynb)$", ".md", target)
         return f"{shows}[{label}]({target}{anchor})"
 
     return LINK.sub(led, markdown)
