@@ -125,7 +125,7 @@ def _folds(problem: Problem) -> list[list[NDArray[np.bool_]]]:
     names = list(dict.fromkeys(signal.recording for signal in problem.signals))
     if len(names) > 1:
         return [[np.full(len(s.measured), s.recording == name) for s in problem.signals] for name in names]
-    if any(signal.ordered for signal in problem.signals):
+    if problem.moves:
         # The windows of one recording follow each other; samples of one window do not stand for themselves.
         groups = problem.groups.tolist()
         window = [groups[:k].count(group) for k, group in enumerate(groups)]

@@ -123,7 +123,7 @@ def _descend(
     """
     fresh, damping, failed = slopes is None, _DAMPING, 0
     slopes = problem.slopes(z) if slopes is None else list(slopes)
-    moves = any(signal.ordered for signal in problem.signals)
+    moves = problem.moves
     gain = _GAIN if problem.finely else _ROUGHLY if problem.means else _NEARLY
     enough, feigned = (gain, _FEIGNED) if moves else (_EXACT, 0.0)
     count = float(sum(w * len(e) for w, e in zip(shares, residuals, strict=True)))

@@ -1,8 +1,9 @@
-"""Misfit: correlated residuals, what a model misses beyond the scatter of repeats, and intervals that know both."""
+"""Misfit of a model: correlation of residuals, lack of fit beyond the scatter of repeats, covariance under both."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from finger_pin.identification.recordings import RecordedSignal, Recording
 from finger_pin.typing import Array
 
 # From which probability of chance on a model is said to miss something, and how many lags of correlation are fitted.
-_CHANCE, _LAGS = 0.01, 8
+CHANCE, _LAGS = 0.01, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,49 +78,60 @@ def sandwich(problem: Problem, found: Fit, spread: Array) -> Array:
 
 def repeats(problem: Problem, residuals: Sequence[Array]) -> list[Repeats]:
     """Return what is repeated among the signals, with residuals of all of them."""
-    found, runs = [], dict[tuple[object, ...], list[int]]()
-    by_name = {model.recording.name: model.recording for model in problem.models}
+    found, runs = [], list[list[int]]()
+    recordings = {model.recording.name: model.recording for model in problem.models}
     for k, signal in enumerate(problem.signals):
         if signal.ordered:
-            runs.setdefault(_setting(by_name[signal.recording], signal), []).append(k)
+            like = [own for own in runs if _alike(problem.signals[own[0]], signal, recordings)]
+            if like:
+                like[0].append(k)
+            else:
+                runs.append([k])
         elif signal.alike.max(initial=-1) + 1 < len(signal.measured):
             found.append(_of_readings(k, signal.alike, residuals[k], len(problem.keys)))
-    found += [_of_runs(tuple(own), [residuals[k] for k in own]) for own in runs.values() if len(own) > 1]
+    found += [_of_runs(tuple(own), [residuals[k] for k in own]) for own in runs if len(own) > 1]
     return found
 
 
-def _setting(recording: Recording, signal: RecordedSignal) -> tuple[object, ...]:
-    """Return what repeated runs have in common: what moves them, when they are read, and what is read."""
-    settings, columns = recording.settings, sorted(recording.inputs.items())
-    arrays = (recording.time, signal.instant, *(values for _, values in columns))
-    names = tuple(name for name, _ in columns)
-    return (signal.name, names, repr(settings.values), settings.start, *(each.tobytes() for each in arrays))
+def _alike(one: RecordedSignal, other: RecordedSignal, recordings: Mapping[str, Recording]) -> bool:
+    """Return whether two signals of motions are of the same output, read at the same times, of repeated runs."""
+    same = one.name == other.name and np.array_equal(one.instant, other.instant)
+    return same and recordings[one.recording].repeats(recordings[other.recording])
+
+
+def scatter(values: Array, alike: NDArray[np.intp]) -> float:
+    """Return the mean square of readings about the mean of those that are alike; not a number if none are."""
+    count = np.bincount(alike)
+    if len(count) == len(values):
+        return math.nan
+    mean = np.bincount(alike, values) / count
+    return float(np.sum((values - mean[alike]) ** 2)) / (len(values) - len(count))
 
 
 def _of_readings(k: int, alike: NDArray[np.intp], residual: Array, parameters: int) -> Repeats:
     count = np.bincount(alike)
     mean = np.bincount(alike, residual) / count
     inner, outer = len(residual) - len(count), max(len(count) - parameters, 1)
-    scatter = float(np.sum((residual - mean[alike]) ** 2)) / inner
+    within = scatter(residual, alike)
     between = float(np.sum(count * mean**2)) / outer
-    chance = float(f_distribution.sf(between / max(scatter, 1e-300), outer, inner))
-    common = max(between - scatter, 0.0) / float(np.mean(count))
-    return Repeats((k,), scatter, common if chance < _CHANCE else 0.0, chance)
+    chance = float(f_distribution.sf(between / max(within, 1e-300), outer, inner))
+    common = max(between - within, 0.0) / float(np.mean(count))
+    return Repeats((k,), within, common if chance < CHANCE else 0.0, chance)
 
 
 def _of_runs(signals: tuple[int, ...], residuals: Sequence[Array]) -> Repeats:
     runs = len(residuals)
     mean = np.mean(residuals, axis=0)
     apart = [each - mean for each in residuals]
-    scatter = sum(float(np.mean(each**2)) for each in apart) / (runs - 1)
+    within = sum(float(np.mean(each**2)) for each in apart) / (runs - 1)
     # Squares of what is correlated by rho count as (1 - rho^2) / (1 + rho^2) (Bartlett, J. Roy. Stat. Soc. B 8, 1946).
     square = sum(float(each @ each) for each in apart)
     rho = sum(float(each[1:] @ each[:-1]) for each in apart) / max(square, 1e-300)
     independent = max(len(mean) * (1.0 - rho**2) / (1.0 + rho**2), 1.0)
     between = runs * float(np.mean(mean**2))
-    chance = float(f_distribution.sf(between / max(scatter, 1e-300), independent, (runs - 1) * independent))
-    common = max(between - scatter, 0.0) / runs
-    return Repeats(signals, scatter, common if chance < _CHANCE else 0.0, chance)
+    chance = float(f_distribution.sf(between / max(within, 1e-300), independent, (runs - 1) * independent))
+    common = max(between - within, 0.0) / runs
+    return Repeats(signals, within, common if chance < CHANCE else 0.0, chance)
 
 
 def _process(residuals: Sequence[Array]) -> Array:

@@ -11,8 +11,8 @@ from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.motions import RecordedMotion
-from finger_pin.identification.problem import Problem, RecordingModel
-from finger_pin.identification.recordings import RecordedSignal, Recording, unit_of
+from finger_pin.identification.problem import Problem
+from finger_pin.identification.recordings import RecordedSignal, Recording, RecordingModel, unit_of
 from finger_pin.identification.scenario_parameters import with_own_values
 from finger_pin.identification.steady_data import SteadyReadings
 from finger_pin.mechanism.coerce import with_parameters_of

@@ -18,8 +18,7 @@ from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.identification.problem import At
-from finger_pin.identification.recordings import Recording, check_pulling
+from finger_pin.identification.recordings import At, Recording, check_pulling
 from finger_pin.identification.scenario_parameters import NuisanceParameter, own_number
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
@@ -59,7 +58,7 @@ class RecordedMotion:
     Attributes:
         recording: The recording.
         rows: Which of its rows, shape (m,).
-        scenario: Moved by the recorded inputs.
+        scenario: Moved by the recorded inputs; its position drives read exact angles.
         own: Numbers of its own that are to be found: where its joints start.
     """
 
@@ -87,7 +86,8 @@ class RecordedMotion:
         table["simulation"] = {**table.get("simulation", {}), **settings}
         table["simulation"]["start_time"] = scenario.simulation.start_time + first
         self._put_start(table, scenario, window)
-        self.scenario = read_scenario(table)
+        # The steps of an encoder would make the likelihood as rough as what ends an interval.
+        self.scenario = with_exact_encoders(read_scenario(table))
         self._finger = finger
         self._factor = 1.0
 
@@ -145,12 +145,7 @@ class RecordedMotion:
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
     def _with_own(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
-        """Return a scenario with the starts of joints and the corrections of inputs that are being found.
-
-        Its position drives read exact angles: the steps of an encoder would make the likelihood as rough as what ends
-        an interval.
-        """
-        scenario = with_exact_encoders(scenario)
+        """Return a scenario with the starts of joints and the corrections of inputs that are being found."""
         for name, values in self.recording.inputs.items():
             numbers = [
                 own_number(own, self.recording.name, name, what, default)

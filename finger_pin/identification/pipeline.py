@@ -55,7 +55,6 @@ class FitPipeline:
         self.middle: Fit | None = None
         self.sides: dict[tuple[int, int], ProfileBound] = {}
         self.spread: Array | None = None
-        self.inflation = np.ones(len(problem.keys))
         self.comparison: LawComparison | None = None
 
     @property
@@ -72,7 +71,7 @@ class FitPipeline:
         def misfit(problem: Problem, z: Array) -> float:
             return _met(problem, problem.residuals(z))
 
-        problem, others = self.problem.rough() if self._moves else self.problem, len(places) - 1
+        problem, others = self.problem.rough() if self.problem.moves else self.problem, len(places) - 1
         found = self._side_by_side("trying starts", lambda item: misfit(item[1], places[1 + item[0]]), others, problem)
         order = np.argsort(found, kind="stable").tolist()
         tiny = _TINY * np.subtract(*self.problem.box)
@@ -81,7 +80,7 @@ class FitPipeline:
             k = order[item[0]]
             return not abs(misfit(item[1], places[1 + k] + tiny) - found[k]) < _JUMP
 
-        near = order[: 2 * (count - 1)] if self._moves else []
+        near = order[: 2 * (count - 1)] if self.problem.moves else []
         hunting = dict(zip(near, self._side_by_side("trying starts", hunts, len(near), problem), strict=True))
         return [places[0], *(places[1 + k] for k in sorted(order, key=lambda k: hunting.get(k, True))[: count - 1])]
 
@@ -105,12 +104,12 @@ class FitPipeline:
                 "identify.recordings", "the motion fails wherever the search starts; narrow the parameters"
             )
         _check_felt(self.problem, self.fits, given)
-        if self._moves:
+        if self.problem.moves:
             self._cross()
 
     def _roughly(self, starts: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
         """Return the ends of rough searches: those that may be near the best place, and the others."""
-        if not self._moves:
+        if not self.problem.moves:
             return starts, []
         rough, found = self.problem.rough(), dict[int, Fit]()
 
@@ -146,19 +145,12 @@ class FitPipeline:
             if _met(self.problem, self.best.residuals) > _met(self.problem, best.residuals) - _DEEPER:
                 return
 
-    @property
-    def _moves(self) -> bool:
-        """Whether a recording is of a motion."""
-        return any(signal.ordered for signal in self.problem.signals)
-
     def _settle(self, place: Fit) -> tuple[Problem, Fit, Array]:
         """Return the problem computed finely, the minimum near a place, and its covariance by the likelihood alone."""
         fine, number = self.problem.fine(), self.fits.index(self.best)
         best = self.fits[number] = self.middle = fit(fine, place.z, loss=self.loss, slopes=place.slopes)
         naive = covariance(fine, best)
         self.spread = sandwich(fine, best, naive)
-        naive_variance = np.diag(naive)
-        self.inflation = np.where(naive_variance > 0.0, np.diag(self.spread) / np.maximum(naive_variance, 1e-300), 1.0)
         self.problem.join(fine)
         return fine, best, naive
 
@@ -175,11 +167,14 @@ class FitPipeline:
     def profile_all(self, place: Fit, turn: int = 0) -> None:
         """Compute all profiles; restart from a lower minimum if one is found."""
         fine, best, naive = self._settle(place)
+        assert self.spread is not None
+        plain = np.diag(naive)
+        inflation = np.where(plain > 0.0, np.diag(self.spread) / np.maximum(plain, 1e-300), 1.0)
         ends = [(k, way) for k in range(self.problem.asked) for way in (-1, 1)]
 
         def one(item: tuple[int, Problem]) -> Fit | None:
             (k, way), twin = ends[item[0]], item[1]
-            work = partial(profile, twin, best, k, way, naive, self.loss, float(self.inflation[k]))
+            work = partial(profile, twin, best, k, way, naive, self.loss, float(inflation[k]))
             side = self.ledger.side(f"side {k} {way} {turn}", work)
             if side.better is None:
                 self.sides[k, way] = side
@@ -205,7 +200,7 @@ class FitPipeline:
 
         items = list(enumerate(twins))
         try:
-            return in_threads(one, items) if self._moves else [one(item) for item in items]
+            return in_threads(one, items) if self.problem.moves else [one(item) for item in items]
         finally:
             for twin in twins:
                 self.problem.join(twin)

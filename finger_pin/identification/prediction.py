@@ -15,10 +15,10 @@ from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
+from finger_pin.identification.misfit import scatter as scatter_of
 from finger_pin.identification.models import held_out_rows, recording_models
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import Recording, read_recording
-from finger_pin.identification.results import replicates
 from finger_pin.identification.scenario_parameters import bare, owner
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.mechanism.finger import Finger
@@ -125,7 +125,11 @@ def predictions(
             found.setdefault(signal.name, []).append(rows)
         for name, pieces in found.items():
             first = next(each for each in problem.signals if each.name == name)
-            scatter = _repeats(recording, name, known) if first.ordered else replicates(first)
+            scatter = (
+                _repeats(recording, name, known)
+                if first.ordered
+                else math.sqrt(scatter_of(first.measured, first.alike))
+            )
             rows = np.concatenate(pieces, axis=1)
             signals.append(
                 {"name": f"{recording.name}.{name}", "unit": first.unit, "steady": not first.ordered}
@@ -181,26 +185,7 @@ def _beyond(result: xr.Dataset, load: Array) -> float:
 
 def _repeats(recording: Recording, name: str, known: Sequence[Recording]) -> float:
     """Return the rms of an output about its mean over motions with equal inputs; not a number of one alone."""
-
-    def repeats(other: Recording) -> bool:
-        same = other.inputs.keys() == recording.inputs.keys() and name in other.outputs
-        settings = (other.settings.values, other.settings.start) == (
-            recording.settings.values,
-            recording.settings.start,
-        )
-        return (
-            same
-            and settings
-            and all(
-                np.array_equal(a, b)
-                for a, b in (
-                    (other.time, recording.time),
-                    *((other.inputs[k], recording.inputs[k]) for k in other.inputs),
-                )
-            )
-        )
-
-    runs = np.array([each.outputs[name] for each in known if repeats(each)])
+    runs = np.array([each.outputs[name] for each in known if name in each.outputs and each.repeats(recording)])
     there = np.isfinite(runs).all(axis=0) & held_out_rows(recording)
     if len(runs) < 2 or not there.any():
         return math.nan

@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,47 +16,12 @@ from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.limits import Limits
-from finger_pin.identification.recordings import RecordedSignal, Recording, unit_of
-from finger_pin.identification.scenario_parameters import (
-    NuisanceParameter,
-    ScenarioPart,
-    check_apart,
-    is_of_scenario,
-    owner,
-)
+from finger_pin.identification.recordings import At, RecordedSignal, RecordingModel, unit_of
+from finger_pin.identification.scenario_parameters import ScenarioPart, check_apart, is_of_scenario, owner
 from finger_pin.typing import Array
 
 # Errors of what is computed finely and roughly, of those asked for; means of every output that roughly count.
 _FINER, _ROUGHER, _MEANS = 0.1, 10.0, 40
-
-
-#: Maps values to a scenario, and to the numbers that belong to a recording, by key.
-At = Callable[[Array], tuple[Scenario, dict[str, float]]]
-
-
-class RecordingModel(Protocol):
-    """Recording, or a part of one, compared with a scenario."""
-
-    @property
-    def recording(self) -> Recording:
-        """The recording."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario with the recording's inputs."""
-
-    @property
-    def own(self) -> tuple[NuisanceParameter, ...]:
-        """The numbers to be found for it alone."""
-
-    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
-        """Return the computed values of every output, shape (m,) each."""
-
-    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
-        """Return the derivatives of that by the values, shape (m, p) each, by changes of given sizes."""
-
-    def tune(self, factor: float) -> None:
-        """Compute from now on with the errors asked for times a factor."""
 
 
 class Stopped(Exception):
@@ -143,6 +108,11 @@ class Problem:
         return self.to_search(values) if changed.any() else z
 
     @property
+    def moves(self) -> bool:
+        """Whether a recording is of a motion."""
+        return any(signal.ordered for signal in self.signals)
+
+    @property
     def groups(self) -> NDArray[np.intp]:
         """The number of the output that every signal is of: windows of one share its noise."""
         names = [f"{signal.recording}.{signal.name}" for signal in self.signals]
@@ -174,7 +144,8 @@ class Problem:
         except InputError:
             return self._smooth([np.full(len(s.measured), np.inf) for s in self.signals])
         pairs = list(zip(self.models, places, strict=True))
-        by_model = in_threads(lambda pair: pair[0].compute(*pair[1]), pairs)
+        # Closed forms hold Python's lock.
+        by_model = in_threads(_compute, pairs) if self.moves else map(_compute, pairs)
         computed = [each for found in by_model for each in found]
         residuals = self._smooth([s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)])
         if not all(np.isfinite(e).all() for e in residuals):
@@ -283,6 +254,12 @@ class Problem:
         asked = slice(0, self.asked)
         bounds = (self.keys[asked], self.low[asked], self.high[asked])
         return Problem(self.scenario, *bounds, self.models, signals, self.held, self.stop)
+
+
+def _compute(pair: tuple[RecordingModel, tuple[Scenario, dict[str, float]]]) -> list[Array]:
+    """Return the outputs of a recording at a place."""
+    model, place = pair
+    return model.compute(*place)
 
 
 def _means(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:

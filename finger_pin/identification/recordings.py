@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.recordings.bench import Column, RecordingSettings
 from finger_pin.description.recordings.columns import Table, chosen_rows, read_columns
+from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
 from finger_pin.exceptions import InputError
+from finger_pin.identification.scenario_parameters import NuisanceParameter
 from finger_pin.typing import Array
 
 #: SI units of what is recorded most; of anything else a column is in SI.
@@ -89,6 +92,43 @@ class Recording:
     outputs: dict[str, Array]
     time: Array
     speed: Array
+
+    def repeats(self, other: Recording) -> bool:
+        """Return whether this is a motion like another one, with equal times, inputs, values and start."""
+        a, b = self.settings, other.settings
+        if (a.values, a.start, self.inputs.keys()) != (b.values, b.start, other.inputs.keys()):
+            return False
+        pairs = [(self.time, other.time), *((self.inputs[name], other.inputs[name]) for name in self.inputs)]
+        return all(np.array_equal(one, another) for one, another in pairs)
+
+
+#: Maps values to a scenario, and to the numbers that belong to a recording, by key.
+At = Callable[[Array], tuple[Scenario, dict[str, float]]]
+
+
+class RecordingModel(Protocol):
+    """Recording, or a part of one, compared with a scenario."""
+
+    @property
+    def recording(self) -> Recording:
+        """The recording."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario with the recording's inputs."""
+
+    @property
+    def own(self) -> tuple[NuisanceParameter, ...]:
+        """The numbers to be found for it alone."""
+
+    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
+        """Return the computed values of every output, shape (m,) each."""
+
+    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
+        """Return the derivatives of that by the values, shape (m, p) each, by changes of given sizes."""
+
+    def tune(self, factor: float) -> None:
+        """Compute from now on with the errors asked for times a factor."""
 
 
 def unit_of(name: str) -> str:

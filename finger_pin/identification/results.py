@@ -22,7 +22,6 @@ from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import LEVEL, ProfileBound, free_directions
 from finger_pin.identification.misfit import repeats
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
-from finger_pin.identification.recordings import RecordedSignal
 from finger_pin.identification.scenario_parameters import bare, owner
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.keys import describe
@@ -178,16 +177,6 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
         **{name: ("sample", values, {"long_name": names[name]}) for name, values in whole.items()},
     }
-
-
-def replicates(signal: RecordedSignal) -> float:
-    """Return the scatter of repeated readings about their mean, rms."""
-    groups = signal.alike
-    if signal.ordered or groups.max() + 1 == len(groups):
-        return math.nan
-    means = np.bincount(groups, signal.measured) / np.bincount(groups)
-    spread = np.sum((signal.measured - means[groups]) ** 2)
-    return float(np.sqrt(spread / (len(groups) - len(means))))
 
 
 def write_results(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> None:

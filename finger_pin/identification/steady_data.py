@@ -9,8 +9,7 @@ import numpy as np
 from finger_pin.analysis.steady import steady_state
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.problem import At
-from finger_pin.identification.recordings import Recording, check_pulling
+from finger_pin.identification.recordings import At, Recording, check_pulling
 from finger_pin.identification.scenario_parameters import NuisanceParameter, own_number
 from finger_pin.identification.settled import settled_posture
 from finger_pin.mechanism.coerce import with_parameters_of

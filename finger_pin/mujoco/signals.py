@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -39,9 +40,18 @@ class Signals:
         Raises:
             InputError: If it has no friction.
         """
-        if name not in self.names:
-            raise InputError(f"friction.{name}", f"there are {', '.join(self.names)}")
-        return self.names.index(name)
+        return place_of(name, self.names)
+
+
+def place_of(name: str, names: Sequence[str]) -> int:
+    """Return the index of a friction by its name.
+
+    Raises:
+        InputError: If there is none of that name.
+    """
+    if name not in names:
+        raise InputError(f"friction.{name}", f"there are {', '.join(names)}")
+    return names.index(name)
 
 
 def friction(model: mujoco.MjModel, data: mujoco.MjData) -> Signals:

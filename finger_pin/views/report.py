@@ -11,12 +11,12 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.files import write_text
+from finger_pin.identification.misfit import CHANCE
 from finger_pin.views.document import document, image
 from finger_pin.views.plots.identification import plot_identification, plot_predictions, plot_profiles, short_name
 
-# From which probability of chance on a model is said to miss something; from which correlation of neighbours residuals
-# are said to follow each other.
-_MISSED, _FOLLOWING = 0.01, 0.9
+# From which correlation of neighbours residuals are said to follow each other.
+_FOLLOWING = 0.9
 
 
 def summarize_identification(result: xr.Dataset) -> str:
@@ -151,7 +151,7 @@ def _misses(result: xr.Dataset) -> list[str]:
         if math.isfinite(repeated):
             what = "Equal readings" if steady else "Repeated runs"
             words.append(f"{what} of {name} differ by {repeated:.3g} rms, all from the law by {noise:.3g}.")
-        if chance < _MISSED:
+        if chance < CHANCE:
             words.append(
                 f"The model misses something of {name}: by chance alone it would miss as much with a probability of "
                 f"{chance:.2g}. The intervals count that as noise which repeats share; numbers that take the place of "

@@ -13,6 +13,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import FORCE, LEVEL, LOAD, TURN, PluginFriction
 from finger_pin.mujoco.frictions import frictions, pulled
 from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose
+from finger_pin.mujoco.signals import place_of
 from finger_pin.mujoco.specification import Keys, warn_if_noslip, warn_if_stiff
 from finger_pin.mujoco.warp import kernels, row_kernels
 from finger_pin.mujoco.warp.names import NamedModel, branches_of
@@ -80,9 +81,7 @@ class Friction:
         Raises:
             InputError: If it has no friction.
         """
-        if name not in self.names:
-            raise InputError(f"friction.{name}", f"there are {', '.join(self.names)}")
-        return self.names.index(name)
+        return place_of(name, self.names)
 
     @property
     def state(self) -> Any:

@@ -1,4 +1,4 @@
-"""Kernels of friction in MuJoCo Warp, one thread a world and friction or row: what `kernel.py` does in the plugin.
+"""Kernels of friction in MuJoCo Warp, one thread a world and friction or row, as `kernel.py` in the plugin.
 
 Every thread gathers what it needs and writes what is its own, so that a world alone and among others has the same
 numbers to the last bit.

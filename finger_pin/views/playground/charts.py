@@ -73,7 +73,7 @@ class Charts:
             plot.data, plot.series = self._data(which)
 
     def reset(self) -> None:
-        """Forget what has been plotted."""
+        """Forget the plotted samples."""
         self._times.clear()
         self._past.clear()
 
