@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from importlib import resources
 
 import numpy as np
 import pandas as pd
@@ -64,9 +64,11 @@ class Recording:
 @cache
 def recordings() -> tuple[Recording, ...]:
     """Return all of them."""
-    table = pd.read_csv(Path(__file__).parent / "recordings" / "xl330_pendulum.csv", comment="#")
+    with resources.as_file(resources.files("finger_pin.description") / "benches" / "servo_pendulum.csv") as path:
+        table = pd.read_csv(path, comment="#")
     found = []
-    for name, rows in table.groupby("recording", sort=False):
+    for name, every in table.groupby("recording", sort=False):
+        rows = every.iloc[::2]
         columns = (rows[each].to_numpy(dtype=float) for each in ("time_s", "goal_rad", "position_rad", "pwm_885"))
         time, goal, position, pwm = columns
         gain, supply = float(str(name).split("kp")[1]), float(rows["supply_V"].mean())
