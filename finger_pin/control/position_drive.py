@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.interface import Controller, ControlSignals
-from finger_pin.core.stepping.drives import Drives
+from finger_pin.core.drives import Drives
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import SignalSettings

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from finger_pin.core.evaluation.law_code import SLOPES, widest
 from finger_pin.core.inputs import InputTable
+from finger_pin.core.islands import find_islands
 from finger_pin.core.jit import Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import COLUMNS, PathWork, build_path_work
-from finger_pin.core.stepping.islands import find_islands
 from finger_pin.core.tables import Tables
 from finger_pin.laws.law import ContactLaw, Law
 

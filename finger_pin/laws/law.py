@@ -71,7 +71,9 @@ class Law:
         scale: Typical magnitude of the state, for absolute tolerances; None for a law without a state, whose z' is 0.
         kink: Name of the signal by whose sign the force bends so sharply that steps must not cross it unseen, or
             ``speed`` where the rate of the state bends with the sign of that; empty for none. On either side of it,
-            value and slopes are smooth and heed ``Row.side``.
+            value and slopes are smooth and heed ``Row.side``. With ``speed`` the state is bounded as in (9a): sliding
+            on one way, z' falls with z, from its rate at z = 0 to zero at the most that z can be. Steps after which a
+            state is beyond twice that and has grown are tried again, shorter.
     """
 
     name: str

@@ -37,7 +37,8 @@ def friction_torque(speed: Number, torque: Number, p: Parameters) -> tuple[Numbe
     """
     dry, by_torque, by_load, viscous, reversal = p[6:]
     eased, pull = np.tanh(speed / reversal), np.maximum(torque, 0.0)
-    side = np.where(by_torque * pull + by_load * eased * dry >= 0.0, 1.0, -1.0)
+    # Of numbers, np.where would make arrays in compiled code.
+    side = 2.0 * (by_torque * pull + by_load * eased * dry >= 0.0) - 1.0
     left = np.maximum(1.0 - side * by_load * eased, _LEAST)
     level = (dry + side * by_torque * pull) / left
     by_eased = level * (1.0 + side * by_load * eased / left * (left > _LEAST))

@@ -11,9 +11,9 @@ from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled
 from finger_pin.control.interface import LoopController
 from finger_pin.control.position_drive import PositionDrives, given_voltages, wound_spools
 from finger_pin.control.sampling import SampledController, sampling_settings
+from finger_pin.core.collision.interpolants import meetings
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.stepping.integrator import integrate_compiled
-from finger_pin.core.stepping.interpolant_collision import meetings
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper

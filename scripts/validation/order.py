@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
-from finger_pin.core.stepping import rosenbrock
+from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.scenario import Scenario
@@ -86,7 +86,7 @@ def step_errors(smooth: Smooth, method: str) -> Array:
     for count in COUNTS:
         stepper = smooth.stepper(method, step=END)
         for k in range(count):
-            if stepper.advance(END * (k + 1) / count) != rosenbrock.DONE:
+            if stepper.advance(END * (k + 1) / count) != integration.DONE:
                 raise RuntimeError("an imposed step failed")
         if stepper.parts[0].memory.accepted_steps[0] != count:
             raise RuntimeError("an imposed step was divided")

@@ -11,7 +11,7 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.inputs import held_control
-from finger_pin.core.stepping.islands import Selection, selections
+from finger_pin.core.islands import Selection, selections
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables

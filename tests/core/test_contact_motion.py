@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 from finger_pin.core.inputs import held_control
-from finger_pin.core.stepping import rosenbrock
+from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
@@ -170,7 +170,7 @@ def test_the_methods_keep_their_order_while_a_contact_stays_closed_and_slides(me
         stepper = Stepper(mechanism, control, start, TABLEAUS[method](), 1e6, np.full(mechanism.size, 1e6))
         stepper.parts[0].memory.step_size[0] = end
         for k in range(count):
-            assert stepper.advance(end * (k + 1) / count) == rosenbrock.DONE
+            assert stepper.advance(end * (k + 1) / count) == integration.DONE
         assert stepper.parts[0].memory.accepted_steps[0] == count
         errors.append(np.abs(stepper.x - exact)[:7].max())
     assert np.log(errors[0] / errors[1]) / np.log(4.0) == pytest.approx(order, abs=0.6)

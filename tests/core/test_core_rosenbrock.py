@@ -8,7 +8,7 @@ from validation.order import END, mean_order, smooth_motion, step_errors
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping import error_norm, rosenbrock
+from finger_pin.core.stepping import error_norm, integration
 from finger_pin.core.stepping.integrator import _Recorder
 from finger_pin.core.stepping.island_stepper import failure
 from finger_pin.core.stepping.stepper import TABLEAUS
@@ -44,7 +44,7 @@ def test_the_interpolant_of_a_step_converges_with_its_order(smooth, method):
     for h in (2.5e-4, 1.25e-4, 6.25e-5):
         recorder = _Recorder(smooth.stepper(method, step=h), 0, 1)
         part = recorder.part
-        assert recorder.advance(h) == rosenbrock.DONE and recorder.taken == 1
+        assert recorder.advance(h) == integration.DONE and recorder.taken == 1
         times = np.linspace(0.0, h, 9)
         found, _ = recorder.steps().interpolate(times)
         np.testing.assert_allclose(found[[0, -1]], [x, part.x], rtol=1e-15, atol=1e-18)
@@ -66,11 +66,11 @@ def test_a_rejected_step_leaves_no_trace(cases, method, touching):
         x += 1e-3 * np.random.default_rng(2).normal(size=x.shape)
     tried = case.part(method, x=x, step=0.5)
     record = tried.room(1)
-    assert tried.advance(1.0, record) == (rosenbrock.FULL, 1)
+    assert tried.advance(1.0, record) == (integration.FULL, 1)
     assert tried.memory.rejected_steps[0] > 0
     direct = case.part(method, x=x, step=tried.time)
     again = direct.room(1)
-    assert direct.advance(1.0, again) == (rosenbrock.FULL, 1)
+    assert direct.advance(1.0, again) == (integration.FULL, 1)
     assert direct.memory.rejected_steps[0] == 0
     np.testing.assert_array_equal(direct.x, tried.x)
     for ours, theirs in zip(vars(again).values(), vars(record).values(), strict=True):
@@ -86,7 +86,7 @@ def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_nam
         part.atol[culprit] = 1e-60
         start = part.x.copy()
         status, _ = part.advance(1.0)
-        assert status == rosenbrock.UNDERFLOW
+        assert status == integration.UNDERFLOW
         np.testing.assert_array_equal(part.x, start)
         assert part.time == 0.0
         name = case.layout.names[culprit]
@@ -111,9 +111,9 @@ def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_name
     part.atol[:] = 1.0
     part.atol[9] = 1e-22
     status, _ = part.advance(1.0)
-    assert status == rosenbrock.STALLED
+    assert status == integration.STALLED
     tries = part.memory.accepted_steps[0] + part.memory.rejected_steps[0]
-    assert 0.0 < part.time < tries * rosenbrock.LEAST_MEAN_STEP
+    assert 0.0 < part.time < tries * integration.LEAST_MEAN_STEP
     assert failure(part, status, case.layout.names).endswith("the error is largest in passive_velocity[T5]")
 
 
@@ -129,7 +129,7 @@ def test_a_rate_that_is_not_finite_is_a_failure_that_keeps_the_state_and_names_t
     assert list(np.flatnonzero(~np.isfinite(rate))) == [9]
     part = case.part(method, x=x)
     status, _ = part.advance(1.0)
-    assert status == rosenbrock.NOT_FINITE
+    assert status == integration.NOT_FINITE
     np.testing.assert_array_equal(part.x, x)
     assert failure(part, status, case.layout.names) == "the rate of passive_velocity[T5] is not finite"
 
@@ -139,7 +139,7 @@ def recorded(part, end, size):
     record, kept = part.room(size), []
     while part.time < end:
         status, steps = part.advance(end, record)
-        assert status in (rosenbrock.DONE, rosenbrock.FULL)
+        assert status in (integration.DONE, integration.FULL)
         kept.append([each[:steps].copy() for each in vars(record).values()])
     return [np.concatenate(each) for each in zip(*kept, strict=True)]
 

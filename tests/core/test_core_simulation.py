@@ -215,7 +215,7 @@ def test_the_same_simulation_twice_gives_the_same_bits(scenarios, period):
 
 def test_a_failure_of_the_core_tells_time_reason_and_advice_and_keeps_what_was_computed(scenarios, monkeypatch):
     """Whatever the reason: here the integrator is told that its steps have become too short."""
-    from finger_pin.core.stepping import rosenbrock
+    from finger_pin.core.stepping import integration
     from finger_pin.core.stepping.island_stepper import IslandIntegrator
 
     advance = IslandIntegrator.advance
@@ -224,7 +224,7 @@ def test_a_failure_of_the_core_tells_time_reason_and_advice_and_keeps_what_was_c
         status, steps = advance(self, *given)
         if self.time > 0.2:
             self.memory.limiting_state[0] = 9.0
-            return rosenbrock.UNDERFLOW, steps
+            return integration.UNDERFLOW, steps
         return status, steps
 
     monkeypatch.setattr(IslandIntegrator, "advance", failing)

@@ -12,10 +12,10 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.inputs import held_control, planned_control
+from finger_pin.core.islands import find_islands
 from finger_pin.core.jit import pack
-from finger_pin.core.stepping import rosenbrock
+from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.integrator import integrate_compiled
-from finger_pin.core.stepping.islands import find_islands
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
 from finger_pin.exceptions import InputError
@@ -202,7 +202,7 @@ def test_a_failure_of_one_finger_names_its_own_state(fingers):
     part.atol[:] = 1.0
     part.atol[2] = 1e-60
     part._bound = part._bound._replace(rtol=0.0)
-    part._block._words[:] = pack(part._bound, rosenbrock.INTEGRATION)._words
+    part._block._words[:] = pack(part._bound, integration.INTEGRATION)._words
     trajectory = integrate_compiled(stepper, TIMES[-1], names_of(fingers.mechanism))
     place = fingers.parts[0].body.model.nv + 2
     assert trajectory.failure.endswith(f"the error is largest in x{place}")

@@ -3,7 +3,7 @@
 import numpy as np
 
 import finger_pin as fp
-from finger_pin.core.stepping.rosenbrock import DONE
+from finger_pin.core.stepping.integration import DONE
 from finger_pin.simulation.setup import Setup
 
 TOLERANCE = 1e-5

@@ -19,7 +19,7 @@ from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
 from finger_pin.core.path_tables import LOOKS, PathWork
-from finger_pin.core.stepping.rosenbrock import Integration
+from finger_pin.core.stepping.integration import Integration
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 
 # Bernstein coefficients of a coordinate over a step.

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import forget_culled, list_active_pairs, update_culling
-from finger_pin.core.collision.continuous import MISSED_BY_CULLING, NOTHING
 from finger_pin.core.evaluation.attitude_charts import rechart
 from finger_pin.core.inputs import HELD
 from finger_pin.core.jit import CompiledFunction, call_at, copy, copy_matrix, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.stepping import rosenbrock as at
+from finger_pin.core.stepping import integration as at
 from finger_pin.core.stepping.error_norm import step_error, worst
-from finger_pin.core.stepping.rosenbrock import Integration, try_step
+from finger_pin.core.stepping.integration import AdvanceArgs, Integration
+from finger_pin.core.stepping.rosenbrock import try_step
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
 
 @njit_always_inline
 def _begin(integration: Integration, model: Model, end: float) -> None:
-    """Prepare to advance to a time, with the present active contact pairs."""
+    """Prepare to advance to a time."""
     memory, control = integration.memory, model.control
-    list_active_pairs(model.tables, model.work.paths)
     memory.fresh[0], memory.uncut_step_size[0] = 1.0, 0.0
     # Right after a full record nothing has jumped.
     jumped = control.kind == HELD and memory.continued[0] == 0.0
@@ -62,11 +58,11 @@ def _note_limiting_state(integration: Integration) -> None:
 
 
 @njit_inline
-def try_counted(integration: Integration, model: Model, h: float) -> int:
+def try_counted(address: int, integration: Integration, model: Model, h: float) -> int:
     """Try a step and count its evaluations; return the outcome of `try_step`."""
-    memory, tables = integration.memory, model.tables
+    memory = integration.memory
     fresh, count = memory.fresh[0] > 0.0, integration.tableau.nodes.size
-    outcome = try_step(integration, model, memory.time[0], h, fresh)
+    outcome = try_step(address, integration, model, memory.time[0], h, fresh)
     if outcome == at.SENSELESS:
         for c in range(integration.x.size - 1, -1, -1):
             if not np.isfinite(integration.start[c]):
@@ -74,7 +70,7 @@ def try_counted(integration: Integration, model: Model, h: float) -> int:
         return outcome
     memory.jacobians[0] += fresh
     memory.factorisations[0] += 1
-    memory.evaluations[0] += count if fresh or tables.has_tip_force or tables.contact_rows > 0 else count - 1
+    memory.evaluations[0] += count if fresh or integration.reevaluate else count - 1
     # What follows a kink follows from this try alone.
     memory.fresh[0], memory.max_next_step_size[0] = 0.0, np.inf
     return outcome
@@ -127,16 +123,11 @@ def _pace(integration: Integration, h: float, error: float, final: bool, clipped
 
 
 @njit_always_inline
-def accept_step(args: Any, integration: Integration, model: Model, time: float) -> None:
+def accept_step(args: AdvanceArgs, integration: Integration, model: Model, time: float) -> None:
     """Move to the end of an accepted step, and store the step if there is a record."""
-    x, attitude, tables, taken = integration.x, integration.attitude, model.tables, args.taken[0]
-    first = 2 * model.linear.mass.shape[0]
-    if tables.contact_rows and update_culling(tables, model.work.rows, model.work.paths, model.state[first:]):
-        list_active_pairs(tables, model.work.paths)
-        for values in (integration.start, integration.global_error, model.rate):
-            forget_culled(tables, model.work.paths, first, values)
-        for j in range(integration.k.shape[0]):
-            forget_culled(tables, model.work.paths, first, integration.k[j])
+    x, attitude, taken = integration.x, integration.attitude, args.taken[0]
+    if integration.events.settle:
+        call_at(integration.events.settle, args.integration, 0.0)
     copy(model.state, x)
     integration.memory.time[0] = time
     if taken < args.times.size:
@@ -145,7 +136,7 @@ def accept_step(args: Any, integration: Integration, model: Model, time: float) 
         copy(x, args.states[taken])
         copy(integration.kinks, args.branches[taken])
         args.shares[taken] = integration.memory.taken_share[0]
-    rechart(tables, x, attitude, integration.global_error)
+    rechart(model.tables, x, attitude, integration.global_error)
     if taken < args.times.size:
         for f in range(attitude.shape[0]):
             for c in range(4):
@@ -172,7 +163,7 @@ def advance(address: int, end: float) -> int:
         clipped = final and end - time < h
         if final:
             h = end - time
-        outcome = try_counted(integration, model, h)
+        outcome = try_counted(args.integration, integration, model, h)
         if outcome == at.SENSELESS:
             return at.NOT_FINITE
         error = np.inf
@@ -184,18 +175,13 @@ def advance(address: int, end: float) -> int:
                 _note_limiting_state(integration)
                 return at.UNDERFLOW
             continue
-        memory.outcome[0], memory.touch_share[0] = outcome, NOTHING
-        call_at(integration.cut, args.integration, h)
-        if memory.retry_share[0] == 1.0 and model.tables.contact_rows:
-            call_at(integration.detect_missed_contacts, args.integration, h)
-        kept, part, touch = memory.retry_share[0], memory.taken_share[0], memory.touch_share[0]
-        if touch == MISSED_BY_CULLING:
-            # The same step once more, with what slept.
-            list_active_pairs(model.tables, model.work.paths)
+        memory.outcome[0], memory.stale[0] = outcome, 0.0
+        call_at(integration.events.cut, args.integration, h)
+        kept, part = memory.retry_share[0], memory.taken_share[0]
+        if memory.stale[0] > 0.0:
             memory.fresh[0] = 1.0
-        elif kept < 1.0 or touch < NOTHING:
-            # Of a touch nothing has seen the next step's end is inside, and sees it.
-            _shorten(integration, h * (part * touch if touch < NOTHING else kept), max(memory.uncut_step_size[0], h))
+        elif kept < 1.0:
+            _shorten(integration, h * kept, max(memory.uncut_step_size[0], h))
         else:
             if integration.joints.size + integration.objects.size > 0:
                 call_at(integration.propagate_error, args.integration, h)

@@ -10,10 +10,8 @@ from finger_pin.core.buffers import Linear
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.stepping import rosenbrock as at
+from finger_pin.core.stepping.integration import INTEGRATION, Integration
 from finger_pin.core.stepping.interpolation import between
-from finger_pin.core.stepping.kink_sides import unfreeze_branch
-from finger_pin.core.stepping.rosenbrock import Integration
 
 # Terms of the flow. With three, vibrations that steps of a radian or two follow would be damped, and with them what a
 # loop that hunts makes of small errors; with six they are not.
@@ -34,14 +32,12 @@ def propagate_error(address: int, h: float) -> int:
 
     Its state is that of the step's start, that of its model the one at the end.
     """
-    integration = unpack(address, at.INTEGRATION)
+    integration = unpack(address, INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
     global_error, k, width = integration.global_error, integration.k, model.linear.mass.shape[0]
     part, turned, last = memory.taken_share[0], memory.left_share[0] < 1.0, k.shape[0] - 1
-    again = memory.rejected[0] > 0.0 and model.tables.contact_rows > 0
-    if turned or memory.outcome[0] == at.LEFT_BRANCH or again:
-        # The two methods may err alike.
-        defect(integration, model, memory.time[0], h, part)
+    if memory.errors_alike[0] > 0.0:
+        defect(address, integration, model, memory.time[0], h, part)
     else:
         for c in range(global_error.size):
             k[last, c] *= part
@@ -108,15 +104,16 @@ def carry(
 
 
 @njit_always_inline
-def defect(integration: Integration, model: Model, time: float, h: float, share: float) -> None:
+def defect(address: int, integration: Integration, model: Model, time: float, h: float, share: float) -> None:
     """Replace the difference of the two methods in the last stage by the integrated defect of the rates along a step.
 
     At a kink both methods err alike. What a step's interpolant should have grown by is integrated after Lobatto
     with four nodes, and what stiff parts exaggerate is taken back by one solution of the linear system.
 
     Args:
+        address: Of the integration.
         integration: The integration; its states are those of the step's start.
-        model: The model; its state is that of the step's end, where it is evaluated last, and no row is held.
+        model: The model; its state is that of the step's end, where it is evaluated last, and no branch is frozen.
         time: Of the start, s.
         h: Length of the step that was tried, s.
         share: What is taken of it.
@@ -124,7 +121,7 @@ def defect(integration: Integration, model: Model, time: float, h: float, share:
     tableau, x, k, state, rate = integration.tableau, integration.x, integration.k, model.state, model.rate
     r, end, start, length = integration.r, integration.end, integration.start, share * h
     last, size = tableau.nodes.size - 1, x.size
-    unfreeze_branch(model.tables, model.work.rows)
+    call_at(integration.events.release, address, 0.0)
     for c in range(size):
         r[c], end[c] = state[c] - x[c] - _WEIGHTS[2] * length * start[c], state[c]
     for node in range(3):

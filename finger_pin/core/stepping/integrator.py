@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, failure
 from finger_pin.core.stepping.repetition import Steps

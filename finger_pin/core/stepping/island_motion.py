@@ -10,10 +10,10 @@ import numpy as np
 from finger_pin.core.bound_models import FEW, BoundModel
 from finger_pin.core.buffers import build_work
 from finger_pin.core.evaluation.law_code import SIDE
+from finger_pin.core.evaluation.powers import POWERS, Powers, power_many
 from finger_pin.core.jit import call, copied
 from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate_many
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, Record
-from finger_pin.core.stepping.powers import POWERS, Powers, power_many
 from finger_pin.core.threads import in_threads, threads
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array

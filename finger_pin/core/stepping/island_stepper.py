@@ -13,17 +13,17 @@ from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
 from finger_pin.core.chains import PRISMATIC
 from finger_pin.core.collision.broad_phase import activate_all
+from finger_pin.core.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
 from finger_pin.core.evaluation.attitude_charts import place_all
+from finger_pin.core.events.step_events import step_events
 from finger_pin.core.inputs import InputTable
+from finger_pin.core.islands import Island
 from finger_pin.core.jit import Block, CompiledFunction, copied, pack
-from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.adaptive import advance
-from finger_pin.core.stepping.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
 from finger_pin.core.stepping.error_propagation import propagate_error
-from finger_pin.core.stepping.islands import Island
 from finger_pin.core.stepping.knots import ADVANCE_KNOTTED_ARGS, AdvanceKnottedArgs, advance_knotted
 from finger_pin.core.stepping.repetition import REPEAT_STEPS_ARGS, RepeatStepsArgs, Steps, repeat_steps
-from finger_pin.core.stepping.step_cuts import cut_step, find_missed_contacts
 from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.core.tables import Tables
 from finger_pin.laws.law import ContactLaw, Law
@@ -129,8 +129,8 @@ class IslandIntegrator:
             kinks=np.zeros(len(tables.state)),
             joints=np.flatnonzero(~of_objects & free & estimate_error),
             objects=np.flatnonzero(of_objects & free & estimate_error),
-            cut=cut_step.address,
-            detect_missed_contacts=find_missed_contacts.address if tables.contact_rows else 0,
+            reevaluate=bool(tables.has_tip_force or tables.contact_rows),
+            events=step_events(tables.contact_rows > 0),
             propagate_error=propagate_error.address if estimate_error else 0,
         )
         self._block = pack(self._bound, core.INTEGRATION)

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import activate_all_pairs
-from finger_pin.core.jit import CompiledFunction, Indices, Matrix, StructType, Vector, unpack
+from finger_pin.core.jit import CompiledFunction, Indices, Matrix, StructType, Vector, call_at, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping import rosenbrock as at
+from finger_pin.core.stepping import integration as at
 from finger_pin.core.stepping.adaptive import accept_step, try_counted
 from finger_pin.core.stepping.interpolation import cut, interpolant
 from finger_pin.typing import Array
@@ -71,10 +70,10 @@ def repeat_steps(address: int, end: float) -> int:
         if frozen:
             for k in range(integration.kinks.size):
                 integration.kinks[k] = steps.branches[step, k]
-        # What another run could cull may be close in this one.
-        activate_all_pairs(model.tables, model.work)
+        if integration.events.forget:
+            call_at(integration.events.forget, args.integration, 0.0)
         memory.fresh[0], memory.frozen[0], memory.taken_share[0] = 1.0, 1.0 * frozen, share
-        outcome = try_counted(integration, model, (goal - time) / share)
+        outcome = try_counted(args.integration, integration, model, (goal - time) / share)
         if outcome == at.SENSELESS:
             return at.NOT_FINITE
         if outcome == at.SINGULAR:

@@ -2,188 +2,28 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import record_start_gaps
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import Indices, Layers, Matrix, StructType, Vector, call_at, njit_always_inline
+from finger_pin.core.jit import call_at, njit_always_inline
 from finger_pin.core.model import Model
-from finger_pin.core.stepping.kink_sides import freeze_branch, left_branch, unfreeze_branch
-from finger_pin.core.stepping.tableaus import Tableau
-from finger_pin.typing import Array
-
-DONE, FULL, UNDERFLOW, NOT_FINITE, STALLED, RUNAWAY = range(6)
-
-# So many tries in a row must advance by so much time each on average, s: a second at that pace would take hours.
-WINDOW, LEAST_MEAN_STEP = 20_000, 1e-9
-# Where a joint turns faster, rad/s, or a mass is faster, m/s, nothing physical is left to follow: the tip of a link of
-# 1 cm is then faster than sound, 343 m/s.
-FASTEST = 343.0 / 0.01
-# What comes of trying a step.
-TRIED, LEFT_BRANCH, SINGULAR, SENSELESS = range(4)
-
-
-class StepMemory(NamedTuple):
-    """Memory of an integration that outlives a call, one number each, shape (1,); flags are 0 or 1.
-
-    Attributes:
-        time: Time reached, s.
-        step_size: Size of the next step, s.
-        last_step_size: Size of the last step, s; 0 if it says nothing of the next.
-        last_error: Error of the last step, in tolerances.
-        evaluations: Number of right-hand sides.
-        jacobians: Number of Jacobians.
-        factorisations: Number of factorisations.
-        accepted_steps: Number of steps that were taken.
-        rejected_steps: Number of tries that were not.
-        rejected: Flag, whether the last try was rejected.
-        limiting_state: Index of the state that is named in a failure.
-        held_step_size: Size of the first step after the last jump of held inputs, s.
-        continued: Flag, whether the last call ended at a full record, so that no input has jumped since.
-        goal: End of the last call, s.
-        window_start: Time at which the last `WINDOW` tries began, s.
-        window_end: Number of tries at which they end.
-        joint_error: Integral over time of the mean square of the joints' errors, rad2 s.
-        object_error: The same of objects, rad2 s or m2 s.
-        error_lag: Time from where the error has been carried to, to the time reached, s.
-        fresh: Flag, whether the step that is tried has a new start.
-        jumped: Flag, whether held inputs have jumped since the last step.
-        uncut_step_size: Size of the step before it was cut at a kink, s, or 0.
-        max_next_step_size: Maximum size of the step after a kink, s.
-        outcome: Outcome of the try.
-        taken_share: Share of the try that is taken.
-        retry_share: Share of it that is tried next, or 1.
-        left_share: Share of it after which a row has left its branch, or 1.
-        touch_share: Share of it at which bodies touch and part again.
-        frozen: Flag, whether the branches of kinks are given instead of those where the step starts.
-    """
-
-    time: Vector
-    step_size: Vector
-    last_step_size: Vector
-    last_error: Vector
-    evaluations: Vector
-    jacobians: Vector
-    factorisations: Vector
-    accepted_steps: Vector
-    rejected_steps: Vector
-    rejected: Vector
-    limiting_state: Vector
-    held_step_size: Vector
-    continued: Vector
-    goal: Vector
-    window_start: Vector
-    window_end: Vector
-    joint_error: Vector
-    object_error: Vector
-    error_lag: Vector
-    fresh: Vector
-    jumped: Vector
-    uncut_step_size: Vector
-    max_next_step_size: Vector
-    outcome: Vector
-    taken_share: Vector
-    retry_share: Vector
-    left_share: Vector
-    touch_share: Vector
-    frozen: Vector
-
-    @classmethod
-    def from_vector(cls, values: Array) -> StepMemory:
-        """Return views of a vector, shape (number of fields,)."""
-        return cls(*(values[place : place + 1] for place in range(len(cls._fields))))
-
-
-class Integration(NamedTuple):
-    """Arrays and settings of an integration.
-
-    Attributes:
-        model: Address of the bound `Model`.
-        tableau: The method.
-        x: State, changed in place, shape (size,); the angles of free bodies are those since the last step.
-        attitude: Unit quaternions of the free bodies, changed in place, shape (f, 4).
-        rtol: Relative tolerance.
-        atol: Absolute tolerances, shape (size,).
-        memory: Time, step size, error history and counters; kept between calls.
-        k: Scratch for the stages, shape (s, size).
-        start: Scratch, f(t, x) at the start of a step, shape (size,).
-        r: Scratch, shape (size + 1,).
-        end: Scratch, shape (size,).
-        dense: Coefficients of a step's interpolant, shape (rows of the tableau's dense, size).
-        global_error: Estimate of the error so far, shape (size,).
-        kinks: Where each row was between the sides of its kink when the step began, or a sign, shape (K,).
-        joints: Coordinates whose error is estimated; without any nothing is, which saves a tenth.
-        objects: Those of free objects, likewise.
-        cut: Address of the unit that cuts a step that was tried.
-        detect_missed_contacts: Of the one that looks for touches in it; 0 without contacts.
-        propagate_error: Of the one that carries the error over it; 0 where none is estimated.
-    """
-
-    model: int
-    tableau: Tableau
-    x: Vector
-    attitude: Matrix
-    rtol: float
-    atol: Vector
-    memory: StepMemory
-    k: Matrix
-    start: Vector
-    r: Vector
-    end: Vector
-    dense: Matrix
-    global_error: Vector
-    kinks: Vector
-    joints: Indices
-    objects: Indices
-    cut: int
-    detect_missed_contacts: int
-    propagate_error: int
-
-
-class AdvanceArgs(NamedTuple):
-    """Arguments of `advance`: an integration, and room for a record of at most m steps.
-
-    Attributes:
-        integration: Address of the bound `Integration`.
-        times: Times at which steps end, shape (m,); of length zero to record nothing.
-        states: States there, with the angles of free bodies since the step's start, shape (m, size).
-        attitudes: Quaternions of the free bodies there, shape (m, f, 4).
-        dense: Interpolants of the steps, shape (m, rows of the tableau's dense, size).
-        shares: Of the length that was tried the share that was taken, shape (m,).
-        branches: Where each row was between the sides of its kink at the start of each step, shape (m, K).
-        taken: Number of steps recorded so far, and that at which to stop, shape (2,).
-    """
-
-    integration: int
-    times: Vector
-    states: Matrix
-    attitudes: Layers
-    dense: Layers
-    shares: Vector
-    branches: Matrix
-    taken: Indices
-
-
-INTEGRATION, ADVANCE_ARGS = StructType(Integration), StructType(AdvanceArgs)
+from finger_pin.core.stepping.integration import LEFT_BRANCH, SENSELESS, SINGULAR, TRIED, Integration
 
 
 @njit_always_inline
-def try_step(integration: Integration, model: Model, time: float, h: float, fresh: bool) -> int:
+def try_step(address: int, integration: Integration, model: Model, time: float, h: float, fresh: bool) -> int:
     """Try one step: fill the increments k and, in model.state, the state at its end.
 
     What depends on the start alone, f(t, x) and the linearisation, is kept for a second try.
 
     Returns:
-        `TRIED`; `LEFT_BRANCH`, if at a stage a row has left the branch it is frozen on; `SINGULAR`, if
-        g - J is; `SENSELESS`, if f(t, x) is not finite.
+        `TRIED`; `LEFT_BRANCH`, if at a stage a branch is left that is frozen; `SINGULAR`, if g - J is; `SENSELESS`, if
+        f(t, x) is not finite.
     """
     tableau, x, k, r, start = integration.tableau, integration.x, integration.k, integration.r, integration.start
-    size, state, rate = x.size, model.state, model.rate
-    tables, rows, kinks = model.tables, model.work.rows, integration.kinks
+    size, state, rate, events = x.size, model.state, model.rate, integration.events
     g = 1.0 / (h * tableau.gamma)
-    outcome, frozen = TRIED, integration.memory.frozen[0] > 0.0
+    outcome = TRIED
     for i in range(tableau.nodes.size):
         for c in range(size):
             r[c], rate[c], state[c] = 0.0, start[c], x[c]
@@ -194,11 +34,8 @@ def try_step(integration: Integration, model: Model, time: float, h: float, fres
                 state[c] += of_stage * k[j, c]
                 r[c] += of_coupling * k[j, c]
         if i == 0 and fresh:
-            unfreeze_branch(tables, rows)
-            if frozen:
-                freeze_branch(tables, rows, kinks, frozen)
-        # For a second try too: what pins and tips feel there is read from the memory of the evaluation.
-        if i > 0 or fresh or tables.has_tip_force or tables.contact_rows > 0:
+            call_at(events.release, address, 0.0)
+        if i > 0 or fresh or integration.reevaluate:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
             if fresh:
@@ -206,14 +43,11 @@ def try_step(integration: Integration, model: Model, time: float, h: float, fres
                     start[c] = rate[c]
                     if not np.isfinite(rate[c]):
                         return SENSELESS
-                if not frozen:
-                    freeze_branch(tables, rows, kinks, frozen)
-                if tables.contact_rows:
-                    record_start_gaps(tables, model.work.paths)
+                call_at(events.freeze, address, 0.0)
                 call_at(model.linearise, integration.model, time)
             if call_at(model.condense, integration.model, g) == 0:
                 return SINGULAR
-        elif i < tableau.nodes.size - 1 and left_branch(tables, rows, kinks) < 1.0:
+        elif i < tableau.nodes.size - 1 and call_at(events.left, address, 0.0):
             outcome = LEFT_BRANCH
         for c in range(size):
             r[c] += rate[c]

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.collision.broad_phase import activate_all
+from finger_pin.core.drives import Drives
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.inputs import HELD, InputTable
+from finger_pin.core.islands import Island, selections
 from finger_pin.core.jit import copied
-from finger_pin.core.stepping import rosenbrock as core
-from finger_pin.core.stepping.drives import Drives
+from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, failure
-from finger_pin.core.stepping.islands import Island, selections
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import build_tables

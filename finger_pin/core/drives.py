@@ -17,7 +17,7 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.rosenbrock import ADVANCE_ARGS, DONE, FULL, INTEGRATION
+from finger_pin.core.stepping.integration import ADVANCE_ARGS, DONE, FULL, INTEGRATION
 from finger_pin.laws.motor import OPEN_CIRCUIT
 from finger_pin.typing import Array
 

@@ -1,19 +1,20 @@
 """Rows frozen on one branch of their law during a step, so that its rates are smooth.
 
-Those that bend with the sign of their speed are held and released here; where they turn round, `reversals` says.
+Those that bend with the sign of their speed are frozen here too; where they turn round, `reversals` says.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from finger_pin.core.collision.broad_phase import record_start_gaps
 from finger_pin.core.evaluation.law_code import SIDE, SPEED
-from finger_pin.core.jit import Matrix, Vector, call_at, copy, njit_always_inline, njit_inline
-from finger_pin.core.model import Model
+from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_at, copy, njit_always_inline, njit_inline, unpack
+from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping.error_norm import step_error
+from finger_pin.core.stepping.integration import INTEGRATION, Integration
 from finger_pin.core.stepping.interpolation import between, cut
+from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 
 # A step after a kink that is rejected costs as much as two that grow.
@@ -23,25 +24,35 @@ _SHARE = 0.25
 _BEHIND, _WANTED, _TRIALS = 0.02, 0.5, 6
 
 
-@njit_inline
-def unfreeze_branch(tables: Tables, rows: Matrix) -> None:
-    """Let the branches of all rows follow the motion."""
+@CompiledFunction
+def release(address: int, _time: float) -> int:
+    """Let the branches of all rows follow the motion, or freeze those that are given to an `Integration`."""
+    integration = unpack(address, INTEGRATION)
+    model = unpack(integration.model, MODEL)
+    tables, rows, given = model.tables, model.work.rows, integration.memory.frozen[0] > 0.0
     for g in range(tables.groups.shape[0]):
         if tables.groups[g, KINK] >= 0:
             for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                rows[SIDE, k] = 0.0
+                rows[SIDE, k] = np.sign(integration.kinks[k]) if given else 0.0
+    return 1
 
 
-@njit_always_inline
-def freeze_branch(tables: Tables, rows: Matrix, kinks: Vector, given: bool) -> None:
-    """Freeze all rows on the present branch of their law, or on that given by the signs of ``kinks``."""
-    for g in range(tables.groups.shape[0]):
-        column = tables.groups[g, KINK]
-        if column >= 0:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                if not given:
+@CompiledFunction
+def freeze(address: int, _time: float) -> int:
+    """Freeze all rows on the present branches of their laws, unless others are given, and record gaps."""
+    integration = unpack(address, INTEGRATION)
+    model = unpack(integration.model, MODEL)
+    tables, rows, kinks = model.tables, model.work.rows, integration.kinks
+    if integration.memory.frozen[0] == 0.0:
+        for g in range(tables.groups.shape[0]):
+            column = tables.groups[g, KINK]
+            if column >= 0:
+                for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
                     kinks[k] = rows[column, k]
-                rows[SIDE, k] = np.sign(kinks[k])
+                    rows[SIDE, k] = np.sign(kinks[k])
+    if tables.contact_rows:
+        record_start_gaps(tables, model.work.paths)
+    return 1
 
 
 @njit_inline
@@ -61,8 +72,16 @@ def leaving_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
     return share
 
 
+@CompiledFunction
+def left(address: int, _time: float) -> int:
+    """Return 1 if a frozen row of an `Integration`'s model has left its branch, else 0."""
+    integration = unpack(address, INTEGRATION)
+    model = unpack(integration.model, MODEL)
+    return 1 if left_share(model.tables, model.work.rows, integration.kinks) < 1.0 else 0
+
+
 @njit_inline
-def left_branch(tables: Tables, rows: Matrix, kinks: Vector) -> Any:
+def left_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
     """Return the least share of the step after which a frozen row has left its branch, 1 if none has."""
     return min(1.0, leaving_share(tables, rows, kinks))
 
@@ -79,7 +98,7 @@ def switch_left_branches(tables: Tables, rows: Matrix, kinks: Vector) -> None:
 
 
 @njit_inline
-def branch_error(integration: Any, model: Model, time: float, h: float) -> float:
+def branch_error(integration: Integration, model: Model, time: float, h: float) -> float:
     """Return the error of rows frozen on a branch already left, in tolerances."""
     tables, rows, kinks, size = model.tables, model.work.rows, integration.kinks, integration.x.size
     r = integration.r
@@ -95,7 +114,7 @@ def branch_error(integration: Any, model: Model, time: float, h: float) -> float
 
 
 @njit_always_inline
-def max_step_after_event(h: float, share: float, cost: float, rtol: float, tableau: Any) -> float:
+def max_step_after_event(h: float, share: float, cost: float, rtol: float, tableau: Tableau) -> float:
     """Return the maximum step size after a branch change, s.
 
     Stiff methods damp what they are too long for, and both of a pair alike: of a vibration of y radians in a step the
@@ -110,7 +129,7 @@ def max_step_after_event(h: float, share: float, cost: float, rtol: float, table
 
 
 @njit_always_inline
-def midpoint_violation(integration: Any, model: Model, time: float, h: float) -> float:
+def midpoint_violation(integration: Integration, model: Model, time: float, h: float) -> float:
     """Return the share of a step after which a row has left its branch at too great an error, else 1.
 
     A row that is back at the end would not be seen there.
@@ -119,7 +138,7 @@ def midpoint_violation(integration: Any, model: Model, time: float, h: float) ->
     copy(state, end)
     between(x, end, integration.dense, 0.5, state)
     call_at(model.evaluate, integration.model, time + 0.5 * h)
-    share = left_branch(model.tables, model.work.rows, integration.kinks)
+    share = left_share(model.tables, model.work.rows, integration.kinks)
     if share < 1.0 and branch_error(integration, model, time + 0.5 * h, h) <= 1.0:
         share = 1.0
     copy(end, state)
@@ -129,7 +148,7 @@ def midpoint_violation(integration: Any, model: Model, time: float, h: float) ->
 
 @njit_always_inline
 def locate_event(
-    integration: Any, model: Model, time: float, h: float, share: float, cost: float
+    integration: Integration, model: Model, time: float, h: float, share: float, cost: float
 ) -> tuple[float, float, float, int]:
     """End a step a little behind the first branch change, at the interpolant's state.
 

@@ -17,7 +17,7 @@ import numpy as np
 from finger_pin.core.evaluation.law_code import RATE, SIDE, SPEED, STATE
 from finger_pin.core.jit import Matrix, call_value, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
-from finger_pin.core.stepping.rosenbrock import Integration
+from finger_pin.core.stepping.integration import Integration
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 
 # A step is taken as a whole if what is misled in it is so much of the tolerance at most. One that is cut ends a little
@@ -121,7 +121,8 @@ def _more(tables: Tables, rows: Matrix, g: int, k: int, speed: float) -> float:
 def bristles_over_limit(integration: Integration, model: Model) -> bool:
     """Return whether bristles far beyond their limit have bent further in a step.
 
-    No motion does that: by (9a) |F^s|' <= sigma_0 |v| (1 - |F^s| / level). But implicit methods damp what grows, too.
+    No motion does that: by (9a) |F^s|' <= sigma_0 |v| (1 - |F^s| / level), and `Law.kink` asks the like of any law.
+    But implicit methods damp what grows, too.
     """
     tables, x, state, width = model.tables, integration.x, model.state, model.linear.mass.shape[0]
     for g in range(tables.groups.shape[0]):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_contact_motion import G, scene
 
+from finger_pin.core.collision.interpolants import meetings
 from finger_pin.core.compiled_finger import CompiledMechanism
-from finger_pin.core.stepping.interpolant_collision import meetings
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.description.objects import Object
 
