@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.interface import Controller, ControlSignals
-from finger_pin.core.drives import Drives
+from finger_pin.core.drives import Drives, sample
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
-from finger_pin.laws.motor import OPEN_CIRCUIT
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
@@ -180,28 +179,17 @@ class SteppedDrives:
     def __init__(self, finger: Finger) -> None:
         """Read the motors of a finger in position drive, m of them."""
         self._drives = build_drives(finger, np.zeros((1, int(finger.actuators.holds.sum()))))
-        self.period = self._drives.period
-        self.reset()
+        self.period, self._tension = self._drives.period, np.zeros(finger.mechanism.channels)
 
     def reset(self) -> None:
         """Forget all samples."""
-        self._integral = np.zeros(len(self._drives.motors))
-        self._last: Array | None = None
+        self._drives.taken[:], self._drives.integral[:] = 0, 0.0
 
     def voltages(self, time: float, x: Array, goals: Array) -> Array:
         """Return the voltages of a sample, shape (m,), V, at a packed state, for goals of spools, shape (m,), rad."""
-        drives, resolution = self._drives, self._drives.resolution
-        angle = x[drives.places]
-        coarse = resolution > 0.0
-        angle[coarse] = np.round(angle[coarse] / resolution[coarse]) * resolution[coarse]
-        error = goals - angle
-        rate = np.zeros_like(error) if self._last is None else (error - self._last) / self.period
-        summed = self._integral + error * self.period
-        duty = drives.gains[0] * error + drives.gains[1] * rate + drives.gains[2] * summed
-        # The integral stands still while the supply is at its limit.
-        self._integral, self._last = np.where(np.abs(duty) < 1.0, summed, self._integral), error
-        off = time * (1.0 + 1e-12) >= drives.torque_off
-        return np.where(off, OPEN_CIRCUIT, drives.supply * np.clip(duty, -1.0, 1.0))
+        self._drives.goals[0] = goals
+        sample(self._drives, time, x, self._tension)
+        return np.array(self._drives.voltages[0])
 
 
 def _positioned(finger: Finger) -> list[tuple[str, Actuator]]:

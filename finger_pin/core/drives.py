@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,9 +83,8 @@ class AdvanceDrivenArgs(NamedTuple):
 ADVANCE_DRIVEN_ARGS = StructType(AdvanceDrivenArgs)
 
 
-@njit_always_inline
-def _sample(drives: Any, x: Vector, tension: Vector) -> None:
-    """Take a sample of all motors, and set their voltages."""
+def sample(drives: Drives, time: float, x: Vector, tension: Vector) -> None:
+    """Take a sample of all motors at a time, s, and set their voltages."""
     last = drives.goals.shape[0] - 1
     k = min(drives.taken[0], last)
     for j in drives.motors:
@@ -103,12 +102,15 @@ def _sample(drives: Any, x: Vector, tension: Vector) -> None:
         voltage = drives.supply[j] * min(max(duty, -1.0), 1.0)
         if not np.isnan(drives.given[k, j]):
             voltage = drives.given[k, j]
-        if drives.taken[0] * drives.period * (1.0 + 1e-12) >= drives.torque_off[j]:
+        if time * (1.0 + 1e-12) >= drives.torque_off[j]:
             voltage = OPEN_CIRCUIT
         # Until the next one is taken, perhaps never.
         drives.voltages[k, j] = drives.voltages[min(k + 1, last), j] = voltage
         tension[drives.channels[j]] = voltage
     drives.taken[0] += 1
+
+
+_sample = njit_always_inline(sample)
 
 
 @CompiledFunction
@@ -124,7 +126,7 @@ def advance_driven(address: int, end: float) -> int:
     memory, times = integration.memory, args.times
     while True:
         if memory.time[0] * (1.0 + 1e-12) >= drives.taken[0] * drives.period:
-            _sample(drives, integration.x, model.control.tension)
+            _sample(drives, drives.taken[0] * drives.period, integration.x, model.control.tension)
         if memory.time[0] >= end:
             return DONE
         if args.taken[0] == args.taken[1] and times.size > 0:

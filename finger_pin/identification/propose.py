@@ -61,11 +61,7 @@ def propose(
     for name, changed in candidates.items():
         entries = {**(overrides or {}), "simulation.sample_rate": rate, **changed}
         run = prepare(load_scenario(scenario, entries), keys, variables, finger=finger).run(sensitivities=True)
-        information = np.diag(1.0 / before**2)
-        for output, noise in outputs.items():
-            slopes = _slopes(run, output)
-            until = run.time < run.attrs["sensitivities_lost"]
-            information = information + slopes[:, until] @ slopes[:, until].T / noise**2
+        information = np.diag(1.0 / before**2) + sum(_information(run, *each) for each in outputs.items())
         scaled = information * np.outer(before, before)
         found[name] = (float(np.linalg.slogdet(scaled)[1]), np.sqrt(np.diag(np.linalg.inv(scaled))) * before)
     order = sorted(found, key=lambda name: -found[name][0])
@@ -81,6 +77,12 @@ def propose(
         },
         {"candidate": order, "parameter": keys},
     )
+
+
+def _information(run: RunArrays, output: str, noise: float) -> Array:
+    """Return what an output with some noise tells of the parameters, shape (p, p), as far as the derivatives hold."""
+    slopes = _slopes(run, output)[:, run.time < run.attrs["sensitivities_lost"]]
+    return np.asarray(slopes @ slopes.T / noise**2)
 
 
 def _check(

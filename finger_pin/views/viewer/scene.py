@@ -136,25 +136,10 @@ class Scene:
             palm: Poses of the palm at those positions, if it moves.
         """
         geometry, tube = self.geometry, self.tube_radius
-        poses = geometry.poses(joint_positions, palm)
-        paths = geometry.paths(joint_positions, poses=poses)
         turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
-        seen = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
-        tree = isinstance(geometry, TreeGeometry)
-        large = [each for each in geometry.visuals if tree or is_mesh(each.shape) or each.name == "palm"]
-        seen += [_corners(visual, poses) for visual in large]
-        if shown is not None:
-            seen.append(shown.corners)
-        if ghost is not None:
-            seen.append(ghost.seen())
-        corners = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
-        if tree:
-            # What a hand has lost, such as a pen of a model's that falls, leaves the view.
-            first = np.concatenate([points.reshape(-1, *points.shape[-2:])[0] for points in seen]) @ turn.T
-            middle = first.mean(axis=0)
-            reach = np.linalg.norm(first - middle, axis=1).max()
-            corners = corners[np.linalg.norm(corners - middle, axis=1) <= _LOST * reach]
+        beside = ([] if shown is None else [shown.corners]) + ([] if ghost is None else [ghost.seen()])
+        corners = self._in_view(joint_positions, palm, beside)
         drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
@@ -176,6 +161,25 @@ class Scene:
             "slackTension": SLACK_TENSION,
             "chunks": [],
         }
+
+    def _in_view(self, joint_positions: ArrayLike, palm: LinkPoses | None, beside: list[Array]) -> Array:
+        """Return the points that the camera must have in view, with some beside the finger, shape (p, 3), m."""
+        geometry, turn = self.geometry, self.view()
+        poses = geometry.poses(joint_positions, palm)
+        paths = geometry.paths(joint_positions, poses=poses)
+        seen = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
+        tree = isinstance(geometry, TreeGeometry)
+        large = [each for each in geometry.visuals if tree or is_mesh(each.shape) or each.name == "palm"]
+        seen += [*(_corners(visual, poses) for visual in large), *beside]
+        corners: Array = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
+        if not tree:
+            return corners
+        # What a hand has lost, such as a pen of a model's that falls, leaves the view.
+        first = np.concatenate([points.reshape(-1, *points.shape[-2:])[0] for points in seen]) @ turn.T
+        middle = first.mean(axis=0)
+        reach = np.linalg.norm(first - middle, axis=1).max()
+        kept: Array = corners[np.linalg.norm(corners - middle, axis=1) <= _LOST * reach]
+        return kept
 
     def chunk(
         self, time: ArrayLike, joint_position: ArrayLike, tension: ArrayLike, palm: LinkPoses | None = None
