@@ -1,6 +1,7 @@
 """The compiled core against the readable evaluation, on random mechanisms of rows of every law."""
 
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -22,6 +23,8 @@ from finger_pin.mechanism.mechanism import Mechanism
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 SEEDS = range(10)
+# States of each whose Jacobian is compared, of those without a kink nearby.
+ENOUGH = 3
 # A whole number, and one of other laws.
 NOT_LUGRE = ("stribeck_exponent", "reversal_speed")
 
@@ -133,13 +136,13 @@ def linearised(drawn):
     mechanism, command, force, (states, _) = drawn
     control = held_control(mechanism.channels, mechanism.coordinates)
     control.tension[:] = command
-    found = [(x, jacobian(mechanism, x, command, force)) for x in states]
-    return Bound(mechanism, control, force), [each for each in found if each[1] is not None]
+    found = ((x, jacobian(mechanism, x, command, force)) for x in states)
+    return Bound(mechanism, control, force), [*islice((each for each in found if each[1] is not None), ENOUGH)]
 
 
 def test_the_compiled_jacobian_is_that_of_differences_of_the_readable_evaluation(linearised):
     bound, states = linearised
-    assert len(states) > 2
+    assert len(states) == ENOUGH
     for x, expected in states:
         _, solution, solved = bound.solve(0.0, x, 30.0)
         found = 30.0 * np.eye(len(x)) - np.linalg.inv(solution[:, :-1])
@@ -159,19 +162,18 @@ def test_the_condensed_solution_is_that_of_the_dense_system(linearised, g):
         assert np.abs(solution[:, :-1] - dense).max() < 1e-6 * np.abs(dense).max()
 
 
-def ends(mechanism, x, command, force):
-    """The state of a mechanism after 0.02 s, by scipy's Radau on the readable rates and by both compiled methods."""
+def ends(mechanism, x, command, force, duration=5e-3):
+    """The state of a mechanism after a time, s, by scipy's LSODA on the readable rates and by both compiled methods."""
     control = held_control(mechanism.channels, mechanism.coordinates)
     control.tension[:] = command
-    atol = np.full(len(x), 1e-10)
-    found = [
-        integrate(
-            lambda _, y: mechanism.evaluate(y, command, force).rate, x, 0.02, method="Radau", rtol=1e-9, atol=1e-10
-        ).interpolate(np.array([0.02]))[0]
-    ]
+    # The readable rates take most of the time, and LSODA asks for the fewest of them.
+    textbook = integrate(
+        lambda _, y: mechanism.evaluate(y, command, force).rate, x, duration, method="LSODA", rtol=1e-7, atol=1e-8
+    )
+    found = [textbook.interpolate(np.array([duration]))[0]]
     for method in TABLEAUS.values():
-        stepper = Stepper(mechanism, control, x, method(), 1e-10, atol, force)
-        stepper.advance(0.02)
+        stepper = Stepper(mechanism, control, x, method(), 1e-10, np.full(len(x), 1e-10), force)
+        stepper.advance(duration)
         found.append(stepper.x)
     return found
 
@@ -184,7 +186,7 @@ def test_the_textbook_and_the_compiled_integrators_read_the_same_tables():
     force = rng.normal(size=(len(mechanism.body.tips), 3))
     before, *compiled = ends(mechanism, x, command, force)
     for each in compiled:
-        np.testing.assert_allclose(each, before, atol=1e-6)
+        np.testing.assert_allclose(each, before, atol=5e-6)
     for index, table in enumerate(mechanism.rows):
         rows = list(mechanism.rows)
         rows[index] = replace(table, arm=1.3 * table.arm, parameters=1.1 * table.parameters)
@@ -192,7 +194,7 @@ def test_the_textbook_and_the_compiled_integrators_read_the_same_tables():
         after, *compiled = ends(changed, x, command, force)
         assert np.abs(after - before).max() > 1e-4, table.law.name
         for each in compiled:
-            np.testing.assert_allclose(each, after, atol=1e-6)
+            np.testing.assert_allclose(each, after, atol=5e-6)
 
 
 @pytest.mark.parametrize("name", ["fig6", "servo", "press"])
