@@ -6,7 +6,6 @@ import pytest
 import finger_pin as fp
 from finger_pin.mechanism.coerce import as_finger, description_of
 from finger_pin.simulation.energy import entries
-from finger_pin.studies.fingerprint import finger_digest
 
 SHORT = {"simulation.duration": 0.005}
 
@@ -235,25 +234,11 @@ def test_a_sweep_over_keys_of_a_finger_changes_one_of_ones_own(tmp_path, heavy):
         swept(None, tmp_path)
 
 
-def test_runs_with_a_law_of_ones_own_are_kept_under_a_digest_of_it():
-    law = fp.Law("none", ("k",), lambda row, p: (0.0 * row.length, 0.0), lambda row, p, s: ((0,) * 7, (0,) * 6), abs)
-    fingers = [
-        fp.Finger("ub", rows=[fp.Rows("none", law, ("a",), [[number]], np.zeros((1, 5)))]) for number in (1.0, 2.0, 1.0)
-    ]
-    first, other, again = map(finger_digest, fingers)
-    assert first == again != other and first != finger_digest(fp.Finger("ub"))
-
-
 def test_values_at_keys_of_a_finger_change_one_of_ones_own():
     plain = fp.prepare("fig6", ["finger.tendon_friction.coulomb"])
     own = fp.prepare("fig6", ["finger.tendon_friction.coulomb"], finger=fp.Finger("ub"))
     for values in (None, [0.2]):
         np.testing.assert_array_equal(own.run(values)["tendon_tension"], plain.run(values)["tendon_tension"])
-
-
-def test_the_state_has_pinocchios_short_names():
-    state = fp.Simulator("ub", position=[0.0, 0.1, 0.2, 0.3]).state
-    assert state.q is state.position and state.v is state.velocity
 
 
 def test_what_a_loop_of_ones_own_needs_stands_at_the_front_door():
@@ -310,20 +295,3 @@ def test_a_scenario_stands_for_its_finger_as_its_name_does():
         assert finger.description == scenario.finger != fp.load_finger("ub")
     assert description_of(scenario) == scenario.finger
     assert description_of(fp.load_scenario("hand")) == fp.load_hand("ub_hand")
-
-
-def test_a_hand_needs_no_name_and_what_is_missing_is_said_in_words(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text('[hand.fingers]\nthumb = "ub"\n')
-    scenario = fp.load_scenario(path)
-    assert scenario.hand.name == scenario.finger.name == "hand"
-    assert fp.load_scenario(scenario, {"controller.gain": 2.0}).hand == scenario.hand
-    for text, said in [
-        ('[hand]\nnmae = "mine"\n[hand.fingers]\nthumb = "ub"\n', "did you mean hand.name?"),
-        ('[hand]\nname = "mine"\n', "hand.fingers: is missing: Fingers by name."),
-        ("[hand.fingers.thumb]\nscale = 1.0\n", "thumb.finger: is missing: Name of one that ships, path of a"),
-    ]:
-        path.write_text(text)
-        with pytest.raises(fp.InputError) as refused:
-            fp.load_scenario(path)
-        assert said in str(refused.value) and "Of the hand" not in str(refused.value)

@@ -80,3 +80,14 @@ def together(motor, radii, **actuator):
             }
         )
     )
+
+
+def scenario(made, duration, **sections):
+    """A scenario of a finger with one joint, in open loop, at a tight tolerance."""
+    table = {
+        "name": "one",
+        "finger": made.description.model_dump(exclude_none=True),
+        "controller": {"kind": "tensions", "minimum_tension": 0.7},
+        "simulation": {"duration": duration, "rtol": 1e-9, "atol_scale": 1e-9},
+    }
+    return fp.Scenario.model_validate(table | sections)

@@ -9,13 +9,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.position_drive import (
-    PositionDrives,
-    given_voltages,
-    loop_period,
-    spool_goals,
-    wound_spools,
-)
+from finger_pin.control.position_drive import PositionDrives, given_voltages, loop_period, spool_goals, wound_spools
 from finger_pin.description.loading import list_scenarios, read_scenario, to_toml
 from finger_pin.exceptions import InputError
 

@@ -236,3 +236,8 @@ def test_a_palm_moves_along_its_path_and_the_result_has_it(tmp_path: Path) -> No
     np.testing.assert_allclose(found.palm_position, expected.palm_position, atol=1e-12)
     np.testing.assert_allclose(simulator.signals().acceleration, expected.joint_acceleration[-1], rtol=1e-3, atol=1e-2)
     assert abs(float(found.energy_residual[-1])) < 1e-6
+
+
+def test_the_state_has_pinocchios_short_names():
+    state = fp.Simulator("ub", position=[0.0, 0.1, 0.2, 0.3]).state
+    assert state.q is state.position and state.v is state.velocity

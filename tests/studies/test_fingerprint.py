@@ -6,7 +6,8 @@ import threading
 import numpy as np
 import pytest
 
-from finger_pin.studies.fingerprint import UnknownDependency, code_digest, source_digest
+import finger_pin as fp
+from finger_pin.studies.fingerprint import UnknownDependency, code_digest, finger_digest, source_digest
 from finger_pin.studies.metrics import METRICS
 
 
@@ -77,3 +78,12 @@ def test_what_cannot_be_compared_has_no_digest(mystery):
 def test_all_metrics_of_the_package_have_digests_of_their_own():
     assert len({code_digest(metric.measure) for metric in METRICS.values()}) == len(METRICS)
     assert source_digest() == source_digest()
+
+
+def test_runs_with_a_law_of_ones_own_are_kept_under_a_digest_of_it():
+    law = fp.Law("none", ("k",), lambda row, p: (0.0 * row.length, 0.0), lambda row, p, s: ((0,) * 7, (0,) * 6), abs)
+    fingers = [
+        fp.Finger("ub", rows=[fp.Rows("none", law, ("a",), [[number]], np.zeros((1, 5)))]) for number in (1.0, 2.0, 1.0)
+    ]
+    first, other, again = map(finger_digest, fingers)
+    assert first == again != other and first != finger_digest(fp.Finger("ub"))
