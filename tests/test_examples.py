@@ -152,7 +152,7 @@ def test_the_notebook_sticks_slips_goes_slack_and_locks(tmp_path):
     pytest.importorskip("ipykernel")
     notebook = nbformat.read(FOLDER / "stick_slip_slack_locking.ipynb", as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
-    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(tmp_path)}}).execute()
     printed = [each for cell in notebook.cells for each in cell.get("outputs", []) if each.output_type == "stream"]
     assert {each.name for each in printed} == {"stdout"}
     lines = "".join(each.text for each in printed).splitlines()

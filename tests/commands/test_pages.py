@@ -40,7 +40,7 @@ SHORTER = {
     r"conclusions\.py$": "conclusions.py fig6 --only a",
     r"reaction\.py$": "reaction.py fig6 --forces 1",
     # What it finds has a test of its own.
-    r"(identify\.py) (winding|servo_pendulum).*": r"\1 --list any",
+    r"(identify\.py) (winding|servo_pendulum|postures|spool_finger).*": r"\1 --list any",
     # Its stages have tests of their own, and it measures for minutes.
     r"(benchmark\.py).*": r"\1 --help",
     # They train for minutes, with a library that tests do without.

@@ -177,7 +177,7 @@ def test_a_full_disk_ends_with_one_line_and_earlier_results_stay(run, here, quic
 def test_a_reader_that_has_gone_is_no_error(here):
     process = subprocess_of("--list", folder=here)
     process.stdout.close()
-    assert (process.stderr.read(), process.wait(timeout=60)) == ("", 0)
+    assert (process.stderr.read(), process.wait(timeout=600)) == ("", 0)
     process.stderr.close()
 
 
@@ -198,7 +198,7 @@ def test_a_disk_that_fills_up_in_a_real_run_is_told_in_one_line(here):
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
     with subprocess_of("s.toml", folder=here, preexec_fn=limit) as process:
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=600)
     assert (process.returncode, out) == (1, "")
     assert err.count("\n") == 1
     assert "cannot be written" in err

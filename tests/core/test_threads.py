@@ -37,7 +37,7 @@ def two_cores(monkeypatch):
 
 def test_tasks_go_on_side_by_side_and_return_in_order(two_cores):
     """Two that wait for each other end only if both are under way."""
-    both = threading.Barrier(2, timeout=10.0)
+    both = threading.Barrier(2, timeout=120.0)
 
     def task(number):
         if number < 2:
@@ -58,7 +58,7 @@ def _squares(count):
 def test_a_forked_process_has_threads_of_its_own(two_cores):
     assert _squares(3) == [0, 1, 4]
     with multiprocessing.get_context("fork").Pool(1) as processes:
-        assert processes.apply_async(_squares, (5,)).get(timeout=20.0) == [0, 1, 4, 9, 16]
+        assert processes.apply_async(_squares, (5,)).get(timeout=120.0) == [0, 1, 4, 9, 16]
 
 
 class _Slow:
@@ -69,7 +69,7 @@ class _Slow:
     @cached_property
     def number(self):
         self.computing.set()
-        return 7 if threading.current_thread() is threading.main_thread() else self.end.wait(20.0)
+        return 7 if threading.current_thread() is threading.main_thread() else self.end.wait(120.0)
 
 
 def _number():
@@ -82,10 +82,10 @@ def test_a_process_forked_while_a_thread_computes_waits_for_no_lock_of_that_thre
     """Before Python 3.12 a property that is computed is locked for all objects meanwhile."""
     other = threading.Thread(target=_number)
     other.start()
-    assert _Slow.computing.wait(10.0)
+    assert _Slow.computing.wait(120.0)
     try:
         with multiprocessing.get_context("fork").Pool(1) as processes:
-            assert processes.apply_async(_number).get(timeout=10.0) == 7
+            assert processes.apply_async(_number).get(timeout=120.0) == 7
     finally:
         _Slow.end.set()
         other.join()

@@ -83,10 +83,10 @@ def test_a_process_that_is_forked_while_a_thread_remembers_remembers_too():
 
     thread = threading.Thread(target=lambda: known(0, Slow))
     thread.start()
-    inside.wait(10.0)
+    inside.wait(120.0)
     child = os.fork()
     if not child:
-        signal.alarm(10)
+        signal.alarm(120)
         known(1, Thing)
         os._exit(0)
     thread.join()

@@ -224,7 +224,7 @@ def test_shipped_scenarios_are_played(name):
     assert reading.time == pytest.approx(0.02 + 0.01 * len(session.inputs.kinds))
 
 
-def until(condition, patience=60.0):
+def until(condition, patience=120.0):
     deadline = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < deadline, "the page did not react"

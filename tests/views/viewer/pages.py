@@ -30,12 +30,17 @@ def seek(page, t):
     page.execute_script("fingerPlayer.pause(); fingerPlayer.seek(arguments[0]);", t)
 
 
-def until(condition, patience=10.0):
+def until(condition, patience=120.0):
     """Wait for the browser, which renders in software here."""
     deadline = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < deadline, "the page did not react"
         time.sleep(0.02)
+
+
+def painted(page):
+    """Wait until the browser has painted what was changed, in the second of two frames, however long they take."""
+    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
 
 
 def console_errors(page):

@@ -2,13 +2,12 @@
 
 import io
 import re
-import time
 
 import numpy as np
 import pytest
 from closed_kinematics import equation_1
 from motion import DURATION
-from pages import console_errors, opened, seek
+from pages import console_errors, opened, painted, seek
 from PIL import Image
 
 import finger_pin as fp
@@ -78,7 +77,7 @@ def test_the_set_is_visible_and_translucent(forces_page):
             "fingerPlayer.viewer.set_dirty();",
             visible,
         )
-        time.sleep(0.5)
+        painted(forces_page)
         picture = Image.open(io.BytesIO(forces_page.get_screenshot_as_png())).convert("RGB")
         pictures.append(np.asarray(picture, dtype=float))
     change = np.abs(pictures[0] - pictures[1]).max(axis=-1)

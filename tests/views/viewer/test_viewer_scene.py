@@ -2,7 +2,6 @@
 
 import io
 import json
-import time
 
 import matplotlib
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 import xarray as xr
 from closed_kinematics import equation_1, frames
 from motion import DURATION, joint_position, table, tensions
-from pages import console_errors, opened, ring_centres, seek, tendon_colour
+from pages import console_errors, opened, painted, ring_centres, seek, tendon_colour
 from PIL import Image
 
 import finger_pin as fp
@@ -22,7 +21,7 @@ def test_the_page_loads_without_console_messages_and_without_a_network(browser, 
     page = opened(browser, write_animation(result, tmp_path / "animation.html").as_uri())
     for t in (0.5, 1.5, DURATION):
         seek(page, t)
-    time.sleep(0.5)
+    painted(page)
     assert console_errors(page) == []
     events = [json.loads(entry["message"])["message"] for entry in page.get_log("performance")]
     requests = [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
@@ -147,7 +146,7 @@ def test_the_finger_is_visible_in_the_picture(page):
     pictures = []
     for visible in (True, False):
         page.execute_script("fingerPlayer.scene.root.visible = arguments[0]; fingerPlayer.viewer.set_dirty();", visible)
-        time.sleep(0.5)
+        painted(page)
         pictures.append(np.asarray(Image.open(io.BytesIO(page.get_screenshot_as_png())).convert("RGB"), dtype=int))
     page.execute_script("fingerPlayer.scene.root.visible = true; fingerPlayer.viewer.set_dirty();")
     changed = (np.abs(pictures[0] - pictures[1]).max(axis=-1) > 12).mean()

@@ -15,7 +15,7 @@ from finger_pin.views.viewer.animation import animation_page
 
 def fetch(url, path="/", host=None):
     address = url.removeprefix("http://").rstrip("/")
-    connection = http.client.HTTPConnection(address, timeout=5)
+    connection = http.client.HTTPConnection(address, timeout=120)
     try:
         connection.request("GET", path, headers={"Host": host or address})
         answer = connection.getresponse()
