@@ -172,8 +172,18 @@ def _refuse_restless(finger: Finger) -> None:
     description, tables = finger.description, finger.mechanism.rows
     driven = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
     own = any(table.states for table in finger.constructor_args[1])
-    if description.hand is not None or driven or finger.layout.names_of("object_pose") or own:
-        raise InputError("finger", "must be one finger with ideal sources of tension, without free objects")
+    free = finger.layout.names_of("object_pose")
+    refused = {
+        "several fingers": description.hand is not None,
+        f"actuators ({', '.join(description.actuators)})": driven and bool(description.actuators),
+        "drives of its own": driven and not description.actuators,
+        f"free objects ({', '.join(free)})": bool(free),
+        "rows with states": own,
+    }
+    found = ", ".join(what for what, there in refused.items() if there)
+    if found:
+        allowed = "must be one finger with ideal sources of tension, without free objects"
+        raise InputError("finger", f"{allowed}; it has {found}")
     for name, each in (description.tree.actuators if description.tree is not None else {}).items():
         if each.integrates or each.integral:
             raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")

@@ -16,8 +16,9 @@ import typer
 
 from finger_pin.cancellation import signals_interrupt
 from finger_pin.commands import export, force_capability, identify, optimise, play, self_locking, simulate, sweep
-from finger_pin.commands.console import Unsuccessful, complain
+from finger_pin.commands.console import Unsuccessful, complain, print_text
 from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, StudyError
+from finger_pin.version import __version__
 
 # What is left when a process ends is not worth a search for garbage, which takes half a second.
 atexit.register(gc.freeze)
@@ -51,6 +52,9 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
     """Run a command line for one function, by default for any command; return the exit code."""
     program = "finger-pin" if function is None else f"{function.__name__}.py"
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if function is None and given == ["--version"]:
+        print_text(f"{program} {__version__}")
+        return DONE
     app = typer.Typer(help="Tendon-driven robot fingers.", add_completion=False, rich_markup_mode=None)
     for each in COMMANDS if function is None else (function,):
         app.command(each.__name__.replace("_", "-"))(_with_exit_code(each, program))
@@ -102,5 +106,7 @@ def _usage(error: typer.TyperException, given: Sequence[str]) -> str:
     if context is None or not text.startswith("No such option"):
         return text
     there = [name for each in context.command.params for name in (*each.opts, *each.secondary_opts) if name[:1] == "-"]
-    near = "".join(f"; did you mean {each}?" for each in get_close_matches(str(option), [*there, "--help"], n=1))
+    # All commands together have no parameters.
+    there = [*(there or ["--version"]), "--help"]
+    near = "".join(f"; did you mean {each}?" for each in get_close_matches(str(option), there, n=1))
     return f"{option}: no such option; there are {', '.join(there)}{near}"

@@ -32,6 +32,7 @@ def export(
     settings: Settings = [],  # noqa: B006
 ) -> None:
     """Write a finger as URDF, MJCF or TOML, or the signals of a result as CSV."""
+    from finger_pin.description.reading import is_path
     from finger_pin.files import write_text
 
     results = Path(source).is_dir() or source.endswith(".nc")
@@ -40,11 +41,12 @@ def export(
     if target.suffix not in ENDINGS:
         raise wrong("FILE", f"{target}: must end with {', '.join(ENDINGS)}")
     if results != (target.suffix == ".csv"):
-        what = (
-            "signals are written as .csv"
-            if results
-            else "has no signals; simulate it, and give the folder of its results"
-        )
+        if results:
+            what = "signals are written as .csv"
+        elif is_path(source) and not Path(source).exists():
+            what = "there is no such file or folder"
+        else:
+            what = "has no signals; simulate it, and give the folder of its results"
         raise wrong("SOURCE", f"{source}: {what}")
     if results:
         from finger_pin.simulation.netcdf import load, save
@@ -65,11 +67,16 @@ def export(
 
 def described(source: str, settings: list[str]) -> FingerDescription | Scenario:
     """Return the finger, hand or scenario of a name or a file."""
-    from finger_pin.description.loading import load_finger, load_hand, load_scenario
-    from finger_pin.description.reading import kind_of
+    from finger_pin.description.loading import list_benches, list_scenarios, load_finger, load_hand, load_scenario
+    from finger_pin.description.reading import is_path, kind_of, shipped
+    from finger_pin.description.validation import suggestion
 
     kind, changed = kind_of(source), overrides(settings)
     if kind == "scenario":
+        names = [*shipped("fingers"), *shipped("hands"), *list_scenarios(), *list_benches()]
+        if not is_path(source) and source not in names:
+            allowed = f"no such finger, hand or scenario; there are {', '.join(names)}, or the path of a .toml file"
+            raise wrong("SOURCE", f"{source}: {allowed}{suggestion(source, names)}")
         return load_scenario(source, changed)
     return (load_hand if kind == "hand" else load_finger)(source, changed)
 

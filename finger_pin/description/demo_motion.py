@@ -41,7 +41,7 @@ def demo_motion(description: FingerDescription, duration: float = 4.0) -> dict[s
         position[name] = first.get(name, min(max(tree.joints[name].reference, lower), upper))
     return {
         "name": description.name,
-        "title": f"{description.name}: every actuator to and fro",
+        "title": f"{description.name}: {'every actuator to and fro' if count else 'it falls, as nothing drives it'}",
         "finger": description.model_dump(mode="python", exclude_none=True),
         "controller": {
             "kind": "tensions",

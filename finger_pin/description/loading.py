@@ -172,6 +172,10 @@ def load_bench(
         InputError: Naming the entry that is wrong.
     """
     checked = normalise_overrides(overrides or {}, set(Scenario.model_fields))
+    if isinstance(name, str) and not is_path(name) and name not in {**list_benches(), **list_scenarios()}:
+        near = suggestion(name, list_benches())
+        allowed = f"no such bench; there are {', '.join(list_benches())}, or the path of a .toml file{near}"
+        raise InputError("bench", allowed, name)
     with _depth_limited("scenario"):
         table, folder = ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(str(name), Path())
         wanted = merge(as_table(table.pop("identify", None)), dict(identify or {}))

@@ -126,7 +126,7 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
     what, names = present.get(tuple(owner), (owner[-1].removesuffix("s"), siblings))
     if name not in names:
         allowed = f"no such {what}; there are {', '.join(names) or 'none'}"
-        if what == "object" and not names:
+        if not names and (what == "object" or tuple(owner) not in present):
             allowed = f"{allowed}; {'.'.join(owner)} = {{ {name} = {{ ... }} }} puts it there"
         raise InputError(".".join(path), f"{allowed}{suggestion(name, names)}")
 

@@ -164,7 +164,7 @@ def finite_vector(name: str, value: Sequence[float] | NDArray[np.float64], size:
     """
     found = np.asarray(value, dtype=float)
     if found.shape != (size,) or not np.isfinite(found).all():
-        raise InputError(name, f"must be {size} finite numbers", found.tolist())
+        raise InputError(name, f"must be {size} finite {'number' if size == 1 else 'numbers'}", found.tolist())
     return found
 
 

@@ -108,7 +108,7 @@ class Finger:
         self.scene = Scene.around(mechanism, objects, description, placed)
         self.mechanism = mechanism if self.scene is None else self.scene.joined(mechanism)
         layers = self.tendons, self.joint_friction, self.actuators
-        self.layout = state_layout(*layers, last, self.scene, before, canals.tables)
+        self.layout = state_layout(*layers, last, self.scene, before, canals.tables, self.rigid_body.slides)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""

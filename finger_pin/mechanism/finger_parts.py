@@ -143,8 +143,9 @@ def state_layout(
     scene: Scene | None = None,
     of_tree: Sequence[Rows] = (),
     canals: Sequence[Rows] = (),
+    slides: Sequence[bool] = (),
 ) -> Layout:
-    """Return the layout of tendons, joints, motors, extra rows, drives among them, and a scene."""
+    """Return the layout of tendons, joints, motors, extra rows, drives among them, and a scene; which joints slide."""
     routing = tendons.routing
     drives, of_others = (state_scales([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
 
@@ -182,6 +183,11 @@ def state_layout(
         "drives": [scale for _, scale in drives],
         "further": [scale for _, scale in of_others],
     }
+    if any(slides):
+        # What slides moves as an object does, by centimetres where a joint turns by a radian.
+        for block, sliding in (("position", "object_pose"), ("velocity", "object_velocity")):
+            turning, along = BLOCKS[block].scale[0], BLOCKS[sliding].scale[0]
+            scaled[block] = np.where(slides, along, turning).tolist()
     return _same(Layout.of(labels, scaled))
 
 

@@ -80,6 +80,11 @@ class RigidBody:
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
 
     @property
+    def slides(self) -> tuple[bool, ...]:
+        """Whether each joint of the model slides, and its position is in m."""
+        return tuple(joint.shortname().startswith("JointModelP") for joint in self.model.joints[1:])
+
+    @property
     def _data(self) -> pin.Data:
         """Pinocchio's memory; every thread has its own."""
         if not hasattr(self._own, "data"):

@@ -90,7 +90,7 @@ class Solid:
         first, *others = [each for each in body.model.supports[self.joint] if each]
         radius = float(np.linalg.norm(self.place.translation)) + self.reach
         radius += sum(float(np.linalg.norm(body.model.jointPlacements[each].translation)) for each in others)
-        slides = any("JointModelP" in body.model.joints[each].shortname() for each in (first, *others))
+        slides = any(body.slides[each - 1] for each in (first, *others))
         home = np.array(body.model.jointPlacements[first].translation)
         return replace(self, home=home, range=np.inf if slides else radius)
 

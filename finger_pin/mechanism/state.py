@@ -222,10 +222,10 @@ class Layout:
     def scales(self) -> Array:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).
 
-        Angles 1 rad, velocities 10 rad/s, passive tendon 1 mm and 0.1 m/s, stiction 1 N and 1e-2 N m: the size of
-        each in ordinary motion of a finger, so that one factor serves them all. A lumped mass that rings has the
-        velocity that goes with 1 % of its position: an oscillation too small to matter in the one is not followed
-        in the other.
+        Angles 1 rad and 10 rad/s, joints that slide 1 cm and 0.1 m/s, passive tendon 1 mm and 0.1 m/s, stiction 1 N
+        and 1e-2 N m: the size of each in ordinary motion of a finger, so that one factor serves them all. A lumped
+        mass that rings has the velocity that goes with 1 % of its position: an oscillation too small to matter in the
+        one is not followed in the other.
         """
         return self._scales.copy()
 

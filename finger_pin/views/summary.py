@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -16,6 +16,7 @@ from finger_pin.simulation.accuracy import NOT_JUDGED
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.recording import custom_of, is_tracking
 from finger_pin.typing import Array
+from finger_pin.views.units import actuators_by_unit, joints_by_unit
 
 _SETTLING = 1.0
 _LONG = 2.0
@@ -33,7 +34,7 @@ def summarize(result: xr.Dataset) -> str:
     head = [*_head(result), *_own(result), *_warnings(result)]
     tree = read_scene(result.attrs).finger.tree
     tracks = tree is None and is_tracking(result)
-    motion = [_tracking(result)] if tracks else [_joints(result), *_actuators(result)]
+    motion = [_tracking(result)] if tracks else [*_joints(result), *_actuators(result)]
     pulled = [_tension(result)] if result.sizes["tendon"] else []
     blocks = [
         head,
@@ -98,27 +99,39 @@ def _contacts(result: xr.Dataset) -> list[list[str]]:
     return [["Contacts, N, and parts of the time", *table(("", "normal", "friction", "touching", "sliding"), rows)]]
 
 
-def _joints(result: xr.Dataset) -> list[str]:
+def _joints(result: xr.Dataset) -> list[list[str]]:
     position = result["joint_position"]
-    rows = [_range(str(name), np.asarray(position.sel(joint=name))) for name in result["joint"].values]
-    return ["Positions of the joints, rad or m", *table(("", "least", "greatest"), rows)]
+    return [
+        _ranges(
+            f"Positions of the joints, {unit}",
+            {name: np.asarray(position.sel(joint=name)) for name in names},
+            digits=3 if unit == "rad" else 6,
+        )
+        for unit, names in joints_by_unit(result).items()
+    ]
 
 
 def _actuators(result: xr.Dataset) -> list[list[str]]:
-    found = []
+    forces: dict[str, dict[str, Array]] = {}
+    for group in (STATELESS, STATEFUL, MUSCLES):
+        if f"{group}_force" in result:
+            for unit, names in actuators_by_unit(result, group).items():
+                forces.setdefault(unit, {}).update(
+                    {name: np.asarray(result[f"{group}_force"].sel({group: name})) for name in names}
+                )
+    found = [
+        _ranges(f"{'Torques' if unit == 'N m' else 'Forces'} of the actuators, {unit}", values)
+        for unit, values in forces.items()
+    ]
     canals = [name for name in map(str, result.dims) if is_canal(name) and not name.startswith(WRAPS)]
-    for groups, signal, head in (
-        ([STATELESS, STATEFUL, MUSCLES], "force", "Forces of the actuators, N or N m"),
-        (canals, "friction", "Friction of tendons that they and springs pull, N"),
-    ):
-        kinds = [each for each in groups if f"{each}_{signal}" in result]
-        rows = [
-            _range(str(name), np.asarray(result[f"{each}_{signal}"].sel({each: name})))
-            for each in kinds
-            for name in result[each].values
-        ]
-        if rows:
-            found.append([head, *table(("", "least", "greatest"), rows)])
+    frictions = {
+        str(name): np.asarray(result[f"{each}_friction"].sel({each: name}))
+        for each in canals
+        if f"{each}_friction" in result
+        for name in result[each].values
+    }
+    if frictions:
+        found.append(_ranges("Friction of tendons that they and springs pull, N", frictions))
     return found
 
 
@@ -216,8 +229,15 @@ def _final(values: xr.DataArray | xr.Variable) -> float:
     return float(values[-1])
 
 
-def _range(name: str, values: Array) -> tuple[str, str, str]:
-    return name, f"{values.min():.3f}", f"{values.max():.3f}"
+def _ranges(head: str, signals: Mapping[str, Array], digits: int = 3) -> list[str]:
+    """Return a head and a table of the least and the greatest value of signals by name."""
+    return [head, *table(("", "least", "greatest"), [_range(*each, digits) for each in signals.items()])]
+
+
+def _range(name: str, values: Array, digits: int = 3) -> tuple[str, str, str]:
+    # Adding zero turns what rounds to -0.0 into 0.0.
+    least, greatest = (round(float(each), digits) + 0.0 for each in (values.min(), values.max()))
+    return name, f"{least:.{digits}f}", f"{greatest:.{digits}f}"
 
 
 def _share(value: float, total: float) -> str:

@@ -130,3 +130,16 @@ def test_what_a_path_cannot_hold_is_told_apart_by_a_digest_and_no_name_is_too_lo
     ]
     assert len({*names}) == len(names)
     assert all(len(each) < 70 and each.isascii() and "/" not in each for each in names)
+
+
+def test_the_version_is_told_and_options_of_all_commands_are_listed(capsys):
+    assert application.run_function(None, ["--version"]) == 0
+    assert capsys.readouterr().out == f"finger-pin {fp.__version__}\n"
+    assert application.run_function(None, ["--verson"]) == 2
+    assert capsys.readouterr().err.endswith("there are --version, --help; did you mean --version?\n")
+
+
+def test_a_bench_that_is_not_there_is_told_with_the_benches_that_ship(capsys):
+    assert application.run("identify", ["transmision"]) == 2
+    said = capsys.readouterr().err
+    assert 'bench = "transmision": no such bench; there are postures' in said and "did you mean transmission?" in said

@@ -69,3 +69,16 @@ def test_results_that_cannot_be_read_are_a_wrong_input_and_not_one_that_cannot_b
     assert run("export", [source, "folder/x.csv"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"SOURCE: {source}: cannot be read" in line and not (here / "folder").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["uub", "x.urdf"], "SOURCE: uub: no such finger, hand or scenario; there are dexmart_index, planar, ub,"),
+        (["results/none", "x.csv"], "SOURCE: results/none: there is no such file or folder"),
+    ],
+)
+def test_a_source_that_is_not_there_is_said_with_what_there_is(arguments, says, here, capsys):
+    assert run("export", arguments) == 2
+    assert says in capsys.readouterr().err
+    assert not list(here.iterdir())

@@ -40,3 +40,10 @@ def test_a_model_that_is_refused_leaves_one_line_and_nothing_else(tmp_path, caps
     assert run_function(simulate, ["--mujoco", str(tmp_path / "one.xml"), "--output", str(tmp_path / "out")]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_model_without_actuators_says_that_nothing_drives_it(tmp_path, capsys):
+    (tmp_path / "one.xml").write_text(HAND[: HAND.index("<tendon>")] + "</mujoco>")
+    arguments = ["--mujoco", str(tmp_path / "one.xml"), "--duration", "0.05", "--no-figures"]
+    assert run_function(simulate, [*arguments, "--output", str(tmp_path / "out")]) == 0
+    assert "one: it falls, as nothing drives it" in capsys.readouterr().out

@@ -133,6 +133,11 @@ OTHER_OVERRIDES = [
         "environment.objects.ball",
         ("no such object; there are none", "environment.objects = { ball = { ... } } puts it there"),
     ),
+    (
+        "finger.actuators.M.spool_radius=0.005",
+        "finger.actuators.M",
+        ("no such actuator; there are none", "finger.actuators = { M = { ... } } puts it there"),
+    ),
     ("finger.joints={}", "finger.joints", "at least one entry"),
     ("finger.tendons={}", "finger.tendons", "at least one entry"),
     ("reference.joints.thumb={offset = 0.1}", "reference.joints.thumb", "no such joint; there are abduction"),

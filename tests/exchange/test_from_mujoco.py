@@ -280,3 +280,17 @@ def test_coupled_fixed_tendons_follow_as_mujoco_s_equality_says():
     lead, follower = fp.simulate(read_scenario(demo_motion(description), start)).joint_position.values.T
     assert np.ptp(lead) > 0.2
     np.testing.assert_allclose(follower, 0.1 + lead, atol=1e-2)
+
+
+SPRING = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="slide" type="slide" axis="1 0 0"
+stiffness="100"/><geom size="0.01" mass="0.1"/></body></worldbody></mujoco>"""
+
+
+def test_a_slide_that_moves_by_a_millimetre_is_followed_as_well_as_its_tolerance_says():
+    table = demo_motion(fp.from_mujoco(mujoco.MjModel.from_xml_string(SPRING)), 1.0)
+    table["simulation"]["initial"]["position"] = {"slide": 1e-3}
+    smooth = {f"finger.joint_friction.{name}": 0.0 for name in ("coulomb", "stiction", "viscous")}
+    result = fp.simulate(read_scenario(table, smooth))
+    expected = 1e-3 * np.cos(np.sqrt(100.0 / 0.1) * result.time.values)
+    # A radian's absolute tolerance, 1e-6, would be off by 6e-4 of the amplitude.
+    np.testing.assert_allclose(result.joint_position.values[:, 0], expected, atol=1e-4 * 1e-3)

@@ -88,6 +88,15 @@ def test_absolute_tolerances_have_one_positive_scale_per_number_by_kind(layout):
         assert scales.passive_position[0] < scales.position[0]
 
 
+def test_tolerances_of_joints_that_slide_are_those_of_moved_objects_and_of_others_unchanged():
+    layout = fp.Finger(fp.load_scenario("underactuated").finger).layout
+    scales, turning = layout.unpack(layout.scales()), LAYOUTS["paper"].unpack(LAYOUTS["paper"].scales())
+    assert layout.names_of("position")[0] == "block"
+    np.testing.assert_array_equal(scales.position, [BLOCKS["object_pose"].scale[0], *turning.position])
+    np.testing.assert_array_equal(scales.velocity, [BLOCKS["object_velocity"].scale[0], *turning.velocity])
+    assert {"position", "velocity"}.isdisjoint(dict(fp.Finger("ub").layout.scaled))
+
+
 @pytest.mark.parametrize("size", [18, 20, 0])
 def test_a_state_of_the_wrong_size_is_refused_with_both_sizes(size):
     with pytest.raises(ValueError, match=f"19 numbers, not {size}"):

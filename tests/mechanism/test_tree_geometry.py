@@ -40,6 +40,23 @@ def test_paths_are_as_long_as_their_tendons_and_end_at_their_sites(pulled):
     assert wrapped > 20
 
 
+def test_cords_that_no_motor_pulls_are_drawn_branch_by_branch_with_ends_at_their_points():
+    finger = fp.load_scenario("underactuated").finger
+    scene, hand = Scene(finger), fp.Hand(finger)
+    position = np.array([0.004, 0.1, -0.3, 0.2, 0.5])
+    drawn = {path.name: path.points for path in scene.geometry.paths(position)}
+    assert list(drawn) == ["cord", "cord.1"]
+    lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in drawn.values()]
+    # Two strands for every metre of the block lengthen the cord beside its path.
+    tendon = list(hand.paths.routes).index("cord")
+    assert sum(lengths) == pytest.approx(float(hand.paths.length(position)[tendon]) - 2.0 * position[0], abs=1e-9)
+    # Their colour is no tension's: the strand behind all others.
+    assert [set(tendon["strand"]) for tendon in scene.tendons] == [{len(scene.strands)}] * 2
+    np.testing.assert_array_equal(scene.looseness(np.zeros((3, 1))), np.zeros((3, 2)))
+    assert scene.header("", position[None], 1.0)["cords"]
+    assert not Scene("ub").header("", np.zeros((1, 4)), 1.0)["cords"]
+
+
 def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
     """Of the Shadow hand meshes, but of two links that have boxes; its capsules are hidden."""
     model = mujoco.MjModel.from_xml_path(str(asset("hand/reach.xml")))

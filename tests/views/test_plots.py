@@ -6,8 +6,10 @@ from made_up import SIZES, assert_shows, columns, lines, synthetic
 from matplotlib.image import imread
 from paper.plot_friction_law import plot_friction_law
 
+import finger_pin as fp
 from finger_pin.exceptions import InputError
 from finger_pin.views import plots
+from finger_pin.views.plots.hand_motion import plot_hand_motion
 from finger_pin.views.plots.lines import BINS, extremes
 from finger_pin.views.plots.panels import labelled
 
@@ -117,6 +119,25 @@ def test_every_panel_of_a_result_names_its_unit(draw, result):
 def test_labels_never_break_a_unit():
     assert labelled("medial", "mN m") == "medial (mN\N{NO-BREAK SPACE}m)"
     assert labelled("flexor_profundus", "mN m") == "flexor_profundus\n(mN\N{NO-BREAK SPACE}m)"
+
+
+def test_long_names_break_at_dots_and_hyphens_so_that_labels_of_strips_do_not_meet():
+    lines = labelled("middle.abduction-cylinder.0", "N").split("\n")
+    assert "".join(lines) == "middle.abduction-cylinder.0(N)"
+    assert max(map(len, lines)) <= 13
+
+
+def test_a_tendon_that_is_wound_has_no_planned_tension():
+    wound = fp.plot_fig6(fp.simulate(fp.load_scenario("wound", {"simulation.duration": 0.4})))
+    assert {line.get_label() for line in wound.axes[-1].get_lines()} == {"delivered"}
+
+
+def test_positions_and_forces_of_a_hand_stand_in_panels_by_their_units():
+    hand = fp.simulate(fp.load_scenario("underactuated", {"simulation.duration": 0.05}))
+    shown = {axes.get_ylabel(): [line.get_label() for line in axes.get_lines()] for axes in plot_hand_motion(hand).axes}
+    assert shown["position (m)"] == ["block"]
+    assert shown["angle (rad)"] == ["left_proximal", "left_distal", "right_proximal", "right_distal"]
+    assert shown["tension (N)"] == ["trunk"]
 
 
 @pytest.mark.parametrize("samples", [1, 2])

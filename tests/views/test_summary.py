@@ -90,3 +90,14 @@ def test_the_summary_of_one_instant_and_of_a_saved_result(result, tmp_path):
     assert "abduction" in summarize(result.isel(time=[0]).assign_attrs(end_time=0.0))
     fp.save(result, tmp_path / "r.nc")
     assert summarize(fp.load(tmp_path / "r.nc")) == summarize(result)
+
+
+def test_positions_of_joints_stand_under_their_units_and_none_is_minus_zero():
+    text = summarize(fp.simulate(fp.load_scenario("underactuated", {"simulation.duration": 0.6})))
+    blocks = dict(block.split("\n", 1) for block in text.split("\n\n") if block.startswith("Positions"))
+    names = {head: [line.split()[0] for line in rows.splitlines()[1:]] for head, rows in blocks.items()}
+    assert names == {
+        "Positions of the joints, m": ["block"],
+        "Positions of the joints, rad": ["left_proximal", "left_distal", "right_proximal", "right_distal"],
+    }
+    assert not re.search(r"-0\.0+( |$)", text, re.MULTILINE)

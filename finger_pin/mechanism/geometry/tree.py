@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import coal
 import numpy as np
@@ -66,11 +67,12 @@ class TreeGeometry:
                 meshes.get(solid.mesh or ""),
             )
         )
-        self._legs = {
-            name: routes.routes[tendon.along].legs
-            for name, tendon in description.tendons.items()
-            if tendon.along is not None and routes.routes[tendon.along].legs
-        }
+        driven = {tendon.along: name for name, tendon in description.tendons.items() if tendon.along is not None}
+        # Those that motors pull come first; the others are cords of springs, ranges and actuators of the tree.
+        ordered = [*driven, *(name for name in routes.routes if name not in driven)]
+        self._branches = [
+            (driven.get(along, along), branch) for along in ordered for branch in _branches(routes.routes[along].legs)
+        ]
         still = self.poses(np.zeros(self.model.nq))
         paths = self.paths(np.zeros(self.model.nq), poses=still)
         seen = np.concatenate([still.translation[self.first_seen :], *(path.points for path in paths)])
@@ -96,20 +98,36 @@ class TreeGeometry:
     def paths(
         self, joint_position: ArrayLike, slack: ArrayLike | None = None, poses: LinkPoses | None = None
     ) -> tuple[TendonPath, ...]:
-        """Return the paths of the tendons that motors pull, in the order of the description; none sags."""
+        """Return the paths of the tendons that motors pull, then those of other cords, a branch each; none sags.
+
+        Further branches behind pulleys have a dot and a number after the name.
+        """
         poses = self.poses(joint_position) if poses is None else poses
         leading = poses.translation.shape[:-2]
         rotations, places = poses.rotation.reshape(-1, self.model.njoints, 3, 3), poses.translation
         places = places.reshape(-1, self.model.njoints, 3)
-        paths = []
-        for name, legs in self._legs.items():
+        paths: list[TendonPath] = []
+        for index, (name, legs) in enumerate(self._branches):
+            before = sum(name == other for other, _ in self._branches[:index])
             points = np.array([_path(legs, *each) for each in zip(rotations, places, strict=True)])
             distal = np.zeros(points.shape[1], dtype=bool)
-            paths.append(TendonPath(name, points.reshape(*leading, *points.shape[1:]), distal))
+            shown = f"{name}.{before}" if before else name
+            paths.append(TendonPath(shown, points.reshape(*leading, *points.shape[1:]), distal))
         return tuple(paths)
 
 
-def _path(legs: tuple[PathTerm, ...], rotations: Array, places: Array) -> Array:
+def _branches(legs: Sequence[PathTerm]) -> list[list[PathTerm]]:
+    """Return the parts of a path that hang together: behind a pulley it goes on elsewhere."""
+    found: list[list[PathTerm]] = []
+    for leg in legs:
+        if found and leg.follows:
+            found[-1].append(leg)
+        else:
+            found.append([leg])
+    return found
+
+
+def _path(legs: Sequence[PathTerm], rotations: Array, places: Array) -> Array:
     """Return the points of a path at one posture, shape (P, 3)."""
     return np.concatenate([_stretch(leg.piece, rotations, places) for leg in legs])
 

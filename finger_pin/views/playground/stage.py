@@ -13,7 +13,7 @@ from finger_pin.control.palm import PalmPath
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.playground.session import Reading, Session
-from finger_pin.views.viewer.drawing import FORCE_COLOUR, tension_colours
+from finger_pin.views.viewer.drawing import FORCE_COLOUR, strand_colours
 from finger_pin.views.viewer.scene import Scene, scale_above
 from finger_pin.views.viewer.scene_objects import SceneObjects
 from finger_pin.views.viewer.solids import ROOT, Command, link_names, newton_length, solid_commands
@@ -210,7 +210,7 @@ class Stage:
         loose = scene.looseness(now.strands)
         paths = scene.geometry.paths(now.position, loose, poses)
         # Lines take the light's intensity, which a screen does not show in proportion.
-        colours = (255.0 * tension_colours(now.strands, self.scale) ** 2.2).astype(np.uint8)
+        colours = (255.0 * strand_colours(now.strands, self.scale) ** 2.2).astype(np.uint8)
         lines: tuple[list[Array], list[Array]] = ([], [])
         shades: tuple[list[Array], list[Array]] = ([], [])
         for path, strands, slack in zip(paths, self._strands, loose, strict=True):

@@ -67,7 +67,7 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
     panels = stack(right, [labelled(name, "N") for name in tendons])
     title(panels[0], "(c) tendon tensions")
     _tensions(panels, result)
-    handles = {line.get_label(): line for line in [*panels[0].get_lines(), *panels[-1].get_lines()]}
+    handles = {line.get_label(): line for axes in panels for line in axes.get_lines()}
     legend(right, list(handles.values()))
     return figure
 
@@ -86,7 +86,9 @@ def _tensions(panels: list[Axes], result: xr.Dataset) -> None:
     dots: dict[str, Any] = {"label": other, "color": VERMILLION, "linestyle": ":", "linewidth": thin(1.3)}
     for index, (axes, name) in enumerate(zip(panels, names(result, "tendon"), strict=True)):
         trace(axes, time, delivered[:, index], label="delivered", color=BLUE)
-        trace(axes, time, planned[:, index], label="planned", color=BLACK, linestyle="--", linewidth=thin())
+        # A tendon that is wound by an angle or a length has no planned tension: its command is zero throughout.
+        if planned[:, index].any():
+            trace(axes, time, planned[:, index], label="planned", color=BLACK, linestyle="--", linewidth=thin())
         if name in proximal:
             trace(axes, time, proximal[name], **dots)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))

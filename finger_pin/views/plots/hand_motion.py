@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -10,6 +12,10 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, trace
 from finger_pin.views.plots.panels import sheet, stack, title
 from finger_pin.views.plots.style import Width, styled
+from finger_pin.views.units import actuators_by_unit, joints_by_unit
+
+# The label of a panel's vertical axis, and its lines by name.
+Panel: TypeAlias = tuple[str, dict[str, Array]]
 
 # Lines in a panel that can still be told apart.
 _MOST = 5
@@ -17,33 +23,48 @@ _MOST = 5
 
 @styled
 def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw positions of all joints, rad or m, tensions of tendons and forces of actuators, N or N m.
+    """Draw positions of all joints, rad or m, tensions of tendons and forces of actuators, N or N m, by their units.
 
     Args:
         result: Dataset of `simulate`, of a hand with a tree.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
-    moved = _panels(names(result, "joint"), result["joint_position"].transpose("time", "joint").values)
-    driven = _panels(names(result, "tendon"), result["tendon_tension"].transpose("time", "tendon").values)
-    for group in (STATELESS, STATEFUL, MUSCLES):
-        if f"{group}_force" in result:
-            driven += _panels(names(result, group), result[f"{group}_force"].transpose("time", group).values)
-    columns = ((moved, "position", "(a) joints, rad or m"), (driven, "force", "(b) tendons and actuators, N or N m"))
-    sizes = [(5.5, 1.0 + 1.5 * max(len(panels), 1)) for panels, _, _ in columns]
+    moved, driven = _moved(result), _driven(result)
+    columns = ((moved, "(a) joints"), (driven, "(b) tendons and actuators"))
+    sizes = [(5.5, 1.0 + 1.5 * max(len(panels), 1)) for panels, _ in columns]
     figure, parts = sheet(sizes, width, titles)
-    for part, (panels, label, text) in zip(parts, columns, strict=True):
+    for part, (panels, text) in zip(parts, columns, strict=True):
         if panels:
-            axes = stack(part, [label] * len(panels))
+            axes = stack(part, [label for label, _ in panels])
             title(axes[0], text)
-            for each, panel in zip(axes, panels, strict=True):
+            for each, (_, panel) in zip(axes, panels, strict=True):
                 for index, (name, values) in enumerate(panel.items()):
                     trace(each, result["time"].values, values, label=name, **series(index))
                 each.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="x-small", frameon=False)
     return figure
 
 
-def _panels(labels: list[str], values: Array) -> list[dict[str, Array]]:
-    """Return lines by their labels, a few for each panel."""
-    lines = list(zip(labels, values.T, strict=True))
-    return [dict(lines[first : first + _MOST]) for first in range(0, len(lines), _MOST)]
+def _moved(result: xr.Dataset) -> list[Panel]:
+    position = result["joint_position"]
+    return [
+        panel
+        for unit, found in joints_by_unit(result).items()
+        for panel in _panels(position, "joint", found, f"{'angle' if unit == 'rad' else 'position'} ({unit})")
+    ]
+
+
+def _driven(result: xr.Dataset) -> list[Panel]:
+    panels = _panels(result["tendon_tension"], "tendon", names(result, "tendon"), "tension (N)")
+    for group in (STATELESS, STATEFUL, MUSCLES):
+        if f"{group}_force" in result:
+            for unit, found in actuators_by_unit(result, group).items():
+                label = f"{'torque' if unit == 'N m' else 'force'} ({unit})"
+                panels += _panels(result[f"{group}_force"], group, found, label)
+    return panels
+
+
+def _panels(signals: xr.DataArray, along: str, wanted: list[str], label: str) -> list[Panel]:
+    """Return lines by their names, a few for each panel, each with the label of its axis."""
+    lines = [(name, signals.sel({along: name}).values) for name in wanted]
+    return [(label, dict(lines[first : first + _MOST])) for first in range(0, len(lines), _MOST)]

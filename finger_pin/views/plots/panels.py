@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 from collections.abc import Sequence
 
@@ -23,6 +24,9 @@ _NARROWEST = 0.62
 _LOWER = 0.82
 # Mean width of a letter, in parts of the size of the text, and inches of a legend's entry besides its text.
 _LETTER, _HANDLE = 0.5, 0.45
+
+# Most letters in a line of a strip's label.
+_LINE = 13
 
 # What is below this in the unit of a panel is zero.
 _ROUNDING = 1e-9
@@ -178,4 +182,9 @@ def plain(axis: Axis) -> None:
 def labelled(name: str, unit: str | None) -> str:
     """Return the label of a strip: its name and unit if any, on several lines if long."""
     whole = name if unit is None else " ".join([name, f"({unit})".replace(" ", "\N{NO-BREAK SPACE}")])
-    return textwrap.fill(whole, 13, break_long_words=False)
+    lines = [""]
+    for piece in re.split(r"(?<=[-. ])", whole):
+        if lines[-1] and len((lines[-1] + piece).rstrip()) > _LINE:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(line.rstrip(" ") for line in lines)

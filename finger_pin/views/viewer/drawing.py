@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _SIDES = 8
 _LOOSE = (0.62, 0.64, 0.67)
+# Of a cord without a known tension, which no tension has.
+_CORD = (0.93, 0.9, 0.82)
 #: Of the arrow of a contact's force, at both ends: that of the page, which no tension has.
 FORCE_COLOUR = np.tile(np.array([0xFF, 0x5A, 0x5A]) / 255.0, (2, 1))
 
@@ -75,11 +77,21 @@ def tension_colours(tension: Array, scale: float) -> Array:
     return np.asarray(taut + loose * (np.array(_LOOSE) - taut))
 
 
+def strand_colours(tension: Array, scale: float) -> Array:
+    """Return the colours of strands, shape (s + 1, 3), the last of which is that of cords without a known tension.
+
+    Args:
+        tension: Shape (s,), N.
+        scale: As for `tension_colours`.
+    """
+    return np.concatenate([tension_colours(tension, scale), [_CORD]])
+
+
 def _frame(scene: Scene, position: Array, tension: Array, scale: float, palm: LinkPoses | None) -> list[Command]:
     geometry = scene.geometry
     poses = geometry.poses(position, palm)
     commands = [_placement(name, poses, index) for index, name in enumerate(link_names(geometry))]
-    colours = tension_colours(tension, scale)
+    colours = strand_colours(tension, scale)
     for path, tendon in zip(geometry.paths(position, scene.looseness(tension), poses), scene.tendons, strict=True):
         commands.append(_tube(path.name, path.points, scene.tube_radius, colours[tendon["strand"]]))
     return commands

@@ -30,6 +30,7 @@ _RESOLUTION = 11
 # Beyond so many times the hand's own extent, the camera does not follow.
 _LOST = 3.0
 _LARGEST = 32767
+_CORDS = "cords that no motor pulls; their tension is not shown"
 _GHOST, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
 
 
@@ -85,7 +86,8 @@ class Scene:
         geometry: Its tendons in space.
         strands: Labels of the strands whose tension is shown: the actuated tendons, then two halves of each passive.
         tube_radius: Of the tubes that are drawn for tendons, m.
-        tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots.
+        tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots. Cords of
+            a tree that no motor pulls have the index behind the last strand: their tension is not shown.
     """
 
     def __init__(self, finger: FingerLike) -> None:
@@ -146,6 +148,7 @@ class Scene:
             "commands": [root_command(turn), *solid_commands(geometry, tube), *drawn],
             "ghost": ghost.header() if ghost is not None else None,
             "forces": shown.note if shown is not None else "",
+            "cords": _CORDS if any(len(self.strands) in each["strand"] for each in self.tendons) else "",
             "links": link_names(geometry),
             "joints": list(geometry.description.joints),
             "slides": self._slides,
@@ -216,20 +219,31 @@ class Scene:
 
     def looseness(self, strand_tension: Array) -> Array:
         """Return the looseness of tendons, shape (..., t), 0 to 1, at tensions of the strands, (..., s), N."""
-        # A passive tendon is drawn loose when both its halves are.
-        actuated = len(self.geometry.description.actuated_names)
-        passive = strand_tension[..., actuated:]
-        halves = passive.reshape(*passive.shape[:-1], -1, 2)
-        tension = np.concatenate([strand_tension[..., :actuated], halves.max(axis=-1)], axis=-1)
+        # A passive tendon is drawn loose when both its halves are, and a cord without a known tension never.
+        leading = strand_tension.shape[:-1]
+        known = np.concatenate([strand_tension, np.full((*leading, 1), SLACK_TENSION)], axis=-1)
+        largest = [known[..., self._strands_of(tendon["name"])].max(axis=-1) for tendon in self.tendons]
+        tension = np.stack(largest, axis=-1) if largest else np.zeros((*leading, 0))
         return np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)
 
     def _tendon(self, name: str, distal: Sequence[bool]) -> dict[str, Any]:
-        description, last = self.geometry.description, len(distal) - 1
-        if description.tendons[name].kind == "actuated":
-            return {"name": name, "strand": [self.strands.index(name)] * len(distal), "knots": [last]}
-        first = self.strands.index(f"{name} proximal")
-        knots = sorted({0, last, *([distal.index(True)] if True in distal else [])})
-        return {"name": name, "strand": [first + int(flag) for flag in distal], "knots": knots}
+        first, *more = self._strands_of(name)
+        last = len(distal) - 1
+        knots = {last} if first < len(self.geometry.description.actuated_names) else {0, last}
+        if more and True in distal:
+            knots.add(distal.index(True))
+        return {"name": name, "strand": [first + int(flag) for flag in distal], "knots": sorted(knots)}
+
+    def _strands_of(self, name: str) -> list[int]:
+        """Return the indices of the strands of a tendon: one, two halves, or that behind all if its tension is unknown.
+
+        Args:
+            name: Of a path; that of a further branch has a dot and a number after the tendon's.
+        """
+        if self.geometry.description.tree is not None:
+            name = name.split(".")[0]
+        labels = (name, f"{name} proximal", f"{name} distal")
+        return [index for index, label in enumerate(self.strands) if label in labels] or [len(self.strands)]
 
     def view(self) -> Array:
         """Return the rotation from the base frame to the frame in which the finger is looked at, shape (3, 3)."""

@@ -29,7 +29,7 @@ from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Playback
-from finger_pin.views.viewer.drawing import FORCE_COLOUR, tension_colours
+from finger_pin.views.viewer.drawing import FORCE_COLOUR, strand_colours, tension_colours
 from finger_pin.views.viewer.scene import Scene, scale_above
 from finger_pin.views.viewer.scene_objects import SceneObjects
 from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, primitive
@@ -200,7 +200,7 @@ class _Film:
         lines, tension = self._lines(frame), motion.tension[frame]
         strands = np.concatenate([tendon["strand"][:-1] for tendon in scene.tendons])
         self.tubes.set_segments([pair for line in lines for pair in np.stack([line[:-1], line[1:]], axis=1)])
-        self.tubes.set_color(tension_colours(tension, self.scale)[strands])
+        self.tubes.set_color(strand_colours(tension, self.scale)[strands])
         for index, trace in enumerate(self.traces):
             trace.set_data(*self.tips[: frame + 1, index].T)
         if motion.objects is not None:

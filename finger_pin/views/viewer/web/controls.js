@@ -88,7 +88,7 @@ class Player {
       const loose = looseness(tension, this.config.slackTension);
       return tensionColour(tension, this.scale).map((value, i) => value + loose * (LOOSE[i] - value));
     });
-    this.scene.show(place, colours);
+    this.scene.show(place, [...colours, CORD]);
     this.readOut(tensions, colours, this.frames.mix("joint", place));
     this.refresh();
   }
@@ -119,7 +119,7 @@ class Player {
     const names = ["play", "restart", "scrub", "clock", "speed", "loop", "legend", "ticks"];
     this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
     document.getElementById("title").textContent = this.config.title;
-    for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title], ["objects", this.config.objects?.note]]) {
+    for (const [name, text] of [["forces", this.config.forces], ["cords", this.config.cords], ["ghost", this.config.ghost?.title], ["objects", this.config.objects?.note]]) {
       const note = document.getElementById(name);
       note.hidden = !text;
       note.lastElementChild.textContent = text;

@@ -10,6 +10,8 @@ const VIRIDIS = [
   [0.993, 0.906, 0.144],
 ];
 const LOOSE = [0.62, 0.64, 0.67];
+// Of a cord without a known tension, which no tension has.
+const CORD = [0.93, 0.9, 0.82];
 
 function tensionColour(tension, scale) {
   const place = Math.min(Math.max(tension / scale, 0), 1) * (VIRIDIS.length - 1);
