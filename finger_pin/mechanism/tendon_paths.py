@@ -181,13 +181,16 @@ class Excursions:
         self._along: dict[int, int] = {}
         if paths is not None and description.tree is not None:
             self._rest = np.array([joint.reference for joint in description.tree.joints.values()])
-            names, tendons = list(paths.routes), enumerate(description.tendons.values())
-            self._along = {k: names.index(tendon.along) for k, tendon in tendons if tendon.along is not None}
+            tendons = enumerate(description.tendons.values())
+            along = {k: tendon.along for k, tendon in tendons if tendon.along is not None}
+            names = list(dict.fromkeys(along.values()))
+            self._along = {k: names.index(name) for k, name in along.items()}
+            self._paths = replace(paths, routes={name: paths.routes[name] for name in names})
 
     def lengths(self, position: Array) -> Array:
         """Return the excursions of the tendons at theta, shape (..., n): shape (..., t), m."""
         drawn = np.asarray(position @ self._coupling.T)
-        if self._paths is not None:
+        if self._paths is not None and self._along:
             lengths = self._paths.length(self._rest) - self._paths.length(position)
             for k, path in self._along.items():
                 drawn[..., k] = lengths[..., path]
