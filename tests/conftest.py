@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -68,6 +69,13 @@ def fig6_runs(fig6_progress):
 def fig6():
     """The main job, all of it."""
     return fp.simulate(fp.load_scenario("fig6"))
+
+
+@pytest.fixture
+def kernel(monkeypatch):
+    """A notebook's kernel that runs the test, as IPython tells of it."""
+    shell = SimpleNamespace(kernel=None, config={})
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
 
 
 @pytest.fixture

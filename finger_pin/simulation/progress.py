@@ -13,7 +13,8 @@ _SIMULATED = "{percentage:3.0f}%|{bar}| {n:.3f} of {total:g} s simulated [{elaps
 
 def in_notebook() -> bool:
     """Return whether a notebook's kernel runs this."""
-    return "ipykernel" in sys.modules
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
 
 def notebook_bar(unit: str, total: float | None = None) -> ProgressBar | None:

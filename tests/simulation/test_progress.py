@@ -13,8 +13,7 @@ SHORT = {"simulation.duration": 0.01}
 
 
 @pytest.fixture
-def notebook(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+def notebook(kernel, monkeypatch):
     monkeypatch.setattr(progress, "_PATIENCE", 0.0)
 
 
@@ -36,7 +35,7 @@ def test_a_notebook_shows_nothing_of_what_is_over_within_its_patience_and_a_scri
 ):
     monkeypatch.setattr(progress, "_PATIENCE", 1e6)
     fp.simulate(fp.load_scenario("fig6", SHORT))
-    monkeypatch.delitem(sys.modules, "ipykernel")
+    monkeypatch.delitem(sys.modules, "IPython")
     fp.simulate(fp.load_scenario("fig6", SHORT))
     assert progress.notebook_bar("s", 1.0) is None and capsys.readouterr() == ("", "")
 

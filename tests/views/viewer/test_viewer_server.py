@@ -59,8 +59,9 @@ def test_closing_leaves_neither_threads_nor_an_open_port(result):
         fetch(viewing.url)
 
 
-def test_view_opens_the_browser_at_its_own_address(result, monkeypatch):
+def test_view_opens_the_browser_at_its_own_address_also_where_ipykernel_was_imported(result, monkeypatch):
     opened = []
+    monkeypatch.setitem(sys.modules, "ipykernel", sys)
     monkeypatch.setattr("webbrowser.open", lambda url, new: opened.append(url))
     with view(result, block=False) as viewing:
         assert opened == [viewing.url]
@@ -78,10 +79,9 @@ def interrupt(_):
     raise KeyboardInterrupt
 
 
-def test_a_notebook_shows_the_page_in_its_cell_and_opens_no_window(result, monkeypatch):
+def test_a_notebook_shows_the_page_in_its_cell_and_opens_no_window(result, kernel, monkeypatch):
     opened = []
     monkeypatch.setattr("webbrowser.open", lambda url, new: opened.append(url))
-    monkeypatch.setitem(sys.modules, "ipykernel", sys)
     with view(result) as viewing:
         (page,) = re.findall(r'<iframe srcdoc="([^"]*)"', viewing._repr_html_())
         # All of it stands in the cell: where a hub runs the notebook, an address of its machine leads nowhere.
