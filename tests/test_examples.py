@@ -154,8 +154,8 @@ def test_the_notebook_sticks_slips_goes_slack_and_locks(tmp_path):
     assert not any(cell.get("outputs") for cell in notebook.cells)
     nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(tmp_path)}}).execute()
     printed = [each for cell in notebook.cells for each in cell.get("outputs", []) if each.output_type == "stream"]
-    # The first run of all may say that it compiles.
-    assert all(each.text.startswith("Compiling") for each in printed if each.name == "stderr")
+    # On standard error the first run of all says that it compiles, and a long one how far it is.
+    assert not any("Warning" in each.text for each in printed)
     lines = "".join(each.text for each in printed if each.name == "stdout").splitlines()
     even, jerky, loose, *locking = [[float(number) for number in re.findall(r"[\d.]+", line)] for line in lines]
     assert even[1] == pytest.approx(even[2], rel=0.01) and jerky[1] > 10.0 * jerky[2]
