@@ -189,12 +189,10 @@ def _borne_out(result: xr.Dataset) -> bool:
 
 def _table(head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
     top = "".join(f"<th{' class=number' if k else ''}>{escape(each)}</th>" for k, each in enumerate(head))
-    body = "".join(
-        "<tr>"
-        + "".join(f"<td{' class=number' if k else ''}>{escape(each)}</td>" for k, each in enumerate(row))
-        + "</tr>"
-        for row in rows
-    )
+    # On a phone a key breaks behind its dots, not inside words.
+    lines = ("".join(f"<td class=number>{escape(each)}</td>" for each in row[1:]) for row in rows)
+    names = (escape(row[0]).replace(".", ".<wbr>") for row in rows)
+    body = "".join(f"<tr><td>{name}</td>{line}</tr>" for name, line in zip(names, lines, strict=True))
     return f"<table><tr>{top}</tr>{body}</table>"
 
 
