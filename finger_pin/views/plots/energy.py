@@ -34,7 +34,7 @@ from finger_pin.views.plots.style import (
 #: Of losses, in their order; they begin anew where there are more.
 _COLOURS = (
     *(VERMILLION, ORANGE, YELLOW, PURPLE, BLUE, SKY, BLACK, GREEN),
-    *("saddlebrown", "darkcyan", "deeppink", "tan", "firebrick", "slategrey", "lightsteelblue", "olive"),
+    *("saddlebrown", "darkcyan", "palevioletred", "tan", "firebrick", "slategrey", "lightsteelblue", "olive"),
     *("yellowgreen", "darkolivegreen", "sienna", "mediumpurple", "rosybrown"),
 )
 _MILLI = 1e3
