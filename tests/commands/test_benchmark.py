@@ -157,7 +157,7 @@ def stages():
     runs = {"fig6": dict.fromkeys((*spent, "load"), 1e-3)}
     simulator = {"times": {"varied slowly": 7e-5}, "errors": {"varied slowly": 9e-4}}
     prepared = {"runs": runs, "simulator": simulator}
-    job = {"options": [], "first": 46.0, "first_processor_time": 30.0, "first_memory": 2**20}
+    job = {"options": [], "first": 31.0, "first_processor_time": 30.0, "first_memory": 2**20}
     return {
         "work-precision": {"fig6": study, "stick_slip": study},
         "step-interface": {"duration": 8.0, "period": 1e-3, "whole": 0.5, "stepping": 0.2, "real_time_factor": 16.0}
@@ -234,6 +234,7 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["a simulator's step of 20 ms, tensions varied slowly"] is False
     assert verdicts["its error, at most"] is True
     assert verdicts["six numbers of fig6 identified from three starts"] is True
+    assert verdicts["slopes by 3 numbers, in runs"] is True and verdicts["slopes by 6 numbers, in runs"] is False
     assert verdicts["main job, first run"] is False
     output = capsys.readouterr().out
     assert "pass" in output and "FAIL" in output and "Rodas5P" in output

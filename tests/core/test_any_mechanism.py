@@ -168,7 +168,7 @@ def ends(mechanism, x, command, force, duration=5e-3):
     control.tension[:] = command
     # The readable rates take most of the time, and LSODA asks for the fewest of them.
     textbook = integrate(
-        lambda _, y: mechanism.evaluate(y, command, force).rate, x, duration, method="LSODA", rtol=1e-7, atol=1e-8
+        lambda _, y: mechanism.evaluate(y, command, force).rate, x, duration, method="LSODA", rtol=1e-8, atol=1e-9
     )
     found = [textbook.interpolate(np.array([duration]))[0]]
     for method in TABLEAUS.values():
@@ -186,7 +186,7 @@ def test_the_textbook_and_the_compiled_integrators_read_the_same_tables():
     force = rng.normal(size=(len(mechanism.body.tips), 3))
     before, *compiled = ends(mechanism, x, command, force)
     for each in compiled:
-        np.testing.assert_allclose(each, before, atol=5e-6)
+        np.testing.assert_allclose(each, before, atol=1e-6)
     for index, table in enumerate(mechanism.rows):
         rows = list(mechanism.rows)
         rows[index] = replace(table, arm=1.3 * table.arm, parameters=1.1 * table.parameters)
@@ -194,7 +194,7 @@ def test_the_textbook_and_the_compiled_integrators_read_the_same_tables():
         after, *compiled = ends(changed, x, command, force)
         assert np.abs(after - before).max() > 1e-4, table.law.name
         for each in compiled:
-            np.testing.assert_allclose(each, after, atol=5e-6)
+            np.testing.assert_allclose(each, after, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["fig6", "servo", "press"])
