@@ -190,9 +190,9 @@ def _borne_out(result: xr.Dataset) -> bool:
 def _table(head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
     top = "".join(f"<th{' class=number' if k else ''}>{escape(each)}</th>" for k, each in enumerate(head))
     # On a phone a key breaks behind its dots, not inside words.
-    lines = ("".join(f"<td class=number>{escape(each)}</td>" for each in row[1:]) for row in rows)
-    names = (escape(row[0]).replace(".", ".<wbr>") for row in rows)
-    body = "".join(f"<tr><td>{name}</td>{line}</tr>" for name, line in zip(names, lines, strict=True))
+    keys = [escape(key).replace(".", ".<wbr>") for key, *_ in rows]
+    numbers = ["".join(f"<td class=number>{escape(each)}</td>" for each in row) for _, *row in rows]
+    body = "".join(f"<tr><td>{key}</td>{cells}</tr>" for key, cells in zip(keys, numbers, strict=True))
     return f"<table><tr>{top}</tr>{body}</table>"
 
 

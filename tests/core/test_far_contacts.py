@@ -5,7 +5,6 @@ import pytest
 from core_cases import condensed
 from test_contact_motion import G, plane, scene
 
-from finger_pin.core.collision.broad_phase import activate_all
 from finger_pin.core.evaluation.law_code import FORCE
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -38,7 +37,7 @@ def test_contacts_that_sleep_change_not_one_bit_of_a_motion_in_which_they_wake_u
     for k in range(1, 41):
         assert asleep.advance(0.01 * k) == 0
         while waker.time < 0.01 * k:
-            activate_all(waker.tables, waker.work.paths)
+            waker.forget()
             waker.advance(0.01 * k, room)
         assert np.array_equal(asleep.x, awake.x)
         slept = max(slept, int(sleeper.work.paths.culled.sum()))
@@ -54,7 +53,7 @@ def test_each_block_that_contacts_join_is_condensed_to_the_solution_of_the_dense
     (part,) = stepper(mechanism, start).parts
     part.advance(2e-3)
     # Of what sleeps, states are zero, and are not solved for.
-    activate_all(part.tables, part.work.paths)
+    part.forget()
     size, g = len(part.x), 1e4
     columns, rate = np.zeros((size + 1, size)), np.zeros(size)
 

@@ -231,13 +231,13 @@ def until(condition, patience=120.0):
         time.sleep(0.05)
 
 
-def test_a_slider_on_the_page_moves_a_joint(browser, tmp_path):
+def test_a_slider_on_the_page_moves_a_joint(browser, loaded, tmp_path):
     pytest.importorskip("viser", reason="needs viser, which the extra 'play' brings")
     with fp.play("fig6", block=False, open_browser=False, folder=tmp_path) as playground:
         assert playground.url.startswith("http://127.0.0.1:")
         assert playground.url in playground._repr_html_()
         session = playground.session
-        browser.get_log("browser"), browser.get_log("performance")
+        browser.get_log("browser"), loaded()
         browser.get(playground.url)
         until(lambda: session.simulator.time > 0.2)
         thumb = "//label[text()='proximal, °']/ancestor::div[.//input][1]//*[@role='slider']"
@@ -254,10 +254,6 @@ def test_a_slider_on_the_page_moves_a_joint(browser, tmp_path):
         assert fp.load(tmp_path / "fig6-1.nc").joint_position[-1, 1] == pytest.approx(np.pi / 2.0, abs=0.2)
         errors = [line for line in browser.get_log("browser") if line["level"] == "SEVERE"]
         assert not errors
-        asked = [json.loads(line["message"])["message"] for line in browser.get_log("performance")]
-        urls = [each["params"]["request"]["url"] for each in asked if each["method"] == "Network.requestWillBeSent"]
-        # The browser's own first page may still be loading.
-        loaded = {url for url in urls if not url.startswith(("data:", "blob:", "about:", "chrome:"))}
-        assert loaded == {playground.url}
+        assert {*loaded()} == {playground.url}
         browser.get("about:blank")
     playground.close()

@@ -103,12 +103,6 @@ def set_culled(k: int, value: int, culled: Indices) -> None:
         culled[m] = value
 
 
-def activate_all(tables: Tables, own: PathWork) -> None:
-    """Make all contact pairs active, outside compiled code."""
-    own.culled[:], own.active_pairs[:] = 0, np.arange(own.active_pairs.size)
-    own.active_pair_count[0] = tables.contact_rows // COLUMNS
-
-
 @njit_inline
 def list_active_pairs(tables: Tables, own: PathWork) -> None:
     """List the active contact pairs."""

@@ -56,7 +56,7 @@ def cut_step(address: int, h: float) -> int:
 
 @CompiledFunction
 def find_missed_contacts(address: int, _h: float) -> int:
-    """Cut a tried step of an `Integration` where bodies have touched and parted unseen, or activate their pairs."""
+    """Cut a tried step of an `Integration` at an unseen touch, or activate the culled pairs that may have closed."""
     integration = unpack(address, INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
     touch = detect_missed_contacts(integration, model)

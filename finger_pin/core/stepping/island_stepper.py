@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
 from finger_pin.core.chains import PRISMATIC
-from finger_pin.core.collision.broad_phase import activate_all
 from finger_pin.core.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
 from finger_pin.core.evaluation.attitude_charts import place_all
-from finger_pin.core.events.step_events import step_events
+from finger_pin.core.events.step_events import activate_contacts, step_events
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.islands import Island
 from finger_pin.core.jit import Block, CompiledFunction, copied, pack
@@ -202,7 +201,7 @@ class IslandIntegrator:
     def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
         """Continue from another state, at the same time or another one, s, with no memory of earlier steps."""
         self.x[:], self.attitude[:] = x, attitude
-        activate_all(self.tables, self.work.paths)
+        self.forget()
         place_all(self.tables, self.attitude)
         memory = self.memory
         for each in (memory.last_step_size, memory.last_error, memory.rejected, memory.limiting_state):
@@ -214,6 +213,11 @@ class IslandIntegrator:
             memory.time[0], memory.window_start[0], memory.window_end[0] = time, 0.0, 0.0
             if self.drives is not None:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
+
+    def forget(self) -> None:
+        """Forget which contact pairs were far apart, as where the state is another."""
+        if self.tables.contact_rows:
+            activate_contacts(self._block.address)
 
     def with_loads(self, loaded: bool) -> IslandIntegrator:
         """Return the same integrator with or without forces at the tips."""

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.collision.broad_phase import activate_all
 from finger_pin.core.drives import Drives
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.inputs import HELD, InputTable
@@ -268,7 +267,7 @@ class Stepper:
                 self.parts[index] = self.parts[index].with_loads(loaded)
             part = self.parts[index]
             part.drives, part.knots = drives, knots
-            activate_all(part.tables, part.work.paths)
+            part.forget()
             for own, other in zip(part.state_snapshot, arrays, strict=True):
                 own[...] = other
 

@@ -70,8 +70,11 @@ class TreeGeometry:
         driven = {tendon.along: name for name, tendon in description.tendons.items() if tendon.along is not None}
         # Those that motors pull come first; the others are cords of springs, ranges and actuators of the tree.
         ordered = [*driven, *(name for name in routes.routes if name not in driven)]
+        # Further branches behind pulleys have a dot and a number after the name.
         self._branches = [
-            (driven.get(along, along), branch) for along in ordered for branch in _branches(routes.routes[along].legs)
+            (f"{driven.get(along, along)}{f'.{number}' if number else ''}", branch)
+            for along in ordered
+            for number, branch in enumerate(_branches(routes.routes[along].legs))
         ]
         still = self.poses(np.zeros(self.model.nq))
         paths = self.paths(np.zeros(self.model.nq), poses=still)
@@ -107,12 +110,10 @@ class TreeGeometry:
         rotations, places = poses.rotation.reshape(-1, self.model.njoints, 3, 3), poses.translation
         places = places.reshape(-1, self.model.njoints, 3)
         paths: list[TendonPath] = []
-        for index, (name, legs) in enumerate(self._branches):
-            before = sum(name == other for other, _ in self._branches[:index])
+        for name, legs in self._branches:
             points = np.array([_path(legs, *each) for each in zip(rotations, places, strict=True)])
             distal = np.zeros(points.shape[1], dtype=bool)
-            shown = f"{name}.{before}" if before else name
-            paths.append(TendonPath(shown, points.reshape(*leading, *points.shape[1:]), distal))
+            paths.append(TendonPath(name, points.reshape(*leading, *points.shape[1:]), distal))
         return tuple(paths)
 
 

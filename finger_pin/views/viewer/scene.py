@@ -111,6 +111,7 @@ class Scene:
             self._tendon(path.name, path.distal.tolist())
             for path in self.geometry.paths(np.zeros(len(description.joints)))
         ]
+        self._strands = [self._strands_of(tendon["name"]) for tendon in self.tendons]
 
     @property
     def size(self) -> float:
@@ -222,7 +223,7 @@ class Scene:
         # A passive tendon is drawn loose when both its halves are, and a cord without a known tension never.
         leading = strand_tension.shape[:-1]
         known = np.concatenate([strand_tension, np.full((*leading, 1), SLACK_TENSION)], axis=-1)
-        largest = [known[..., self._strands_of(tendon["name"])].max(axis=-1) for tendon in self.tendons]
+        largest = [known[..., strands].max(axis=-1) for strands in self._strands]
         tension = np.stack(largest, axis=-1) if largest else np.zeros((*leading, 0))
         return np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)
 

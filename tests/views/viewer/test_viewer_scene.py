@@ -17,16 +17,13 @@ from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views.viewer import write_animation
 
 
-def test_the_page_loads_without_console_messages_and_without_a_network(browser, result, tmp_path):
+def test_the_page_loads_without_console_messages_and_without_a_network(browser, loaded, result, tmp_path):
     page = opened(browser, write_animation(result, tmp_path / "animation.html").as_uri())
     for t in (0.5, 1.5, DURATION):
         seek(page, t)
     painted(page)
     assert console_errors(page) == []
-    events = [json.loads(entry["message"])["message"] for entry in page.get_log("performance")]
-    requests = [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
-    loaded = [url for url in requests if not url.startswith(("data:", "about:", "blob:", "chrome:"))]
-    assert loaded == [(tmp_path / "animation.html").as_uri()]
+    assert loaded() == [(tmp_path / "animation.html").as_uri()]
 
 
 def test_the_finger_and_five_tendons_are_in_the_scene(page):
