@@ -5,12 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, Protocol, Self
 
 from numpy.typing import ArrayLike
 
 from finger_pin.core.inputs import InputTable
+from finger_pin.description.caching import cached_property
 from finger_pin.description.routing import Routing
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger import Finger

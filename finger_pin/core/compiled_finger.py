@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGT
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
+from finger_pin.description.caching import cached_property
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs
 from finger_pin.mechanism.finger import Finger

@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable, Sequence
 from functools import wraps
 from threading import Lock
 from types import BuiltinFunctionType, FunctionType, ModuleType
-from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Generic, NamedTuple, ParamSpec, Self, TypeVar, overload
 
 import numpy as np
 from pydantic import BaseModel
@@ -201,3 +201,28 @@ def memoised(
         return remembering
 
     return decorate
+
+
+class cached_property(Generic[_Made]):
+    """Property that is computed once per object, without a lock: of two threads that compute it the first one counts.
+
+    That of `functools` has one lock for all objects before Python 3.12. A thread that computes one on several cores
+    would wait for others that wait for the lock.
+    """
+
+    def __init__(self, function: Callable[[Any], _Made]) -> None:
+        """Wrap a method without arguments."""
+        self._function, self._name, self.__doc__ = function, function.__name__, function.__doc__
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+
+    @overload
+    def __get__(self, instance: object, owner: type | None = None) -> _Made: ...
+
+    def __get__(self, instance: object | None, owner: type | None = None) -> Self | _Made:
+        """Return the value; the object's own entry of this name, once it is there, comes before."""
+        if instance is None:
+            return self
+        value: _Made = vars(instance).setdefault(self._name, self._function(instance))
+        return value

@@ -7,13 +7,12 @@ then for each passive tendon its proximal and its distal half, since friction ma
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from finger_pin.description.caching import memoised
+from finger_pin.description.caching import cached_property, memoised
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.parameters import Tendon
 from finger_pin.typing import Array, Indices

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from pydantic import ValidationError
 
+from finger_pin.description.caching import cached_property
 from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.description.tree_actuators import Muscle
 from finger_pin.exchange.mujoco_names import Table, distinct

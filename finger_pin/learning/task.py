@@ -6,12 +6,12 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger_pin.description.caching import cached_property
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.learning.distributions import Distribution

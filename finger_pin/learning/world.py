@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from finger_pin.control.closed_loop import ClosedLoop, sampled_control
 from finger_pin.core.stepping.batch import IDLE
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.description.caching import cached_property
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.parametrised_scenario import ParametrisedScenario

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.description.caching import cached_property
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.rows import RowSignals, combined

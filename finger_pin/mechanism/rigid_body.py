@@ -5,12 +5,12 @@ from __future__ import annotations
 import copy
 import threading
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.caching import cached_property
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.state import Kinematics
 from finger_pin.typing import Array

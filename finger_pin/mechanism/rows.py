@@ -10,12 +10,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.description.caching import cached_property
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.path_elements import PathTerm

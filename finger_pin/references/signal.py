@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.description.caching import memoised
+from finger_pin.description.caching import cached_property, memoised
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.inputs import harmonic, harmonic_rate, quintic, quintic_curvature, quintic_rate

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import NamedTuple
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import ControlSignals
 from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.evaluation import ContactPoints, Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import Energy

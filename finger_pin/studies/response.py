@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 import xarray as xr
 
 from finger_pin.core.stepping.trajectory import Stop
+from finger_pin.description.caching import cached_property
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError

@@ -1,7 +1,5 @@
 """The compiled dynamics against the readable ones: every signal, at states of every kind."""
 
-from functools import cached_property
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,6 +9,7 @@ import finger_pin as fp
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import Rows
 

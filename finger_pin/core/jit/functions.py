@@ -16,7 +16,7 @@ import multiprocessing
 import os
 import threading
 from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from pickle import UnpicklingError
 from types import FunctionType
@@ -26,6 +26,7 @@ import numba
 import platformdirs
 
 from finger_pin.core.jit.digests import Undigestible, source_digest
+from finger_pin.description.caching import cached_property
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _LOGGER = logging.getLogger("finger_pin")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from finger_pin.core.jit import call, copied
 from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate_many
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, Record
 from finger_pin.core.threads import in_threads, threads
+from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 
