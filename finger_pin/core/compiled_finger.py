@@ -40,6 +40,9 @@ class CompiledMechanism:
         self.mechanism = mechanism
         self.charts = Charts.of(mechanism)
         self.tables = build_tables(mechanism)
+        size = 2 * len(self.tables.prescribed) + len(self.tables.state_row)
+        if self.charts.size != size:
+            raise RuntimeError(f"tables have {size} numbers of the state, the mechanism {self.charts.size}")
         laws = [table.law for table in mechanism.rows]
         self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved)
         self._motions: dict[int, _Asked] = {}

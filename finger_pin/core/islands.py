@@ -1,7 +1,7 @@
 """Islands: uncoupled parts of a mechanism, integrated separately.
 
 Coordinates are coupled by inertia (one tree), by a row that acts on or measures both, by a load or an input that one
-row has from another, and by a controller that reads both.
+row has from another, and by a controller that reads both. Every row, state and tip belongs to exactly one island.
 """
 
 from __future__ import annotations
@@ -75,6 +75,8 @@ def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> 
     first, second = (np.concatenate(side) for side in zip(*links, strict=True))
     total = loop_at + (int(control.loop.max(initial=-1)) + 1 if planned else 0)
     labels = _connected(first, second, total)
+    # What no coordinate feels, such as friction of a cord whose points all stand still, is the first one's.
+    labels[~np.isin(labels, labels[:width])] = labels[0]
     found: list[Island] = []
     unread = np.setdiff1d(np.arange(channels), tables.channel)
     for label in dict.fromkeys(labels[:width].tolist()):
@@ -170,6 +172,9 @@ class Selection:
 def selections(tables: Tables, control: InputTable) -> list[Selection]:
     """Return the part of every island, found once for each wiring."""
     islands = find_islands(tables, control)
+    states = np.sort(np.concatenate([each.states for each in islands]))
+    if not np.array_equal(states, np.arange(len(tables.state_row))):
+        raise RuntimeError(f"islands have the states {states.tolist()} of {len(tables.state_row)}")
     if len(islands) == 1:
         return [Selection(islands[0], None, tables.groups, np.arange(len(tables.groups)), tables.contact_rows)]
     return [Selection.of(tables, island) for island in islands]

@@ -12,7 +12,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
-from finger_pin.mechanism.finger_parts import Parts, check_joints, state_layout
+from finger_pin.mechanism.finger_parts import Parts, check_joints, check_layout, state_layout
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
 from finger_pin.mechanism.mechanism import Mechanism
@@ -109,6 +109,7 @@ class Finger:
         self.mechanism = mechanism if self.scene is None else self.scene.joined(mechanism)
         layers = self.tendons, self.joint_friction, self.actuators
         self.layout = state_layout(*layers, last, self.scene, before, canals.tables, self.rigid_body.slides)
+        check_layout(self.layout, self.mechanism)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""

@@ -14,6 +14,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.canals import Canals
 from finger_pin.mechanism.joints import JointFriction, JointSprings, StrokeLimiter
+from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, state_scales
 from finger_pin.mechanism.scene import Scene
@@ -189,6 +190,21 @@ def state_layout(
             turning, along = BLOCKS[block].scale[0], BLOCKS[sliding].scale[0]
             scaled[block] = np.where(slides, along, turning).tolist()
     return _same(Layout.of(labels, scaled))
+
+
+def check_layout(layout: Layout, mechanism: Mechanism) -> None:
+    """Refuse a layout whose blocks are not those of a mechanism, before anything compiled reads a state of it.
+
+    Raises:
+        RuntimeError: Naming the first block that ends elsewhere than coordinates or a table's states do.
+    """
+    turn, middle = mechanism.positions, mechanism.positions + mechanism.coordinates
+    last = {"motor_position": turn, "motor_velocity": middle, "further": mechanism.size}
+    table_ends = {middle, *(middle + part.stop for part in mechanism.states)}
+    states = list(BLOCKS)[list(BLOCKS).index("motor_velocity") :]
+    for block, end in zip(BLOCKS, np.cumsum(layout.sizes).tolist(), strict=True):
+        if end != last.get(block, end) or (block in states and end not in table_ends):
+            raise RuntimeError(f"state.{block} ends at {end}, which the {mechanism.size} numbers of the rows do not")
 
 
 # Of the same names and sizes much follows, once for all fingers.

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.path_elements import PathKinematics, Paths, moved, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import Energies, Rows, RowSignals
+from finger_pin.mechanism.rows import Energies, Rows, RowSignals, check_wiring
 from finger_pin.mechanism.urdf import join_bodies
 from finger_pin.typing import Array
 
@@ -60,7 +60,11 @@ class Mechanism:
         """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
 
         There are as many inputs as rows have, or more if so many ``channels`` are asked for.
+
+        Raises:
+            InputError: If a table reads one that is not evaluated before it, or two have one name.
         """
+        check_wiring(rows)
         self.body = body
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)

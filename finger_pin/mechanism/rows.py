@@ -250,6 +250,28 @@ def combined(force: Array, weights: Array) -> Array:
     return np.asarray(np.einsum("...k,kn->...n", force, weights))
 
 
+def check_wiring(tables: Sequence[Rows]) -> None:
+    """Refuse tables that read the forces of rows which are evaluated later, or of none.
+
+    Raises:
+        InputError: Naming the reading and the read table; also if weights have the wrong shape or two tables one name.
+    """
+    counts: dict[str, int] = {}
+    for table in tables:
+        for wiring, read in (("inputs", table.inputs), ("loads", table.loads)):
+            for group, weights in read.items():
+                entry = f"rows.{table.group}.{wiring}"
+                if group not in counts:
+                    allowed = f"must be evaluated before {table.group}, as are {', '.join(counts) or 'no others'}"
+                    raise InputError(entry, allowed, group)
+                if np.shape(weights) != (table.count, counts[group]):
+                    allowed = f"must have shape {(table.count, counts[group])}, not {np.shape(weights)}"
+                    raise InputError(f"{entry}.{group}", allowed)
+        if table.group in counts:
+            raise InputError("rows", "two tables have this name; choose another", table.group)
+        counts[table.group] = table.count
+
+
 def drive_matrices(tables: Sequence[Rows], tendons: Sequence[str]) -> dict[str, Array]:
     """Return the weights with which the rows of drives pull t tendons, by table, shape (t, k).
 

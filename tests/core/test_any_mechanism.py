@@ -18,6 +18,7 @@ from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.rows import Rows
 
 #: Sixth-order central differences: where to look, in steps, and weights.
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
@@ -27,6 +28,17 @@ SEEDS = range(6)
 ENOUGH = 3
 # A whole number, and one of other laws.
 NOT_LUGRE = ("stribeck_exponent", "reversal_speed")
+
+
+def aside(row, p):
+    return 0.0 * row.length, -row.state - 1.0
+
+
+def aside_slopes(row, p, signals):
+    return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+
+
+ASIDE = fp.Law("aside", (), aside, aside_slopes, lambda row, p, force, rate, signals: (0.0 * force,), scale=1.0)
 
 
 @pytest.fixture(scope="module", params=SEEDS)
@@ -99,6 +111,40 @@ def test_islands_found_for_other_numbers_of_the_same_wiring_select_the_same_tabl
 
 def leaves(table):
     return [leaf for each in table for leaf in (leaves(each) if isinstance(each, tuple) else [each])]
+
+
+@pytest.mark.parametrize("wiring", ["inputs", "loads"])
+def test_rows_that_read_later_rows_themselves_or_none_are_refused_naming_both(wiring):
+    """Compiled code would read what the last evaluation has left there."""
+    mechanism = random_mechanism(np.random.default_rng(2))
+    body, last, before = mechanism.body, mechanism.rows[-1], mechanism.rows[-2]
+    for group, width in ((last.group, last.count), (before.group, before.count), ("nowhere", 1)):
+        reader = replace(before, **{wiring: {group: np.ones((before.count, width))}})
+        rows = [*mechanism.rows[:-2], reader, last]
+        with pytest.raises(fp.InputError, match=f"^rows.{before.group}.{wiring} = .{group}.: must be evaluated before"):
+            Mechanism(body, rows, mechanism.lumps, mechanism.inertia)
+    reader = replace(last, **{wiring: {before.group: np.ones((last.count, before.count + 1))}})
+    with pytest.raises(fp.InputError, match=f"^rows.{last.group}.{wiring}.{before.group}: must have shape"):
+        Mechanism(body, [*mechanism.rows[:-1], reader], mechanism.lumps, mechanism.inertia)
+    with pytest.raises(fp.InputError, match=f"^rows = .{last.group}.: two tables have this name"):
+        Mechanism(body, [*mechanism.rows, last], mechanism.lumps, mechanism.inertia)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rows_that_move_nothing_are_stepped_with_the_rest_and_change_none_of_it(seed):
+    """A state that nothing couples, in one island or in one of several: z' = -z - 1 here, to e^-t (1 + z) - 1."""
+    mechanism = random_mechanism(np.random.default_rng(seed))
+    own = Rows("aside", ASIDE, ("aside",), np.zeros((0, 1)), np.zeros((1, mechanism.coordinates)))
+    more = Mechanism(mechanism.body, [*mechanism.rows, own], mechanism.lumps, mechanism.inertia, mechanism.channels)
+    x = 0.1 * random_states(mechanism, np.random.default_rng(seed), 1)[0]
+    control, ends = held_control(mechanism.channels, mechanism.coordinates), []
+    for each, start in ((mechanism, x), (more, np.append(x, 0.5))):
+        # Errors of all states count: without tolerances of its own it would shorten steps.
+        stepper = Stepper(each, control, start, TABLEAUS["Rodas5P"](), 1e-9, np.full(each.size, 1e-9))
+        assert stepper.advance(0.1) == 0
+        ends.append(stepper.x)
+    np.testing.assert_allclose(ends[1][:-1], ends[0], rtol=1e-5, atol=1e-6)
+    assert ends[1][-1] == pytest.approx(1.5 * np.exp(-0.1) - 1.0, abs=1e-8)
 
 
 def test_what_was_stepped_before_does_not_change_what_is_stepped_now():

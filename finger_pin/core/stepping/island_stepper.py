@@ -110,6 +110,8 @@ class IslandIntegrator:
         # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
         self.work = build_work(tables, laws, len(control.tension))
         self.model = BoundModel(tables, control, self.work)
+        if not len(x) == len(atol) == len(self.model.model.state):
+            raise RuntimeError(f"an island of {len(self.model.model.state)} numbers starts from {len(x)}")
         of_objects, free = object_coordinates(tables), tables.prescribed[: len(tables.parents)] < 0
         self._bound = core.Integration(
             model=self.model.address,
