@@ -24,7 +24,8 @@ _SLACK = 1e-9
 def _parts(_: object, description: FingerDescription) -> tuple[object, ...]:
     """Return the parts of a description that its routing depends on."""
     joints = (description.hand and tuple(description.hand.fingers), description.tree, *description.joints)
-    return (*joints, None, *description.tendons, *description.tendons.values())
+    at_bends = description.tendon_friction.place == "bends"
+    return (*joints, at_bends, *description.tendons, *description.tendons.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +66,10 @@ class Routing:
         coupling, curvature, strands, loads = [], [], [], []
         for tendon in description.tendons.values():
             radii, bends, crossed = np.zeros((3, len(joints), len(tendon.crossings)))
+            rubbing = _rubbing(description, tendon)
             for order, (joint, crossing) in enumerate(tendon.crossings.items()):
                 radii[column[joint], order] = crossing.radius
-                bends[column[joint], order] = float(crossing.bends)
+                bends[column[joint], order] = float(crossing.bends and joint in rubbing)
                 crossed[column[joint], order] = 1.0
             if tendon.along is not None and description.tree is not None:
                 # Its arms depend on the posture; which joints it crosses does not.
@@ -229,7 +231,17 @@ class ForceClosure:
 def _offset(description: FingerDescription, tendon: Tendon) -> float:
     """Return the curvature of a tendon at theta = 0 that does not show: its own, its crossings', its path's."""
     along = description.tree.tendons[tendon.along].curvature_offset if description.tree and tendon.along else 0.0
-    return tendon.curvature_offset + along + sum(each.curvature_offset for each in tendon.crossings.values())
+    own = _rubbing(description, tendon)
+    return tendon.curvature_offset + along + sum(tendon.crossings[each].curvature_offset for each in own)
+
+
+def _rubbing(description: FingerDescription, tendon: Tendon) -> list[str]:
+    """Return the joints at whose crossings a tendon may rub: at bends, none beyond the last one that moves it."""
+    crossed = list(tendon.crossings)
+    if description.tendon_friction.place != "bends" or tendon.kind != "actuated":
+        return crossed
+    moving = [k for k, name in enumerate(crossed) if tendon.crossings[name].radius]
+    return crossed[: moving[-1] + 1] if moving else crossed
 
 
 def _beginning(names: tuple[str, ...], start: str) -> Indices:

@@ -185,6 +185,24 @@ def test_offsets_of_a_tendon_are_shared_by_its_bends():
     ]
 
 
+@pytest.mark.parametrize("moving", [1, 2])
+@pytest.mark.parametrize("tail", [{"bends": False, "curvature_offset": 1.0}, {"bends": True, "curvature_offset": 0.2}])
+def test_a_bend_behind_the_last_joint_that_moves_the_cord_takes_nothing(moving, tail):
+    """No cord slides past it: runs and statics are those without it, also at a joint that is turned."""
+    given = table(points((0.0, 1.0), (0.1, 6.0)), moving + 1, 0.1)
+    given["simulation"]["initial"]["position"][JOINTS[moving]] = 0.8
+    crossings, found = given["finger"]["tendons"]["flexor"]["crossings"], []
+    for last in (tail, {"bends": False}):
+        crossings[JOINTS[moving]] = {"radius": 0.0} | last
+        scenario = read_scenario(given)
+        finger, theta = fp.Finger(scenario.finger), np.full(moving + 1, 0.4)
+        statics = finger.tendons.in_sliding(theta, np.ones(1))[0][0]
+        assert statics[:moving] == pytest.approx(np.exp(-MU * np.cumsum(TURN[:moving] + 0.4)), rel=1e-12)
+        found.append(fp.simulate(scenario))
+    for name in ("joint_position", "tendon_friction", "tendon_tension", "tendon_curvature"):
+        assert np.array_equal(found[0][name].values, found[1][name].values)
+
+
 STRING = """
 <mujoco><option gravity="0 0 0"/><worldbody>
 <site name="s0" pos="-0.02 0 0.01"/>
