@@ -18,6 +18,8 @@ from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
+from finger_pin.description.demo_motion import demo_motion
+from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import InputError
 from finger_pin.laws.spring import JOINT_SPRING
 from finger_pin.mechanism.mechanism import Mechanism
@@ -215,3 +217,36 @@ def test_parts_under_different_gravity_are_not_joined(scenarios):
     }
     with pytest.raises(InputError, match=r"thumb\.gravity"):
         Mechanism.join(parts)
+
+
+STILL = """<mujoco><option gravity="0 0 0"/><worldbody><site name="p" pos="-.03 0 .01"/>
+<site name="q" pos="-.05 0 .02"/><body><joint name="j" axis="0 1 0" damping="1e-3" stiffness=".05"/>
+<geom type="capsule" size=".005"
+ fromto="0 0 0 .04 0 0" mass=".02"/></body></worldbody>
+<tendon><spatial name="t" {}><site site="p"/><site site="q"/></spatial></tendon><actuator>{}</actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("tendon", "actuator"),
+    [
+        ("", '<position name="a" tendon="t" kp="100"/>'),
+        ("", '<motor name="a" tendon="t" gear="-1" ctrlrange="0 10"/>'),
+        ('stiffness="100" damping="1"', '<motor name="a" joint="j"/>'),
+    ],
+    ids=["servo", "pulled", "spring"],
+)
+def test_a_tendon_whose_points_all_stand_still_changes_nothing(tendon, actuator):
+    """The joint swings as I q'' + c q' + k q = 0 does; friction of the tendon is a state that no joint moves."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(STILL.format(tendon, actuator))
+    hand = fp.from_mujoco(model)
+    smooth = {f"finger.joint_friction.{name}": 0.0 for name in ("coulomb", "stiction", "viscous")}
+    table = demo_motion(hand, 0.2)
+    table["simulation"] |= {"initial": {"position": {"j": 0.3}}, "rtol": 1e-8, "atol_scale": 1e-8}
+    table["controller"] = {"kind": "tensions"} | ({"tensions": {"a": {"offset": 2.0}}} if hand.tendons else {})
+    found = fp.simulate(read_scenario(table, smooth | {"finger.joint_friction.floor": 1e-9}))
+    inertia = fp.Finger(hand).rigid_body.mass_matrix(np.zeros(1))[0, 0]
+    poles = np.roots([inertia, 1e-3, 0.05])
+    amplitude = np.linalg.solve([[1.0, 1.0], poles], [0.3, 0.0])
+    expected = np.real(np.exp(np.outer(found.time.values, poles)) @ amplitude)
+    np.testing.assert_allclose(found.joint_position.values[:, 0], expected, atol=1e-6)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.mechanism.finger_parts import check_layout
 from finger_pin.mechanism.state import BLOCKS, Layout, State
 
 
@@ -110,3 +111,13 @@ def test_shipped_fingers_have_the_layout_of_their_description(name, size):
     assert layout.size == size
     assert layout.names_of("position") == tuple(description.joints)
     assert layout.names_of("tendon_stiction") == tuple(description.tendons)
+
+
+@pytest.mark.parametrize("name", ["ub", "dexmart_index"])
+def test_a_layout_that_lacks_a_number_of_any_block_is_refused_before_anything_is_computed(name):
+    finger = fp.Finger(name)
+    labels = dict(zip(BLOCKS, finger.layout.labels, strict=True))
+    for block in filter(labels.get, BLOCKS):
+        less = Layout.of(labels | {block: labels[block][1:]})
+        with pytest.raises(RuntimeError, match=r"^state\.\w+ ends at"):
+            check_layout(less, finger.mechanism)
