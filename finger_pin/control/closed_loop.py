@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.control.interface import Controller, ControlSignals, Dynamics, LoopController
 from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_paths
-from finger_pin.control.position_drive import DriveSignals
+from finger_pin.control.position_drive import DriveSignals, LoopMemory
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import InputTable, core_signal, held_control
@@ -67,6 +67,7 @@ class ClosedLoop:
         varying_force: The varying part of F, three signals for each finger, N; None for nothing.
         start: The packed state at the start, shape (size,); None for rest on the reference.
         drives: Loops of motors in position drive; None without any.
+        last_samples: Of these loops, from the run that this one goes on from; None for loops that start.
         palm: Path of the palm of a hand; None at rest.
         guides: Paths of moved objects; None without any.
     """
@@ -79,6 +80,7 @@ class ClosedLoop:
     varying_force: Signal | None = None
     start: Array | None = None
     drives: DriveSignals | None = None
+    last_samples: LoopMemory | None = None
     palm: PalmPath | None = None
     guides: PrescribedObjects | None = None
 
@@ -147,9 +149,10 @@ class ClosedLoop:
         x = self.finger.rest_state(position, velocity, tension)
         return at_start(self.finger, x, self.palm, self.guides)
 
-    def started(self, x: Array) -> ClosedLoop:
+    def started(self, x: Array, last_samples: LoopMemory | None = None) -> ClosedLoop:
         """Return the same loop that starts at a packed state; a palm on a path has the world where it is then."""
-        return replace(self, start=x if self.palm is None else self.palm.place_world(self.finger, x))
+        start = x if self.palm is None else self.palm.place_world(self.finger, x)
+        return replace(self, start=start, last_samples=last_samples)
 
     def compiled(self) -> ClosedLoop:
         """Return the same loop on the compiled core."""

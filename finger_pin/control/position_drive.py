@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,22 @@ class GivenVoltages:
         return self.signal.at(time)[0]
 
 
+class LoopMemory(NamedTuple):
+    """The last sample of the loops of m motors before a run that goes on.
+
+    Attributes:
+        age: Time since that sample, s.
+        error: e, shape (m,), rad.
+        integral: int e, shape (m,), rad s.
+        voltage: U, shape (m,), V.
+    """
+
+    age: float
+    error: Array
+    integral: Array
+    voltage: Array
+
+
 class PositionDrives:
     """The loops of all motors of a finger that are in position drive, for one motion.
 
@@ -89,6 +105,7 @@ class PositionDrives:
         start_time: float = 0.0,
         wound: Mapping[int, tuple[Signal, float]] = {},
         voltages: Mapping[int, Signal] = {},
+        memory: LoopMemory | None = None,
     ) -> None:
         """Work out the goals of a motion.
 
@@ -100,6 +117,7 @@ class PositionDrives:
             start_time: Of the motion, s.
             wound: From `wound_spools`.
             voltages: From `given_voltages`.
+            memory: Of the sample that was taken last, where a run goes on.
 
         Raises:
             InputError: If a goal is beyond what its encoder can be told, or drives differ in their period.
@@ -110,7 +128,8 @@ class PositionDrives:
         given = actuators.tendons[np.any(actuators.spools[:, [*wound, *voltages]] != 0.0, axis=1)]
         self._wound = np.isin(np.arange(len(finger.routing.tendons)), given)
         self.channels = actuators.voltages
-        times: Array = period * np.arange(math.ceil(duration / period) + 1.0)
+        first = 0.0 if memory is None else -memory.age
+        times: Array = first + period * np.arange(math.ceil((duration - first) / period) + 1.0)
         goals = spool_goals(finger, controller, times, reference.at(times), wound, start_time)
         goals[:, list(voltages)], volts = 0.0, np.full_like(goals, np.nan)
         for motor, signal in voltages.items():
@@ -122,7 +141,7 @@ class PositionDrives:
             if encoder is not None and not encoder.range[0] <= least <= most <= encoder.range[1]:
                 allowed = f"the motion takes the spool from {least:.4g} to {most:.4g} rad"
                 raise InputError(f"finger.actuators.{name}.motor.encoder.range", allowed, list(encoder.range))
-        self.compiled = build_drives(finger, goals, start_time, volts)
+        self.compiled = build_drives(finger, goals, start_time, volts, memory)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return the commands with the tensions of the goals in place of those of the errors."""
@@ -238,23 +257,27 @@ def loop_period(finger: Finger) -> float:
     return period
 
 
-def build_drives(finger: Finger, goals: Array, start_time: float = 0.0, given: Array | None = None) -> Drives:
+def build_drives(
+    finger: Finger, goals: Array, start_time: float = 0.0, given: Array | None = None, memory: LoopMemory | None = None
+) -> Drives:
     """Return the loops of all motors of a finger in position drive, m of them.
 
     Args:
         finger: The finger.
-        goals: theta_m^d at multiples of their period, shape (k, m), rad.
-        start_time: Time at the first of these, s.
+        goals: theta_m^d at the samples, one every period, shape (k, m), rad.
+        start_time: What the clock shows at the start, s.
         given: Voltages in place of the loops, shape (k, m), V; not numbers where these run.
+        memory: Of the sample that was taken last, where a run goes on.
     """
     chosen = [actuator for _, actuator in _positioned(finger)]
     loops, encoders = [each.position_loop for each in chosen], [each.motor.encoder for each in chosen]
     actuators = finger.actuators
-    return Drives(
+    drives = Drives(
         motors=np.arange(len(chosen)),
         places=finger.mechanism.coordinates - len(actuators.names) + np.flatnonzero(actuators.holds),
         channels=actuators.voltages,
         period=loop_period(finger),
+        first=0.0 if memory is None else -memory.age,
         goals=np.ascontiguousarray(goals),
         given=np.full(goals.shape, np.nan) if given is None else given,
         resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
@@ -265,4 +288,10 @@ def build_drives(finger: Finger, goals: Array, start_time: float = 0.0, given: A
         integral=np.zeros(len(chosen)),
         last=np.zeros(len(chosen)),
         voltages=np.zeros(goals.shape),
+        errors=np.zeros(goals.shape),
+        integrals=np.zeros(goals.shape),
     )
+    if memory is not None:
+        drives.taken[:], drives.last[:], drives.integral[:] = 1, memory.error, memory.integral
+        drives.errors[:2], drives.integrals[:2], drives.voltages[:2] = memory[1:]
+    return drives

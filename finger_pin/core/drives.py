@@ -30,7 +30,8 @@ class Drives(NamedTuple):
         places: Coordinates of the rotors, shape (m,).
         channels: Inputs that are their voltages, shape (m,).
         period: s.
-        goals: theta_m^d at multiples of the period, shape (k, m), rad; the last one is kept.
+        first: Time of the first sample, s; not above zero, and negative where a run goes on.
+        goals: theta_m^d at the samples, one every period, shape (k, m), rad; the last one is kept.
         given: In place of what a loop asks for, at the same times, shape (k, m), V; not numbers where it runs.
         resolution: Step of the measured angles, 0 for none, shape (m,), rad.
         gains: k_p, k_d, k_i, shape (3, m).
@@ -40,12 +41,15 @@ class Drives(NamedTuple):
         integral: Memory, int e, shape (m,).
         last: Memory, e of the last sample, shape (m,).
         voltages: Memory, U from every sample on, shape (k, m), V.
+        errors: Memory, likewise e, shape (k, m), rad.
+        integrals: Memory, likewise int e, shape (k, m), rad s.
     """
 
     motors: Indices
     places: Indices
     channels: Indices
     period: float
+    first: float
     goals: Matrix
     given: Matrix
     resolution: Vector
@@ -56,12 +60,18 @@ class Drives(NamedTuple):
     integral: Vector
     last: Vector
     voltages: Matrix
+    errors: Matrix
+    integrals: Matrix
 
     def held(self, values: Array, time: Array | float) -> Array:
         """Return values of samples, shape (k, m), held at one time, or at times; an instant belongs to its sample."""
-        index = np.floor(np.asarray(time) / self.period * (1.0 + 1e-12)).astype(int)
-        found: Array = values[np.clip(index, 0, len(values) - 1)]
+        found: Array = values[np.clip(self.latest(time), 0, len(values) - 1)]
         return found
+
+    def latest(self, time: Array | float) -> Indices:
+        """Return the numbers of the last samples at one time, or at times; one within rounding has been taken."""
+        latest: Indices = np.floor((np.asarray(time) - self.first) / self.period * (1.0 + 1e-12)).astype(int)
+        return latest
 
 
 class AdvanceDrivenArgs(NamedTuple):
@@ -105,7 +115,10 @@ def sample(drives: Drives, time: float, x: Vector, tension: Vector) -> None:
         if time * (1.0 + 1e-12) >= drives.torque_off[j]:
             voltage = OPEN_CIRCUIT
         # Until the next one is taken, perhaps never.
-        drives.voltages[k, j] = drives.voltages[min(k + 1, last), j] = voltage
+        after = min(k + 1, last)
+        drives.voltages[k, j] = drives.voltages[after, j] = voltage
+        drives.errors[k, j] = drives.errors[after, j] = error
+        drives.integrals[k, j] = drives.integrals[after, j] = drives.integral[j]
         tension[drives.channels[j]] = voltage
     drives.taken[0] += 1
 
@@ -125,12 +138,14 @@ def advance_driven(address: int, end: float) -> int:
     model = unpack(integration.model, MODEL)
     memory, times = integration.memory, args.times
     while True:
-        if memory.time[0] * (1.0 + 1e-12) >= drives.taken[0] * drives.period:
-            _sample(drives, drives.taken[0] * drives.period, integration.x, model.control.tension)
+        due = drives.first + drives.taken[0] * drives.period
+        if memory.time[0] * (1.0 + 1e-12) >= due:
+            _sample(drives, due, integration.x, model.control.tension)
+            due = drives.first + drives.taken[0] * drives.period
         if memory.time[0] >= end:
             return DONE
         if args.taken[0] == args.taken[1] and times.size > 0:
             return FULL
-        status: int = call_at(driven.advance, driven.given, min(end, drives.taken[0] * drives.period))
+        status: int = call_at(driven.advance, driven.given, min(end, due))
         if status != DONE:
             return status

@@ -23,6 +23,8 @@ from finger_pin.typing import Array
 
 # Of the tensions that goals of joints stretch tendons by, which turn no joint, the largest, N.
 _CLOSING = 5.0
+# What loops remember of their samples.
+_MEMORY = ("taken", "integral", "last", "voltages", "errors", "integrals")
 
 
 class Action(LoopController):
@@ -96,10 +98,11 @@ class Action(LoopController):
         self.held = np.zeros(self._finger.mechanism.channels)
         self._begins: list[float] = []
         self._values: list[Array] = []
+        self._value = self.held
         self._waiting: deque[tuple[float, Array]] = deque()
         if self._drives is not None:
-            for memory in (self._drives.taken, self._drives.integral, self._drives.last, self._drives.voltages):
-                memory[:] = 0
+            for name in _MEMORY:
+                getattr(self._drives, name)[:] = 0
 
     def take(self, action: Array, time: float) -> None:
         """Apply an action at a time, s; the first one has no delay."""
@@ -116,28 +119,29 @@ class Action(LoopController):
             end: Of the control period, s.
         """
         while self._waiting and self._waiting[0][0] <= begin:
-            self._hold(stepper, begin, self._waiting.popleft()[1])
-        return min(self._waiting[0][0], end) if self._waiting else end
-
-    def _hold(self, stepper: Stepper, time: float, value: Array) -> None:
-        self._begins.append(time)
-        self._values.append(value)
+            self._value = self._waiting.popleft()[1]
+            if self._drives is not None:
+                # A sample at this instant has been taken already, but not before the first action.
+                self._drives.goals[int(self._drives.latest(begin)) + 1 if self._begins else 0 :] = self._value
         if self._drives is None:
-            self.held = value
-            stepper.hold(value)
-        else:
-            self._drives.goals[math.ceil(time / self._drives.period * (1.0 - 1e-12)) :] = value
+            self.held = self._value
+            stepper.hold(self._value)
+        self._begins.append(begin)
+        self._values.append(self._value)
+        return min(self._waiting[0][0], end) if self._waiting else end
 
     def again(self) -> Drives:
         """Return the loops of an episode with the same goals, to run once more from its start."""
         drives = self._drives
         assert drives is not None
-        fresh = {name: np.zeros_like(getattr(drives, name)) for name in ("taken", "integral", "last")}
-        return drives._replace(**fresh, voltages=np.zeros_like(drives.voltages))
+        return drives._replace(**{name: np.zeros_like(getattr(drives, name)) for name in _MEMORY})
 
     def replayed(self) -> Replayed:
-        """Return a controller that holds the same inputs once more."""
-        return Replayed(self._begins, self._values)
+        """Return a controller that holds the same inputs once more, and ends steps where the episode did."""
+        if self._drives is None:
+            return Replayed(self._begins, self._values)
+        # The loops set all inputs.
+        return Replayed(self._begins, [np.zeros_like(self.held)] * len(self._begins))
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
@@ -198,7 +202,7 @@ def _spools(finger: Finger, coupling: PassiveCoupling, free: NDArray[np.int64], 
 
 
 class Replayed:
-    """Inputs of an episode, held again at the same times."""
+    """Inputs of an episode, held again from the same times on, at each of which a step ends."""
 
     def __init__(self, begins: Sequence[float], values: Sequence[Array]) -> None:
         """Take times, s, and the inputs held from each on."""

@@ -18,6 +18,7 @@ from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.state import Motion, State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
+from finger_pin.simulation.motor_variables import LOOP_VARIABLES
 from finger_pin.simulation.row_variables import RESIDUAL
 from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory
 from finger_pin.simulation.variables import variables
@@ -62,7 +63,7 @@ def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
         name: each
         for name, each in variables(loop).items()
         # The account is of a whole run.
-        if each.energy_term is None and name not in (*_OF_CONTROLLERS, RESIDUAL)
+        if each.energy_term is None and name not in (*_OF_CONTROLLERS, *LOOP_VARIABLES, RESIDUAL)
     }
 
 

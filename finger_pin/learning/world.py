@@ -250,9 +250,10 @@ class World:
         stepper, end = self._stepper_at(self._begun), self.stepper.time
         if self.action.compiled is not None:
             stepper.drive(self.action.again())
-        held = self.action.replayed() if self.action.compiled is None else None
+        held = self.action.replayed()
         trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, held=held)
-        times = np.arange(round(end * sample_rate) + 1) / sample_rate
+        # None beyond the end, also by rounding.
+        times = np.minimum(np.arange(int(end * sample_rate * (1.0 + 1e-12)) + 1) / sample_rate, end)
         motions = SampledTrajectory(self.loop, trajectory, times)
         found = record(self._scenario, motions, self._scenario.simulation.method)
         found.attrs["custom"] = "policy"

@@ -113,7 +113,10 @@ class State:
     )
     contact_bend: Array = field(default=_ZEROS, metadata=_of("m", (1e-5,)))
     actuator_state: Array = field(default=_ZEROS, metadata=_of("1"))
-    elastic_stiction: Array = field(default=_ZEROS, metadata=_of("N"))
+    elastic_stiction: Array = field(
+        default=_ZEROS,
+        metadata=_of("N", (1.0,), "elastic_stiction", "force held against a tendon's stretch", "elastic_tendon"),
+    )
     drives: Array = field(default=_ZEROS, metadata=_of("1"))
     tendon_stiction: Array = field(
         default=_ZEROS, metadata=_of("N", (1.0,), "tendon_stiction", "tendon stiction force", "tendon", "9a")

@@ -8,13 +8,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.position_drive import LoopMemory
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.canals import is_canal
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import BLOCKS, State
-from finger_pin.mechanism.tree import MUSCLES, STATEFUL
 from finger_pin.simulation.contact_variables import last_touching
+from finger_pin.simulation.motor_variables import LOOP_VARIABLES
 from finger_pin.typing import Array
 
 
@@ -71,28 +72,51 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
             raise InputError("initial", f"has no {name}; give what simulate returned")
         else:
             parts[part] = np.zeros(0)
-    parts |= _last_states(finger, last, sizes) | last_touching(finger, last)
-    return finite_vector("initial", finger.layout.pack(State(**parts)), finger.layout.size)
+    x = finger.layout.pack(State(**(parts | last_touching(finger, last))))
+    _fill_rows(finger, last, x)
+    return finite_vector("initial", x, finger.layout.size)
 
 
-def _last_states(finger: Finger, last: xr.Dataset, sizes: dict[str, Array]) -> dict[str, Array]:
-    """Return the states of tree actuators, canals and custom rows from a result's variables.
+def _fill_rows(finger: Finger, last: xr.Dataset, x: Array) -> None:
+    """Fill the states of canals, actuators of trees, and custom rows and drives from a result's variables.
 
     Raises:
         InputError: If a result lacks them.
     """
-    tables = [table for table in finger.extra_rows if table.states and not table.pulls]
-    actuators, canals = (STATEFUL, MUSCLES), [table.group for table in tables if is_canal(table.group)]
-    others = [table.group for table in tables if table.group not in (*actuators, *canals)]
-    found = {}
-    for part, groups in (("actuator_state", actuators), ("canal_stiction", canals), ("further", others)):
-        names = [f"{table.group}_state" for table in tables if table.group in groups]
-        for name in names:
-            if name not in last:
+    rows, z = {table.group for table in finger.extra_rows}, finger.mechanism.split(x)[2]
+    for table, part in zip(finger.mechanism.rows, finger.mechanism.states, strict=True):
+        if table.states and table.group in rows:
+            name = f"{table.group}_state"
+            if name not in last or last[name].size != table.states:
                 raise InputError("initial", f"has no {name}; give what simulate returned")
-        if sizes[part].size:
-            found[part] = np.concatenate([np.ravel(last[name].values) for name in names])
-    return found
+            z[part] = np.ravel(last[name].values)
+
+
+def started(loop: ClosedLoop, initial: ArrayLike | xr.Dataset | None) -> ClosedLoop:
+    """Return a loop that starts at a packed state, or goes on from a result; the loop itself for None.
+
+    Raises:
+        InputError: As `packed_state`.
+    """
+    if initial is None:
+        return loop
+    samples = _last_samples(initial, loop.finger) if isinstance(initial, xr.Dataset) else None
+    return loop.started(packed_state(initial, loop.finger), samples)
+
+
+def _last_samples(initial: xr.Dataset, finger: Finger) -> LoopMemory | None:
+    """Return the memory of the loops of motors at the end of a result; None where no loop has run.
+
+    Raises:
+        InputError: If the result lacks it.
+    """
+    if not finger.actuators.holds.any() or "spool_angle" not in initial:
+        return None
+    last = initial.isel(time=-1)
+    if missing := [name for name in LOOP_VARIABLES if name not in last]:
+        raise InputError("initial", f"has no {missing[0]}; give what simulate returned")
+    age, *rest = (last[name].values for name in LOOP_VARIABLES)
+    return LoopMemory(float(age), *(each[finger.actuators.holds] for each in rest))
 
 
 def as_finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:

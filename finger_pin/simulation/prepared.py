@@ -20,7 +20,7 @@ from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import with_tighter
-from finger_pin.simulation.initial_state import custom_parts, packed_state
+from finger_pin.simulation.initial_state import custom_parts, started
 from finger_pin.simulation.recording import RunArrays, attributes_of, record, recorded, refuse_unknown
 from finger_pin.simulation.running import interruptible, run
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
@@ -206,4 +206,4 @@ class Prepared:
         # Where nothing of it changes in a run all share it, also in threads.
         finger = with_parameters_of(self._finger, self.family.scenario, scenario)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
-        return loop if initial is None else loop.started(packed_state(initial, loop.finger))
+        return started(loop, initial)

@@ -12,7 +12,7 @@ from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.evaluation import ContactPoints, Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import Energy
-from finger_pin.mechanism.state import Motion, State
+from finger_pin.mechanism.state import BLOCKS, Motion, State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.account import Account, account
 from finger_pin.simulation.energy import Flows, energies, powers
@@ -151,3 +151,14 @@ class Quantity(NamedTuple):
         if self.energy_term is not None:
             found |= {"account": self.energy_term.kind, "label": self.energy_term.label}
         return found | {"equation": f"({self.equation})"} if self.equation else found
+
+
+def of_state(block: str, single: bool = False) -> Quantity:
+    """Return the variable of a block of the state; without a second dimension if ``single``."""
+    of = BLOCKS[block]
+
+    def value(motion: SampledTrajectory) -> Array:
+        found: Array = getattr(motion.state, block)
+        return found[:, 0] if single else found
+
+    return Quantity(("time",) if single else ("time", of.dimension), value, of.unit, of.long_name, of.equation)

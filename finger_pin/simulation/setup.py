@@ -108,7 +108,8 @@ class Setup:
             duration, start = scenario.simulation.duration, scenario.simulation.start_time
             wound = wound_spools(scenario, loop.finger)
             voltages = given_voltages(scenario, loop.finger)
-            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, start, wound, voltages)
+            planned = loop.finger, loop.controller, loop.reference, duration, start, wound, voltages
+            drives = PositionDrives(*planned, loop.last_samples)
             loop = replace(loop, drives=drives)
         if sampled is not None:
             loop = replace(loop, controller=sampled)

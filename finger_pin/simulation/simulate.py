@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 
 import xarray as xr
@@ -9,12 +10,14 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import Controller
+from finger_pin.control.sampling import sampling_settings
 from finger_pin.control.user_controllers import Columns, Samples, with_columns
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
+from finger_pin.exceptions import ScenarioWarning
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.references.reference import Reference
-from finger_pin.simulation.initial_state import custom_parts, packed_state
+from finger_pin.simulation.initial_state import custom_parts, started
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.simulation.running import interruptible, run
 
@@ -49,7 +52,8 @@ def simulate(
         fingertip_force: In place of the scenario's: times, shape (m,), s, and forces, shape (m, 3), N, base frame.
         finger: In place of the scenario's, with the same joints and tendons: with custom rows, or on a model.
         initial: The packed state to start from, shape (size,), or a result to continue from its last saved state. Time
-            begins at zero again; ``simulation.start_time`` says what the clock of references shows then.
+            begins at zero again; ``simulation.start_time`` says what the clock of references shows then. Position loops
+            of motors go on as well, from a result; a controller that is sampled starts anew, which is warned of.
         control_period: Sampling period of the controller, s, for compiled methods, in place of the scenario's.
         progress: Called with the simulated time, s, now and then; in a notebook there is a bar by default.
         observe: Called with the simulated time, s, and all signals every few steps.
@@ -74,8 +78,10 @@ def simulate(
     scenario, controls = with_columns(load_scenario(scenario), controller)
     given = resolve_finger(finger, scenario)
     loop = ClosedLoop.from_scenario(scenario, controls, reference, fingertip_force, given)
-    if initial is not None:
-        loop = loop.started(packed_state(initial, loop.finger))
+    loop = started(loop, initial)
+    if isinstance(initial, xr.Dataset) and sampling_settings(scenario, control_period) is not None:
+        text = "the sampled controller starts anew: its sensors, delays and memory are not part of a result"
+        warnings.warn(text, ScenarioWarning, stacklevel=2)
     custom = custom_parts(controls, reference, fingertip_force, initial, given)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
     return interruptible(lambda asked: run(scenario, loop, custom, control_period, progress, observe, asked), stop)

@@ -12,10 +12,10 @@ import pinocchio as pin
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.rows import RowSignals
-from finger_pin.mechanism.state import BLOCKS
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
+from finger_pin.simulation.motor_variables import motor_variables
 from finger_pin.simulation.row_variables import account_variables, extra_row_variables
-from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory
+from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory, of_state
 from finger_pin.typing import Array
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
@@ -27,8 +27,8 @@ SHORTFALL = "torque_shortfall"
 def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return all variables that a result of a loop can have, by name."""
     table = {
-        "joint_position": _of_state("position"),
-        "joint_velocity": _of_state("velocity"),
+        "joint_position": of_state("position"),
+        "joint_velocity": of_state("velocity"),
         "joint_acceleration": Quantity(_JOINT, lambda of: of.finger.acceleration, "rad/s2", "joint acceleration", "18"),
         "joint_reference": Quantity(_JOINT, lambda of: of.reference.position, "rad", "desired joint angle", "20"),
         "tracking_error": Quantity(
@@ -52,12 +52,14 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         SHORTFALL: Quantity(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
     if loop.finger.layout.names_of("joint_stiction"):
-        table["joint_stiction"] = _of_state("joint_stiction")
+        table["joint_stiction"] = of_state("joint_stiction")
+    if loop.finger.layout.names_of("elastic_stiction"):
+        table["elastic_stiction"] = of_state("elastic_stiction")
     table |= (
         _of_wraps(loop)
         | _of_windings(loop)
         | _of_palm(loop)
-        | _of_motors(loop)
+        | motor_variables(loop)
         | _of_passive(loop)
         | _measured(loop)
         | _more(loop)
@@ -80,7 +82,7 @@ def _of_tendons() -> dict[str, Quantity]:
         ),
         "tendon_velocity": Quantity(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
         "tendon_friction": Quantity(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
-        "tendon_stiction": _of_state("tendon_stiction"),
+        "tendon_stiction": of_state("tendon_stiction"),
         "tendon_normal_force": Quantity(
             _TENDON, lambda of: of.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
         ),
@@ -151,17 +153,6 @@ def _of_wraps(loop: ClosedLoop) -> dict[str, Quantity]:
     }
 
 
-def _of_state(block: str, single: bool = False) -> Quantity:
-    """Return the variable of a block of the state; without a second dimension if ``single``."""
-    of = BLOCKS[block]
-
-    def value(motion: SampledTrajectory) -> Array:
-        found: Array = getattr(motion.state, block)
-        return found[:, 0] if single else found
-
-    return Quantity(_TIME if single else ("time", of.dimension), value, of.unit, of.long_name, of.equation)
-
-
 def _frame(name: str, variable: Quantity) -> str:
     """Return the frame of a variable with components: the base's, but the world's for the base's own place."""
     if not {"axis", "quaternion"} & set(variable.dims):
@@ -214,28 +205,6 @@ def _of_palm(loop: ClosedLoop) -> dict[str, Quantity]:
     }
 
 
-def _of_motors(loop: ClosedLoop) -> dict[str, Quantity]:
-    if not loop.finger.actuators.names:
-        return {}
-
-    def driven(of: SampledTrajectory, name: str) -> Array:
-        return np.asarray(getattr(of.finger.motors, name))
-
-    loose = ("spool_position", "spool_velocity") if loop.finger.actuators.loose_names else ()
-    table = {name: _of_state(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction", *loose)}
-    table |= {
-        name: Quantity(_MOTOR, partial(driven, name=inner), units, long_name, equation)
-        for name, inner, units, long_name, equation in (
-            ("motor_current", "current", "A", "current", ""),
-            ("motor_voltage", "voltage", "V", "voltage", ""),
-            ("motor_torque", "torque", "N m", "torque of the motor, at the spool", ""),
-            ("gearbox_friction", "friction", "N m", "friction torque of the gearbox", "9c"),
-            ("gearbox_load", "load", "N m", "torque that the gears carry", ""),
-        )
-    }
-    return table
-
-
 def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
     count, actuated = loop.finger.routing.passive, loop.finger.routing.actuated
     if not count:
@@ -252,7 +221,7 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
 
     return {
         "passive_tension_proximal": Quantity(dims, proximal, "N", "tension of the proximal half", "12"),
-        **{name: _of_state(name, single) for name in ("passive_position", "passive_velocity")},
+        **{name: of_state(name, single) for name in ("passive_position", "passive_velocity")},
     }
 
 
@@ -290,6 +259,8 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
         found["wrap"] = ("wrap", list(finger.wrap_names), {"long_name": "bend of a tendon"})
     if routing.passive > 1:
         found["passive_tendon"] = list(routing.passive_names)
+    if held := finger.layout.names_of("elastic_stiction"):
+        found["elastic_tendon"] = ("elastic_tendon", list(held), {"long_name": "tendon or half of one, that stretches"})
     if finger.actuators.names:
         found["motor"] = ("motor", list(finger.actuators.names), {"long_name": "motor"})
     if finger.actuators.loose_names:

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import finger_pin as fp
 from finger_pin.description.coupling import PassiveCoupling
@@ -56,6 +57,24 @@ def test_an_episode_of_servos_goes_as_if_it_were_the_first():
         environment.reset(seed=0)
         seen.append([environment.step([0.1, 0.8, 0.9])[0] for _ in range(3)])
     np.testing.assert_array_equal(*seen)
+
+
+@pytest.mark.parametrize(("period", "delay"), [(0.02, 0.0), (0.03, 0.0), (0.007, 0.004)])
+def test_a_result_repeats_an_episode_of_new_goals_bit_for_bit(period, delay):
+    """Goals arrive at samples of the loops, whose times differ from theirs by rounding, or between them."""
+    task = dict(reward=nothing, action="spool_angle", period=period, delay=delay)
+    seen = ["joint_position", "motor_position", "motor_voltage", "tendon_stiction"]
+    environment = Environment(fp.load_scenario("servo_position", COARSE), privileged=seen, **task)
+    environment.reset(seed=1)
+    environment.action_space.seed(3)
+    for _ in range(15):
+        told = environment.step(environment.action_space.sample())[4]["privileged"]
+    result = environment.result(sample_rate=1.0 / period)
+    for name in ("joint_position", "motor_position", "tendon_stiction"):
+        np.testing.assert_array_equal(result[name].values[-1], told[name], err_msg=name)
+    np.testing.assert_allclose(result["motor_voltage"].values[-1], told["motor_voltage"], rtol=1e-12)
+    exchanged = float(abs(result.energy_exchanged_electrical).max())
+    assert float(abs(result.energy_residual).max()) < 1e-3 * exchanged
 
 
 def test_a_motor_of_two_cords_can_be_told_to_wind_in_the_one_that_needs_more():

@@ -77,3 +77,25 @@ def test_a_drive_of_a_tendon_that_is_not_there_is_refused(finger):
     rows = fp.Rows("muscles", MUSCLE, ("T9",), np.full((1, 1), LAG), np.zeros((1, 5)), pulls=("T9",))
     with pytest.raises(fp.InputError, match=r"rows.muscles.pulls = .T9.: no such tendon.*T1, T2, T3, T4"):
         fp.Finger(finger.description, rows=[rows])
+
+
+def test_a_run_of_it_goes_on_from_its_state(driven):
+    """The tension after two times 10 ms is that of a first-order lag after 20 ms."""
+    short = fp.load_scenario("fig6", {"simulation.duration": 0.01, "simulation.rtol": 1e-8})
+    held = np.array([0.0, 0.01]), np.tile(TENSION, (2, 1))
+    first = fp.simulate(short, finger=driven, controller=held)
+    second = fp.simulate(short, finger=driven, controller=held, initial=first)
+    np.testing.assert_allclose(second.muscles_force[-1], TENSION[2:] * (1.0 - np.exp(-0.02 / LAG)), atol=1e-6)
+
+
+def test_a_drive_that_reads_a_row_which_is_evaluated_later_is_refused(finger):
+    """In both evaluators alike: neither is built."""
+    arm, one = np.zeros((1, finger.mechanism.coordinates)), np.ones((1, 1))
+    numbers = np.full((1, 1), LAG)
+    filtered = fp.Rows("filter", MUSCLE, ("T3",), numbers, arm, channels=np.array([2]))
+    rows = [fp.Rows("muscles", MUSCLE, ("T3",), numbers, arm, inputs={"filter": one}, pulls=("T3",)), filtered]
+    for given in (rows, rows[::-1]):
+        with pytest.raises(
+            fp.InputError, match=r"^rows.muscles.inputs = .filter.: must be evaluated before muscles, as"
+        ):
+            fp.Finger(finger.description, rows=given)

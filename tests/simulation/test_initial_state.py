@@ -5,7 +5,12 @@ import pytest
 import xarray as xr
 
 import finger_pin as fp
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.description.loading import list_scenarios
 from finger_pin.exceptions import InputError
+from finger_pin.simulation.initial_state import started
+from finger_pin.simulation.motor_variables import LOOP_VARIABLES
+from finger_pin.simulation.setup import Setup
 
 START = {
     "simulation.initial.position": {"proximal": 0.4, "distal": 0.2},
@@ -61,6 +66,62 @@ def test_a_run_continued_from_a_result_is_the_run_that_did_not_stop():
     np.testing.assert_allclose(second.joint_reference, whole.joint_reference[60:], atol=1e-14)
     np.testing.assert_allclose(second.joint_position, whole.joint_position[60:], atol=1e-7)
     np.testing.assert_allclose(second.tendon_stiction, whole.tendon_stiction[60:], atol=1e-4)
+
+
+SPRING = {"stiffness": 0.1, "rest": 0.2, "hysteresis": 0.2}
+#: Everything of a finger that has a state besides those of shipped scenarios: scenario, overrides, and the block.
+FEATURES = {
+    "passive tendon's hysteresis": ("fig6", {"finger.passive_tendon.hysteresis": 0.1}, "elastic_stiction"),
+    "elastic tendons' hysteresis": ("servo", {"finger.actuators.*.tendon_hysteresis": 0.1}, "elastic_stiction"),
+    "play": ("servo_position", {"finger.actuators.*.motor.friction.backlash": 0.01}, "spool_position"),
+    "springs' hysteresis": ("fig6", {"finger.joints.medial.spring": SPRING}, "further"),
+    "bends": ("fig6", {"finger.tendon_friction.place": "bends"}, "canal_stiction"),
+    "position loops": ("servo_position", {"finger.actuators.*.position_loop.integral": 20.0}, "motor_position"),
+}
+CASES = {name: (name, {}, "velocity") for name in list_scenarios()} | FEATURES
+
+
+@pytest.mark.parametrize(("name", "overrides", "block"), CASES.values(), ids=CASES)
+def test_every_number_of_the_state_is_read_from_a_result(name, overrides, block):
+    """Against the packed state of the integrator itself."""
+    # In half a second hands close round what is to be grasped.
+    first = 0.0 if name == "grasp" else 0.5
+    begin, middle = (
+        fp.load_scenario(name, {"simulation.duration": 0.02, "simulation.start_time": start} | overrides)
+        for start in (first, first + 0.02)
+    )
+    setup = Setup.of(begin)
+    x = setup.integrate().interpolate(begin.sample_times()[-1:])[0]
+    assert np.any(getattr(setup.loop.finger.layout.unpack(x), block))
+    found = started(ClosedLoop.from_scenario(middle), fp.simulate(begin)).initial_state()
+    np.testing.assert_allclose(found, x, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("feature", ["passive tendon's hysteresis", "elastic tendons' hysteresis", "position loops"])
+@pytest.mark.parametrize("parts", [(0.05, 0.05), (0.0505, 0.0495)], ids=["aligned", "between samples"])
+def test_two_runs_one_after_the_other_are_one(feature, parts):
+    name, overrides, _ = FEATURES[feature]
+    tight = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11, "simulation.sample_rate": 2000.0} | overrides
+    whole, found, begin = fp.simulate(fp.load_scenario(name, tight | {"simulation.duration": sum(parts)})), None, 0.0
+    for part in parts:
+        clock = {"simulation.start_time": begin, "simulation.duration": part}
+        found, begin = fp.simulate(fp.load_scenario(name, tight | clock), initial=found), begin + part
+    for variable in ("joint_position", "elastic_stiction", *LOOP_VARIABLES):
+        if variable in whole:
+            ours, theirs = found[variable].values[-1], whole[variable].values[-1]
+            np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.abs(theirs).max(initial=1.0), err_msg=variable)
+
+
+def test_a_sampled_controller_starts_anew_and_that_is_said():
+    scenario = short(**{"controller.sampling.period": 1e-3})
+    with pytest.warns(fp.exceptions.ScenarioWarning, match="the sampled controller starts anew"):
+        fp.simulate(scenario, initial=fp.simulate(scenario))
+
+
+def test_a_result_whose_loops_are_missing_is_refused():
+    result = fp.simulate(fp.load_scenario("servo_position", {"simulation.duration": 0.01}))
+    with pytest.raises(InputError, match="has no position_loop_integral"):
+        fp.simulate("servo_position", initial=result.drop_vars("position_loop_integral"))
 
 
 def test_a_saved_result_of_a_finger_without_passive_tendon_is_continued(tmp_path):

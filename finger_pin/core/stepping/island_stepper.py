@@ -214,7 +214,7 @@ class IslandIntegrator:
             # Steps are counted from here on, for those that creep.
             memory.time[0], memory.window_start[0], memory.window_end[0] = time, 0.0, 0.0
             if self.drives is not None:
-                self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
+                self.drives.taken[0] = math.ceil((time - self.drives.first) / self.drives.period * (1.0 - 1e-12))
 
     def forget(self) -> None:
         """Forget which contact pairs were far apart, as where the state is another."""

@@ -198,8 +198,10 @@ class Stepper:
                     motors=motors,
                     places=np.searchsorted(part.island.coordinates, drives.places),
                     channels=np.searchsorted(part.island.channels, drives.channels),
-                    taken=np.zeros(1, dtype=np.int64),
+                    taken=drives.taken.copy(),
                 )
+                if drives.taken[0]:
+                    part.control.tension[part.drives.channels[motors]] = drives.voltages[0, motors]
 
     def end_steps_at(self, knots: Array) -> None:
         """End steps at these times from now on, s, positive, in order: inputs bend or jump there."""

@@ -1,0 +1,68 @@
+"""Variables of motors: their motion, what they exert, and the samples of their position loops."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory, of_state
+from finger_pin.typing import Array
+
+_MOTOR = ("time", "motor")
+#: What a run that goes on needs of its loops' last sample, in the order of `LoopMemory`.
+LOOP_VARIABLES = ("position_loop_age", "position_loop_error", "position_loop_integral", "position_loop_voltage")
+
+
+def motor_variables(loop: ClosedLoop) -> dict[str, Quantity]:
+    """Return the variables of the motors of a loop, by name; none without any."""
+    actuators = loop.finger.actuators
+    if not actuators.names:
+        return {}
+
+    def driven(of: SampledTrajectory, name: str) -> Array:
+        return np.asarray(getattr(of.finger.motors, name))
+
+    loose = ("spool_position", "spool_velocity") if actuators.loose_names else ()
+    table = {name: of_state(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction", *loose)}
+    table |= {
+        name: Quantity(_MOTOR, partial(driven, name=inner), units, long_name, equation)
+        for name, inner, units, long_name, equation in (
+            ("motor_current", "current", "A", "current", ""),
+            ("motor_voltage", "voltage", "V", "voltage", ""),
+            ("motor_torque", "torque", "N m", "torque of the motor, at the spool", ""),
+            ("gearbox_friction", "friction", "N m", "friction torque of the gearbox", "9c"),
+            ("gearbox_load", "load", "N m", "torque that the gears carry", ""),
+        )
+    }
+    if loop.drives is not None and loop.drives.compiled is not None:
+        table |= _of_loops()
+    return table
+
+
+def _of_loops() -> dict[str, Quantity]:
+    """Return the variables of the last sample of position loops; zero for motors without one."""
+
+    def age(of: SampledTrajectory) -> Array:
+        assert of.loop.drives is not None and of.loop.drives.compiled is not None
+        drives = of.loop.drives.compiled
+        since: Array = of.times - drives.first - drives.period * drives.latest(of.times)
+        return np.maximum(since, 0.0)
+
+    def sampled(of: SampledTrajectory, name: str) -> Array:
+        assert of.loop.drives is not None and of.loop.drives.compiled is not None
+        drives, found = of.loop.drives.compiled, np.zeros((len(of.times), len(of.loop.finger.actuators.names)))
+        found[:, of.loop.finger.actuators.holds] = drives.held(getattr(drives, name), of.times)
+        return found
+
+    texts = (
+        ("errors", "rad", "commanded less measured angle at the last sample of a position loop, else 0"),
+        ("integrals", "rad s", "integral of that error, as the loop has it, else 0"),
+        ("voltages", "V", "voltage that it has asked for; 1e30 where the motor is let go"),
+    )
+    ages = Quantity(("time",), age, "s", "time since the last sample of the position loops")
+    return {LOOP_VARIABLES[0]: ages} | {
+        name: Quantity(_MOTOR, partial(sampled, name=history), unit, text)
+        for name, (history, unit, text) in zip(LOOP_VARIABLES[1:], texts, strict=True)
+    }
