@@ -25,7 +25,23 @@ from finger_pin.description.validation import (
 )
 
 _MILLIMETRES = " m (is it in millimetres?)"
+# Osmium, kg/m3 (CRC Handbook of Chemistry and Physics).
+_DENSEST = 22590.0
 _MOST_TENSION = 1e6
+
+
+def check_density(mass: float, inertia: float) -> None:
+    """Raise the error of a mass that nothing has which is no larger than its inertia says.
+
+    Of all bodies that are nowhere denser than a material the ball of it has the least sum of moments of inertia.
+
+    Args:
+        mass: kg.
+        inertia: Sum of the three principal moments about the mass centre, kg m2.
+    """
+    radius = (3.0 * mass / (4.0 * math.pi * _DENSEST)) ** (1.0 / 3.0)
+    if inertia < 3.0 * 0.4 * mass * radius**2:
+        raise problem("mass", "makes it denser than osmium, 22590 kg/m3: masses are in kg (is it in grams?)", mass)
 
 
 class Link(Description):
@@ -65,9 +81,11 @@ class Link(Description):
         axial = self.mass * self.width**2 / (6.0 if square else 8.0)
         lateral = self.mass * (self.width**2 / (12.0 if square else 16.0) + self.length**2 / 12.0)
         defaults = {"centre_of_mass": self.length / 2, "transverse_inertia": lateral, "axial_inertia": axial}
+        solid = axial + 2.0 * lateral
         for name, value in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
+        check_density(self.mass, max(solid, self.inertia[0] + 2.0 * self.inertia[1]))
         if self.inertia[0] > 2.0 * self.inertia[1]:
             raise problem(
                 "axial_inertia", "must be at most twice the transverse inertia (no body has more)", self.inertia[0]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from finger_pin.identification.problem import Problem, minus_twice_likelihood, pooled
 from finger_pin.typing import Array
@@ -27,6 +28,8 @@ _FEIGNED, _MOST_FEIGNED, _BY_SAMPLE = 0.05, 1.0, 1e-3
 # Parts of what a step promises: from what gain on it is taken; up to what error of it its slopes serve again, or bent
 # ones from what gain on.
 _TAKEN, _SERVED = 0.05, 0.3
+# Median size of what is normally distributed with a deviation of one.
+_MEDIAN = float(norm.ppf(0.75))
 #: What a squared residual u counts for where outliers are to count less, and how fast that grows.
 LOSSES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
     "linear": (lambda u: u, np.ones_like),
@@ -44,11 +47,12 @@ class Fit:
     Attributes:
         z: Search variables, shape (p,).
         residuals: Of every signal.
-        noise: rms of the residuals of every signal, shape (s,).
+        noise: rms of the residuals of every signal, shape (s,); where outliers count less, what the median tells.
         correlation: Of neighbouring residuals, shape (s,).
         weights: Part of the samples that are independent, (1 - rho) / (1 + rho), shape (s,) (Bartlett).
         objective: Sum of w n log(SSE / n), outliers as they count.
         slopes: Of every signal's residuals, those of the last step, which need not be of here; none without steps.
+        converged: Whether steps have come to their end.
     """
 
     z: Array
@@ -58,6 +62,7 @@ class Fit:
     weights: Array
     objective: float
     slopes: Sequence[Array] | None = None
+    converged: bool = True
 
 
 def fit(
@@ -79,7 +84,7 @@ def fit(
         weights: Of the signals; by default they follow from the residuals at the end.
         loss: One of `LOSSES`, for outliers.
         slopes: Of the residuals near the start, to step with as long as they serve; by default those at the start.
-        scale: Beyond which residuals are outliers, of the signals; by default their rms.
+        scale: Beyond which residuals are outliers, of the signals; by default their noise.
     """
     z, free = start.copy(), np.ones(len(start), dtype=bool)
     for k, value in (held or {}).items():
@@ -90,7 +95,8 @@ def fit(
     if not all(np.isfinite(e).all() for e in residuals):
         # What cannot be integrated there is the worst of all minima.
         nothing = np.zeros(len(residuals))
-        return Fit(z, residuals, nothing, nothing, nothing, math.inf)
+        return Fit(z, residuals, nothing, nothing, nothing, math.inf, converged=False)
+    ended = True
     for k in range(_ROUNDS if free.any() else 0):
         before = z
         z, residuals, slopes, ended = _descend(problem, z, residuals, free, shares, loss, slopes, scale)
@@ -99,10 +105,10 @@ def fit(
         shares = _independent(problem, residuals)[1]
     correlation, own = _independent(problem, residuals)
     shares = own if weights is None else weights
-    noise = _noise(problem, residuals)
-    counted = _counted(residuals, noise if scale is None else scale, loss)[0]
-    objective = minus_twice_likelihood(counted, shares, problem.groups)
-    return Fit(z, residuals, noise, correlation, shares, objective, slopes)
+    noise = _noise(problem, residuals, robust=loss != "linear")
+    used = noise if scale is None else scale
+    objective = _objective(problem, _counted(residuals, used, loss)[0], shares, used, loss)
+    return Fit(z, residuals, noise, correlation, shares, objective, slopes, ended)
 
 
 def _descend(
@@ -130,7 +136,7 @@ def _descend(
     hidden = _MOST_FEIGNED if problem.finely else max(_MOST_FEIGNED, _BY_SAMPLE * count)
     bending = moves and not problem.finely
     for _ in range(_STEPS):
-        noise = _noise(problem, residuals) if scale is None else scale
+        noise = _noise(problem, residuals, robust=loss != "linear") if scale is None else scale
         met, inner, pull = _normal(problem, residuals, slopes, shares, noise, loss)
         move, promised = _step(problem, z, free, inner, pull, damping)
         if promised < 0.0:
@@ -140,7 +146,8 @@ def _descend(
         if promised < enough:
             return z, residuals, slopes, True
         there = problem.residuals(z + move)
-        sums = [minus_twice_likelihood(each, shares, problem.groups) for each in (met, _counted(there, noise, loss)[0])]
+        both = met, _counted(there, noise, loss)[0]
+        sums = [_objective(problem, each, shares, noise, loss) for each in both]
         gained = sums[0] - sums[1]
         taken, served = gained > _TAKEN * promised, abs(gained - promised) < _SERVED * promised + feigned
         if bending:
@@ -176,11 +183,22 @@ def _normal(
 ) -> tuple[Sequence[Array], Array, Array]:
     """Return the weighed residuals, and half of the curvature and slope of minus twice the likelihood there."""
     met, growth = _counted(residuals, scale, loss)
-    factors = shares / _noise(problem, met) ** 2
+    factors = shares / (_noise(problem, met) if loss == "linear" else scale) ** 2
     grown = [each[:, None] * j for each, j in zip(growth, slopes, strict=True)]
     inner = sum(f * j.T @ j for f, j in zip(factors, grown, strict=True))
     pull = sum(f * j.T @ e for f, j, e in zip(factors, grown, met, strict=True))
     return met, np.asarray(inner), np.asarray(pull)
+
+
+def _objective(problem: Problem, counted: Sequence[Array], shares: Array, scale: Array, loss: str) -> float:
+    """Return minus twice the log-likelihood of weighed residuals.
+
+    Where outliers count less their noise is that of the scale: an rms would be theirs.
+    """
+    if loss == "linear":
+        return minus_twice_likelihood(counted, shares, problem.groups)
+    by_signal = zip(counted, shares, scale, strict=True)
+    return float(sum(w * (e @ e / s**2 + 2.0 * len(e) * math.log(s)) for e, w, s in by_signal))
 
 
 def _step(
@@ -235,11 +253,18 @@ def information(problem: Problem, found: Fit) -> Array:
     return total
 
 
-def _noise(problem: Problem, residuals: Sequence[Array]) -> Array:
-    """Return the rms of the residuals of every output, never less than its rounding."""
+def typical(problem: Problem, residuals: Sequence[Array]) -> Array:
+    """Return the deviation of the residuals of every signal's output by their median, which outliers hardly change."""
+    groups = problem.groups
+    sizes = [np.abs(np.concatenate([e for e, g in zip(residuals, groups, strict=True) if g == k])) for k in groups]
+    return np.array([np.median(each) / _MEDIAN if len(each) else 1.0 for each in sizes])
+
+
+def _noise(problem: Problem, residuals: Sequence[Array], robust: bool = False) -> Array:
+    """Return the rms of the residuals of every output, or what their median tells, never less than its rounding."""
     groups = problem.groups
     count, square = pooled(residuals, np.ones(len(residuals)), groups)
-    rms = np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
+    rms = typical(problem, residuals) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
     least = [1e-9 * max(float(np.max(np.abs(s.measured), initial=0.0)), 1e-9) for s in problem.signals]
     return np.maximum(rms, least)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.identification.checkpoint import Checkpoint, digest
 from finger_pin.identification.comparison import other_laws
 from finger_pin.identification.estimate import LOSSES, fit
@@ -102,6 +103,11 @@ def identify(
     # Before any work: an entry that is wrong in them is refused now.
     other_laws(problem, settings)
     check_predictable(scenario, held_out, own)
+    for name in dict.fromkeys(each.recording.name for each in problem.models):
+        doubts = (each.doubt(problem.keys) for each in problem.models if each.recording.name == name)
+        doubt = next(filter(None, doubts), "")
+        if doubt:
+            warnings.warn(doubt, ScenarioWarning, stacklevel=2)
     problem.stop = CancelToken(stop)
     asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
     with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:

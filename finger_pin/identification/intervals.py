@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Self
 
 import numpy as np
+from scipy.stats import t as student
 
 from finger_pin.identification.estimate import Fit, fit, information
 from finger_pin.identification.problem import Problem
@@ -40,11 +43,63 @@ class ProfileBound:
 
 
 def covariance(problem: Problem, found: Fit) -> Array:
-    """Return the linearised covariance of z, shape (p, p); a pseudo-inverse for free directions."""
-    low, high = problem.box
-    width = high - low
-    scaled = information(problem, found) * np.outer(width, width)
-    return np.asarray(np.linalg.pinv(scaled, rcond=1e-14, hermitian=True) * np.outer(width, width))
+    """Return the linearised covariance of z, shape (p, p); no direction is less sure than its bounds are wide."""
+    values, vectors, size = _directions(problem, found)
+    return np.asarray((vectors / np.maximum(values, 1.0)) @ vectors.T * size)
+
+
+def information_of_bounds(problem: Problem, found: Fit) -> Array:
+    """Return the information of z that bounds add to that of the recordings, shape (p, p)."""
+    values, vectors, size = _directions(problem, found)
+    return np.asarray((vectors * np.maximum(1.0 - values, 0.0)) @ vectors.T / size)
+
+
+def _directions(problem: Problem, found: Fit) -> tuple[Array, Array, Array]:
+    """Return the information of principal directions, these, and products of the ranges that they are scaled by."""
+    width = np.subtract(*reversed(problem.box))
+    size = np.outer(width, width)
+    return *np.linalg.eigh(information(problem, found) * size), size
+
+
+@dataclass(frozen=True, eq=False)
+class SmallSample:
+    """Corrections of what follows from few readings, as for a regression: RSS / (n - p), and Student's t.
+
+    Attributes:
+        variance: Factors on the variance of every parameter for the same 95 % of a normal distribution, shape (p,).
+        level: Rise of minus twice the likelihood at an end of each interval, shape (p,).
+        noise: Factors on the noise of every signal, for 95 % of further readings, shape (s,).
+    """
+
+    variance: Array
+    level: Array
+    noise: Array
+
+    @classmethod
+    def of(cls, problem: Problem, found: Fit, spread: Array) -> Self:
+        """Return the corrections at a minimum with a covariance by the likelihood alone.
+
+        Of several outputs each has what is left of its samples by the parameters that it tells (the trace of its part
+        of the information), and a parameter the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
+        """
+        groups, slopes = problem.groups, problem.slopes(found.z)
+        parts = np.zeros((int(groups.max()) + 1, *spread.shape))
+        count = np.zeros(len(parts))
+        for group, w, n, e, j in zip(groups, found.weights, found.noise, found.residuals, slopes, strict=True):
+            parts[group] += w / n**2 * j.T @ j
+            count[group] += w * len(e)
+        # Correlated samples may count for less than the parameters that they are to tell.
+        left = np.maximum(count - np.einsum("kl,glk->g", spread, parts), 1.0)
+        plain = np.einsum("kl,glm,mk->gk", spread, parts, spread)
+        grown = plain * (count / left)[:, None]
+        whole, corrected = np.maximum(plain.sum(axis=0), 1e-300), np.maximum(grown.sum(axis=0), 1e-300)
+        free = np.maximum(corrected**2 / np.maximum(np.sum(grown**2 / left[:, None], axis=0), 1e-300), 1.0)
+        factor, quantile = corrected / whole, student.ppf(0.975, free)
+        return cls(
+            factor * quantile**2 / LEVEL,
+            factor * free * np.log1p(quantile**2 / free),
+            (np.sqrt(count / left / LEVEL) * student.ppf(0.975, left))[groups],
+        )
 
 
 def profile(
@@ -60,7 +115,7 @@ def profile(
         spread: Covariance of z.
         loss: As for `fit`.
         inflation: Variance of the parameter over that by the likelihood (Pace, Salvan and Sartori, Statistica Sinica
-            21, 2011); rises of the path are divided by it.
+            21, 2011), and over that of few readings; rises of the path are divided by it.
     """
     low, high = problem.box
     limit = high[k] if way > 0 else low[k]
@@ -71,23 +126,27 @@ def profile(
     reach = min(room, max(math.sqrt(LEVEL) * deviation, 1e-6 * (high[k] - low[k])))
     inner, outer = (0.0, 0.0), (math.inf, math.inf)
     slopes: Sequence[Array] = problem.slopes(found.z)
-    there, end = found, math.inf * way
+    # The farthest place within the interval: refits start there, not from one beyond that may have failed.
+    within, end = found, math.inf * way
     for _ in range(_MOST if room > 1e-9 * (high[k] - low[k]) else 0):
         at = found.z[k] + way * reach
-        guess = np.clip(there.z + tilt * (at - there.z[k]), low, high)
-        same = {"weights": found.weights, "scale": found.noise}
-        there = fit(problem, guess, held={k: at}, loss=loss, slopes=slopes, **same)
-        slopes, rise = there.slopes or slopes, (there.objective - found.objective) / inflation
+        guess = np.clip(within.z + tilt * (at - within.z[k]), low, high)
+        refit = partial(fit, problem, held={k: at}, weights=found.weights, scale=found.noise, loss=loss)
+        there = refit(guess, slopes=slopes)
+        if not there.converged and math.isfinite(there.objective):
+            there = refit(there.z)
+        rise = (there.objective - found.objective) / inflation
         path.append((at, rise))
         if rise * inflation < -_BELOW:
             return ProfileBound(end, np.array(path), there)
         if rise >= LEVEL:
-            outer = (reach, math.sqrt(rise))
+            # A refit that has not come to its end tells that the end is before it, not how near.
+            outer = (reach, math.sqrt(rise) if there.converged else math.inf)
         else:
-            inner = (reach, math.sqrt(max(rise, 0.0)))
+            inner, within, slopes = (reach, math.sqrt(max(rise, 0.0))), there, there.slopes or slopes
             if reach >= room * (1.0 - 1e-12):
                 break
-        crossing, near = _crossing(inner, outer), abs(rise - LEVEL) < _NEAR * LEVEL
+        crossing, near = _crossing(inner, outer), there.converged and abs(rise - LEVEL) < _NEAR * LEVEL
         if near or math.isfinite(outer[0]):
             end = found.z[k] + way * min(crossing, room)
         if near:

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
+from scipy.stats import t as student
 
-from finger_pin.identification.estimate import Fit
+from finger_pin.identification.estimate import Fit, typical
+from finger_pin.identification.intervals import information_of_bounds
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording
 from finger_pin.typing import Array
@@ -52,7 +54,7 @@ def sandwich(problem: Problem, found: Fit, spread: Array) -> Array:
     """
     slopes = problem.slopes(found.z)
     scores = [w / n**2 * j for w, n, j in zip(found.weights, found.noise, slopes, strict=True)]
-    total, together = np.zeros_like(spread), set[int]()
+    total, together = information_of_bounds(problem, found), set[int]()
     for each in repeats(problem, found.residuals):
         if each.common == 0.0:
             continue
@@ -74,6 +76,20 @@ def sandwich(problem: Problem, found: Fit, spread: Array) -> Array:
         process = _process([found.residuals[k] for k in own if problem.signals[k].ordered])
         total += sum(found.noise[k] ** 2 * _correlated(scores[k], process) for k in own)
     return np.asarray(spread @ total @ spread)
+
+
+def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:
+    """Return residuals over the deviation that their median tells, by signal; zero of those that are no outliers.
+
+    An outlier is less probable than chance among so many, and alone outweighs all others as they mostly are.
+    """
+    found, groups = [], problem.groups
+    count = np.bincount(groups, [len(e) for e in residuals])[groups]
+    for e, n, deviation in zip(residuals, count, typical(problem, residuals), strict=True):
+        ratio = np.abs(e) / max(deviation, 1e-300)
+        chance = 2.0 * n * student.sf(ratio, max(n - len(problem.keys), 1.0))
+        found.append(np.where((chance < CHANCE) & (ratio**2 > n), ratio, 0.0))
+    return found
 
 
 def repeats(problem: Problem, residuals: Sequence[Array]) -> list[Repeats]:

@@ -12,7 +12,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.motions import RecordedMotion
 from finger_pin.identification.problem import Problem
-from finger_pin.identification.recordings import RecordedSignal, Recording, RecordingModel, unit_of
+from finger_pin.identification.recordings import RecordedSignal, Recording, RecordingModel, check_angles, unit_of
 from finger_pin.identification.scenario_parameters import with_own_values
 from finger_pin.identification.steady_data import SteadyReadings
 from finger_pin.mechanism.coerce import with_parameters_of
@@ -60,6 +60,7 @@ def recording_models(
         if not parts:
             continue
         own = with_own_values(scenario, recording.name, recording.settings)
+        check_angles(recording, own)
         replacing = None if finger is None else with_parameters_of(finger, scenario, own)
         if steady:
             models.append(SteadyReadings(recording, own, replacing))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -14,12 +14,12 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
-from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.identification.recordings import At, Recording, check_pulling
+from finger_pin.identification.recorded_inputs import check_references, put_inputs, with_corrected_inputs
+from finger_pin.identification.recordings import At, Recording
 from finger_pin.identification.scenario_parameters import NuisanceParameter, own_number
+from finger_pin.identification.starts import check_reachable, far_start, recorded_starts, starts_to_find
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import RunArrays, recorded
@@ -29,20 +29,6 @@ from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates
 from finger_pin.typing import Array
 
-# Where the inputs of a motion go in a scenario, by variable.
-_INPUTS = {
-    "tendon_command": ("controller", "tensions"),
-    "spool_angle": ("controller", "spool_angle"),
-    "tendon_winding": ("controller", "tendon_winding"),
-    "motor_voltage": ("controller", "motor_voltage"),
-    "actuator_input": ("controller", "inputs"),
-    "joint_reference": ("reference", "joints"),
-    "fingertip_force": ("environment", "fingertip_force_signal"),
-}
-# How far a start that is to be found may be from where it was recorded, rad.
-_NEAR = 0.3
-# Samples at a window's start that its position and velocity are read from.
-_FIRST = 9
 # Slopes are those of runs at so much larger tolerances, with errors of about 1e-2: a search needs no more, and at its
 # end residuals and slopes are nearly orthogonal.
 _SLOPES = 10.0
@@ -80,7 +66,7 @@ class RecordedMotion:
         self._times = recording.time[rows] - recording.time[rows[0]]
         self.own: tuple[NuisanceParameter, ...] = ()
         table = copy.deepcopy(scenario.model_dump(mode="python", exclude_unset=True, exclude_none=True))
-        self._put_inputs(table, scenario)
+        put_inputs(table, recording, scenario)
         first = float(recording.time[rows[0]])
         settings = {"duration": float(self._times[-1]), "sample_rate": 1.0 / float(self._times[-1])}
         table["simulation"] = {**table.get("simulation", {}), **settings}
@@ -88,8 +74,22 @@ class RecordedMotion:
         self._put_start(table, scenario, window)
         # The steps of an encoder would make the likelihood as rough as what ends an interval.
         self.scenario = with_exact_encoders(read_scenario(table))
+        check_references(recording, self.scenario)
         self._finger = finger
         self._factor = 1.0
+
+    def doubt(self, sought: Collection[str]) -> str:
+        """Return a sentence on a start far from where the recording begins, unless its columns' zeros are sought."""
+        starts = {} if self.recording.settings.start != "rest" else self._starts
+        prefix = f"recordings.{self.recording.name}."
+        starts = {joint: each for joint, each in starts.items() if f"{prefix}{each.column}.offset" not in sought}
+        if not starts:
+            return ""
+        loop = self._setup(self.scenario, {}).loop
+        position = loop.finger.layout.unpack(loop.initial_state()).position
+        return far_start(
+            self.recording, starts, dict(zip(loop.finger.routing.joints, position, strict=True)), self.scenario
+        )
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
@@ -109,7 +109,7 @@ class RecordedMotion:
         """
         here = at(values)
         factor = max(self._factor, _SLOPES)
-        computed, motion = self._made(*here, factor)
+        plain, motion = self._made(*here, factor)
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
         there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
@@ -119,58 +119,46 @@ class RecordedMotion:
         same = self._setup(*here)
         base, *near_by = nearby(motion[1], [same, *others.values()])
         near = dict(zip(feeling, near_by, strict=True))
-        computed = self._outputs(same, base, here[1])
-        ranges = [float(np.ptp(each)) for each in computed]
+        computed = plain if base.failure else self._outputs(same, base, here[1])
+        ranges = [float(np.ptp(each)) for each in plain]
 
         def column(k: int) -> list[Array]:
             if there[k] == here:
                 return [np.zeros(len(each)) for each in computed]
-            found = self._outputs(others.get(k, same), near.get(k, base), there[k][1])
-            slopes = [(f - c) / changes[k] for f, c in zip(found, computed, strict=True)]
-            wild = any(
-                not np.max(np.abs(each)) * float(sizes[k]) <= _WILD * size
-                for each, size in zip(slopes, ranges, strict=True)
-            )
-            if wild:
-                # Of a motion that hunts, what counts is the mean trend.
-                moved = values.copy()
-                moved[k] += np.sign(changes[k]) * _COARSE * float(sizes[k])
+            if not (base.failure or near.get(k, base).failure):
+                found = self._outputs(others.get(k, same), near.get(k, base), there[k][1])
+                slopes = [(f - c) / changes[k] for f, c in zip(found, computed, strict=True)]
+                pairs = zip(slopes, ranges, strict=True)
+                if all(np.max(np.abs(each)) * float(sizes[k]) <= _WILD * size for each, size in pairs):
+                    return slopes
+            # Of a motion that hunts what counts is the mean trend; one that sticks need not bear the steps of another.
+            change = np.where(np.arange(len(values)) == k, np.sign(changes[k]) * _COARSE * float(sizes[k]), 0.0)
+            for moved in (values + change, values - change):
                 # At the edge of what goes together there is no such change.
                 with suppress(InputError):
-                    found, _ = self._made(*at(moved), factor)
-                    slopes = [(f - c) / (moved[k] - values[k]) for f, c in zip(found, computed, strict=True)]
-            return [np.nan_to_num(each, nan=0.0) for each in slopes]
+                    found, other = self._made(*at(moved), factor)
+                    if other is not None:
+                        return [(f - c) / (moved[k] - values[k]) for f, c in zip(found, plain, strict=True)]
+            # Such a motion tells nothing of this number: its interval is that of its bounds.
+            return [np.zeros(len(each)) for each in computed]
 
         columns = in_threads(column, range(len(values)))
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
     def _with_own(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
         """Return a scenario with the starts of joints and the corrections of inputs that are being found."""
-        for name, values in self.recording.inputs.items():
-            numbers = [
-                own_number(own, self.recording.name, name, what, default)
-                for what, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
-            ]
-            if numbers == [1.0, 0.0, 0.0]:
-                continue
-            (section, group), label = _INPUTS[name.partition(".")[0]], name.partition(".")[2]
-            signals = dict(getattr(getattr(scenario, section), group) or {})
-            if label not in signals:
-                allowed = "has no scale, offset or delay to be found: it is of one finger of a hand"
-                raise InputError(f"{self._entry}.inputs.{name}", allowed)
-            corrected = numbers[0] * values + numbers[1]
-            if name.startswith("tendon_command."):
-                # A tendon only pulls: what a wrong zero takes below it is a slack one.
-                corrected = np.maximum(corrected, 0.0)
-            times = np.asarray(signals[label].times) - numbers[2]
-            signals[label] = signals[label].updated(times=Series(times), values=Series(corrected))
-            scenario = scenario.updated(**{section: {group: signals}})
-        starts = {key.rpartition(".")[2]: value for key, value in own.items() if key in {o.key for o in self.own}}
-        if not starts:
+        scenario = with_corrected_inputs(scenario, self.recording, own)
+        if self.recording.settings.start == "rest":
             return scenario
-        initial = scenario.simulation.initial
+        moved = {joint: each.corrected(self.recording.name, own) for joint, each in self._starts.items()}
+        starts = {joint: angle for joint, (angle, _) in moved.items()}
+        starts |= {joint: own[each.key] for joint, each in zip(starts, self.own, strict=False) if each.key in own}
+        speeds, initial = {joint: speed for joint, (_, speed) in moved.items()}, scenario.simulation.initial
         assert initial is not None
-        return scenario.updated(simulation={"initial": {"position": {**initial.position, **starts}}})
+        if starts.items() <= initial.position.items() and speeds.items() <= initial.velocity.items():
+            return scenario
+        changed = {"position": {**initial.position, **starts}, "velocity": {**initial.velocity, **speeds}}
+        return scenario.updated(simulation={"initial": changed})
 
     def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
         moved = self._with_own(scenario, own)
@@ -221,70 +209,20 @@ class RecordedMotion:
             values = np.take(values, labels.index(label), axis=axis)
         return values
 
-    def _put_inputs(self, table: dict[str, Any], scenario: Scenario) -> None:
-        for name, values in self.recording.inputs.items():
-            variable, _, label = name.partition(".")
-            if variable not in _INPUTS:
-                raise InputError(f"{self._entry}.inputs.{name}", f"a motion is given {', '.join(_INPUTS)}")
-            section, group = _INPUTS[variable]
-            entries = table.setdefault(section, {})
-            if variable == "tendon_command" and entries.get("kind") != "tensions":
-                kept = {key: entries[key] for key in ("minimum_tension", "inputs", *WINDINGS) if key in entries}
-                entries = table[section] = {"kind": "tensions", **kept}
-            if variable == "tendon_command":
-                check_pulling(f"{self._entry}.inputs.{name}", values)
-                values = np.maximum(values, 0.0)
-            delay = self.recording.settings.inputs[name].delay
-            times = (self.recording.time - delay + scenario.simulation.start_time).tolist()
-            samples = {"kind": "samples", "times": times, "values": values.tolist()}
-            finger, dot, own = label.partition(".")
-            into = entries.setdefault(group, {})
-            if variable in ("spool_angle", "motor_voltage"):
-                # What the scenario itself tells that motor is not what was recorded.
-                for other in WINDINGS:
-                    if other != group:
-                        entries.get(other, {}).pop(label, None)
-            if dot:
-                into.setdefault(finger, {})[own] = samples
-            else:
-                into[label] = samples
-        given = table.get("controller", {})
-        if given.get("kind") == "tensions" and {*scenario.finger.actuated_names} <= {*given.get("tensions", {})}:
-            # No tendon is left for it.
-            given.pop("minimum_tension", None)
-
     def _put_start(self, table: dict[str, Any], scenario: Scenario, window: int) -> None:
-        kind = self.recording.settings.start
+        kind, entry = self.recording.settings.start, f"{self._entry}.start"
+        self._starts = recorded_starts(self.recording, self.rows, scenario.finger.joints)
         if kind == "rest":
             return
-        positions, velocities = {}, {}
-        for name, values in self.recording.outputs.items():
-            variable, _, joint = name.partition(".")
-            if variable == "joint_position" and joint in scenario.finger.joints:
-                there = self.rows[:_FIRST][np.isfinite(values[self.rows[:_FIRST]])]
-                if not len(there):
-                    continue
-                degree = 1 if len(there) > 3 else 0
-                line = np.polyfit(self.recording.time[there] - self.recording.time[self.rows[0]], values[there], degree)
-                positions[joint], velocities[joint] = float(line[-1]), float(line[0]) if degree else 0.0
-        if not positions:
-            raise InputError(f"{self._entry}.start", "needs joint_position among the outputs", kind)
-        for joint, angle in positions.items():
-            low, high = scenario.finger.joints[joint].range
-            if not low - 0.2 <= angle <= high + 0.2:
-                allowed = (
-                    f"cannot be reached: {joint} begins at {angle:.3g} rad, and its range is {low:.3g} to {high:.3g}"
-                )
-                raise InputError(f"{self._entry}.start", allowed)
+        if not self._starts:
+            raise InputError(entry, "needs joint_position among the outputs", kind)
+        starts = {joint: each.corrected(self.recording.name, {}) for joint, each in self._starts.items()}
+        check_reachable(entry, starts, scenario)
         initial = table["simulation"].setdefault("initial", {})
-        initial["position"] = {**initial.get("position", {}), **positions}
-        initial["velocity"] = {**initial.get("velocity", {}), **velocities}
+        for k, name in enumerate(("position", "velocity")):
+            initial[name] = {**initial.get(name, {}), **{joint: start[k] for joint, start in starts.items()}}
         if kind == "found":
-            prefix = f"recordings.{self.recording.name}.start.{window}"
-            self.own = tuple(
-                NuisanceParameter(f"{prefix}.{joint}", angle - _NEAR, angle + _NEAR, angle)
-                for joint, angle in positions.items()
-            )
+            self.own = starts_to_find(self.recording.name, window, starts)
 
 
 def _tuned(scenario: Scenario, factor: float) -> Scenario:

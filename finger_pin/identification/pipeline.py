@@ -17,7 +17,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.identification.checkpoint import Checkpoint
 from finger_pin.identification.comparison import LawComparison, compare_laws
 from finger_pin.identification.estimate import Fit, best_of, fit
-from finger_pin.identification.intervals import LEVEL, ProfileBound, covariance, profile
+from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, profile
 from finger_pin.identification.misfit import sandwich
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.identification.scenario_parameters import entry_of
@@ -145,18 +145,23 @@ class FitPipeline:
             if _met(self.problem, self.best.residuals) > _met(self.problem, best.residuals) - _DEEPER:
                 return
 
-    def _settle(self, place: Fit) -> tuple[Problem, Fit, Array]:
-        """Return the problem computed finely, the minimum near a place, and its covariance by the likelihood alone."""
+    def _settle(self, place: Fit) -> tuple[Problem, Fit, Array, Array]:
+        """Return the problem computed finely, the minimum near a place, its covariance by the likelihood, inflations.
+
+        These are, by parameter, how much more than 3.841 the likelihood rises at the ends of its interval.
+        """
         fine, number = self.problem.fine(), self.fits.index(self.best)
         best = self.fits[number] = self.middle = fit(fine, place.z, loss=self.loss, slopes=place.slopes)
         naive = covariance(fine, best)
-        self.spread = sandwich(fine, best, naive)
+        few, spread = SmallSample.of(fine, best, naive), sandwich(fine, best, naive)
+        inflations = np.diag(spread) / np.diag(naive) * few.level / LEVEL
+        self.spread = spread * np.sqrt(np.outer(few.variance, few.variance))
         self.problem.join(fine)
-        return fine, best, naive
+        return fine, best, naive, inflations
 
     def linearise(self, place: Fit) -> None:
         """Compute intervals from slopes alone; a side that they take beyond the bounds is open."""
-        fine, best, _ = self._settle(place)
+        fine, best, *_ = self._settle(place)
         low, high = fine.box
         assert self.spread is not None
         for k, way in itertools.product(range(self.problem.asked), (-1, 1)):
@@ -166,15 +171,12 @@ class FitPipeline:
 
     def profile_all(self, place: Fit, turn: int = 0) -> None:
         """Compute all profiles; restart from a lower minimum if one is found."""
-        fine, best, naive = self._settle(place)
-        assert self.spread is not None
-        plain = np.diag(naive)
-        inflation = np.where(plain > 0.0, np.diag(self.spread) / np.maximum(plain, 1e-300), 1.0)
+        fine, best, naive, inflations = self._settle(place)
         ends = [(k, way) for k in range(self.problem.asked) for way in (-1, 1)]
 
         def one(item: tuple[int, Problem]) -> Fit | None:
             (k, way), twin = ends[item[0]], item[1]
-            work = partial(profile, twin, best, k, way, naive, self.loss, float(inflation[k]))
+            work = partial(profile, twin, best, k, way, naive, self.loss, float(inflations[k]))
             side = self.ledger.side(f"side {k} {way} {turn}", work)
             if side.better is None:
                 self.sides[k, way] = side

@@ -145,9 +145,9 @@ def _problem(
     models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
 
     def acts(key: str) -> bool:
-        name = bare(key).rpartition(".")[0]
-        of_scenario = bare(key).partition(".")[0] in Scenario.model_fields
-        return owner(key) is None or (owner(key) == recording.name and (of_scenario or name in recording.outputs))
+        of_column = bare(key).rpartition(".")[0] in {*recording.inputs, *recording.outputs}
+        acting = bare(key).partition(".")[0] in Scenario.model_fields or of_column
+        return owner(key) is None or (owner(key) == recording.name and acting)
 
     kept = [k for k, key in enumerate(result["parameter"].values) if acts(str(key))]
     estimate, upper, low, high = (
@@ -167,8 +167,9 @@ def _problem(
 
 
 def _noise(result: xr.Dataset, recording: str, name: str) -> float:
-    """Return the noise of a fitted signal: that of the same recording, else the rms of those of the same name."""
-    noise = {str(key): float(each) for key, each in zip(result["signal"].values, result["noise"].values, strict=True)}
+    """Return the deviation of a fitted signal: of the same recording, else the rms of those of the same name."""
+    values = zip(result["signal"].values, result["noise_deviation"].values, strict=True)
+    noise = {str(key): float(each) for key, each in values}
     own = noise.get(f"{recording}.{name}")
     alike = [each for key, each in noise.items() if key.partition(".")[2] == name]
     if own is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -42,6 +42,8 @@ VARIABLES = {
     "spool_angle": "rad",
     "tendon_winding": "m",
 }
+#: How far a recorded angle may be beyond a joint's range, rad.
+BEYOND = 0.2
 # By how much of its greatest reading a load cell of a slack cord may err.
 _WRONG_ZERO = 0.1
 
@@ -84,6 +86,7 @@ class Recording:
         outputs: By variable.label, shape (m,); not a number where nothing was measured.
         time: Of a motion, shape (m,), s, from zero.
         speed: Of steady readings, shape (m,), m/s.
+        in_si: Names of inputs and outputs that are read as SI because nothing names their unit.
     """
 
     name: str
@@ -92,6 +95,7 @@ class Recording:
     outputs: dict[str, Array]
     time: Array
     speed: Array
+    in_si: frozenset[str] = frozenset()
 
     def repeats(self, other: Recording) -> bool:
         """Return whether this is a motion like another one, with equal times, inputs, values and start."""
@@ -120,6 +124,9 @@ class RecordingModel(Protocol):
     @property
     def own(self) -> tuple[NuisanceParameter, ...]:
         """The numbers to be found for it alone."""
+
+    def doubt(self, sought: Collection[str]) -> str:
+        """Return a sentence on what is doubtful of it where keys are sought; empty if nothing is."""
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
@@ -181,7 +188,28 @@ def read_recording(
         {key: _signal(table, f"outputs.{key}", given) for key, given in settings.outputs.items()},
         time,
         speed,
+        frozenset(key for key, given in {**settings.inputs, **settings.outputs}.items() if not table.names_unit(given)),
     )
+
+
+def check_angles(recording: Recording, scenario: Scenario) -> None:
+    """Ask about angles of joints without a unit that are beyond the joint's range as radians, and not as degrees.
+
+    Raises:
+        InputError: Naming the column and its farthest angle.
+    """
+    for group, columns in (("inputs", recording.inputs), ("outputs", recording.outputs)):
+        for name in recording.in_si.intersection(columns):
+            variable, _, joint = name.partition(".")
+            if variable not in ("joint_position", "joint_reference") or joint not in scenario.finger.joints:
+                continue
+            low, high = scenario.finger.joints[joint].range
+            beyond = np.maximum(low - columns[name], columns[name] - high)
+            if np.nanmax(beyond, initial=0.0) > BEYOND and scenario.finger.joints[joint].limited:
+                farthest = float(columns[name][np.nanargmax(beyond)])
+                allowed = f"is beyond the range of {joint}, {low:.3g} to {high:.3g} rad (is it in degrees?); write"
+                hint = 'unit = "deg", or unit = "rad" if it is not'
+                raise InputError(f"identify.recordings.{recording.name}.{group}.{name}", f"{allowed} {hint}", farthest)
 
 
 def _signal(table: Table, key: str, given: Column) -> Array:

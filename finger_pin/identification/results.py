@@ -19,8 +19,8 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
 from finger_pin.identification.comparison import LawComparison
 from finger_pin.identification.estimate import Fit
-from finger_pin.identification.intervals import LEVEL, ProfileBound, free_directions
-from finger_pin.identification.misfit import repeats
+from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, free_directions
+from finger_pin.identification.misfit import outliers, repeats
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.identification.scenario_parameters import bare, owner
 from finger_pin.simulation.netcdf import save
@@ -42,7 +42,7 @@ def results(
     free = free_directions(problem, best) if spread is not None else []
     variables: dict[str, Any] = {
         **_estimates(problem, best, sides, spread, [k for _, shown in free for k in shown if k < count]),
-        **_signals(problem, best),
+        **_signals(problem, best, None if spread is None else covariance(problem, best)),
         "start_objective": ("start", [each.objective for each in fits], {"units": "1"}),
         "start_estimate": (("start", "parameter"), [problem.values(each.z)[:count] for each in fits]),
     }
@@ -139,8 +139,9 @@ def _units(problem: Problem, key: str) -> str:
     return {"offset": unit, "delay": "s"}.get(key.rpartition(".")[2], "1")
 
 
-def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
+def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]:
     signals, groups = problem.signals, problem.groups
+    grown = np.ones(len(signals)) if naive is None else SmallSample.of(problem, best, naive).noise
     # The first of every output's windows stands for what they share.
     first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
     known = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}
@@ -150,6 +151,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
         "applied": np.concatenate([s.load for s in signals]),
         "measured": np.concatenate([s.measured for s in signals]),
         "residual": np.concatenate(best.residuals),
+        "outlier": np.concatenate(outliers(problem, best.residuals)),
     }
     names = {
         "signal_index": "which signal",
@@ -157,11 +159,17 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
         "applied": "what pulls, N",
         "measured": "measured, in the unit of the signal",
         "residual": "measured less computed, in the unit of the signal",
+        "outlier": "residual over the deviation that the median of all tells; zero of those that are no outliers",
     }
     return {
         "signal_units": ("signal", [signals[k].unit for k in first]),
         "signal_steady": ("signal", [not signals[k].ordered for k in first]),
         "noise": ("signal", best.noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
+        "noise_deviation": (
+            "signal",
+            (best.noise * grown)[first],
+            {"long_name": "deviation of further readings, of which 95 % are within 1.96 of it"},
+        ),
         "replicate_noise": (
             "signal",
             [math.sqrt(known[k].scatter) if k in known else math.nan for k in range(len(first))],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -117,6 +117,10 @@ class SteadyReadings:
             (right, up), (left, down) = ends
             columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
+
+    def doubt(self, sought: Collection[str]) -> str:
+        """Return nothing: readings have no start."""
+        return ""
 
     def tune(self, factor: float) -> None:
         """Do nothing: a closed form has no errors."""

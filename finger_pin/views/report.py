@@ -28,7 +28,7 @@ def summarize_identification(result: xr.Dataset) -> str:
     for name, noise, count, independent, unit in _signals(result):
         rows.append((name, noise, count, f"{independent} free", unit))
     width = max(len(row[0]) for row in rows)
-    doubt = [] if _borne_out(result) else [_agreement(result), ""]
+    doubt = [line for each in _doubts(result) for line in (each, "")]
     lines = [f"  {a.ljust(width)}{b.rjust(13)}{c.rjust(13)}{d.rjust(13)}  {e}".rstrip() for a, b, c, d, e in rows]
     predicted = _predictions(result)
     return "\n".join([*predicted, *([""] if predicted else []), *doubt, *lines, "", *_words(result)])
@@ -39,7 +39,7 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
     sections = [
         (
             "What was found",
-            ("" if _borne_out(result) else f"<p class='doubt'><strong>{escape(_agreement(result))}</strong></p>")
+            "".join(f"<p class='doubt'><strong>{escape(each)}</strong></p>" for each in _doubts(result))
             + _found(result)
             + image(plot_profiles(result), "Profiles")
             + f"<p class='soft'>{_PROFILES}</p>",
@@ -82,6 +82,38 @@ def _signals(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
         (str(name), f"{noise:.3g}", str(count), f"{share * count:.0f}", str(unit))
         for name, noise, count, share, unit in zip(*(result[each].values for each in columns), strict=True)
     ]
+
+
+def _doubts(result: xr.Dataset) -> list[str]:
+    """Return sentences on why not to trust any number: signals that are not met, searches that do not agree."""
+    found = []
+    for k, (name, *_, unit) in enumerate(_signals(result)):
+        own = result["signal_index"].values == k
+        left, whole = (result[each].values[own] for each in ("residual", "measured"))
+        rms, varies = float(np.sqrt(np.mean(left**2))), float(np.std(whole))
+        # A constant would leave as much as the signal varies by; half of its square and more is no fit.
+        if rms**2 > 0.5 * varies**2:
+            found.append(
+                f"This is no fit of {name}: what is left over is {rms:.3g} {unit} rms, and the signal itself varies "
+                f"by {varies:.3g} {unit}. Look at units, signs and columns."
+            )
+    return found if _borne_out(result) else [*found, _agreement(result)]
+
+
+def _outliers(result: xr.Dataset) -> list[str]:
+    """Return a sentence on the samples of every signal that alone weigh more than all others mostly do."""
+    words = []
+    for k, (name, *_) in enumerate(_signals(result)):
+        sizes = np.where(result["signal_index"].values == k, result["outlier"].values, 0.0)
+        count, worst = int(np.count_nonzero(sizes)), int(np.argmax(sizes))
+        if count:
+            instant = float(result["instant"].values[worst])
+            at = f"row {instant + 1.0:.0f}" if bool(result["signal_steady"].values[k]) else f"{instant:.6g} s"
+            words.append(
+                f"{name} has {count} outlier{'s' if count > 1 else ''}, the worst at {at}, {sizes[worst]:.3g} times as "
+                "far from the law as others mostly are. Leave out what is a fault; with --robust it counts less."
+            )
+    return words
 
 
 def _predictions(result: xr.Dataset) -> list[str]:
@@ -129,7 +161,7 @@ def _words(result: xr.Dataset) -> list[str]:
         )
     if not result.attrs.get("profiles", 1):
         words.append("The intervals are those of slopes at the estimate: where they are wide, profiles are surer.")
-    words += _misses(result)
+    words += _outliers(result) + _misses(result)
     if "law" in result.dims:
         order = np.argsort(result["law_bic"].values)
         first, *others = (str(result["law"].values[k]) for k in order)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 import finger_pin as fp
 from finger_pin.commands.application import run
@@ -50,28 +51,33 @@ def test_sixty_real_readings_give_the_published_friction_and_reject_the_capstan_
     assert result.determined.all() and not result.attrs["undetermined"]
 
 
-def test_intervals_are_those_of_linear_regression_where_the_law_is_a_line():
-    """A line's offset and slope have intervals in closed form; the profile has chi-squared in place of Student's t."""
-    data = readings(np.random.default_rng(3))
+def regression(data):
+    """Slope of a line through readings, and how far the ends of its 95 % interval are from it (Student)."""
+    count = len(data["in"])
+    design = np.stack([data["in"], np.ones(count)], axis=1)
+    (slope, _), rest, *_ = np.linalg.lstsq(design, data["out"], rcond=None)
+    deviation = np.sqrt(np.linalg.inv(design.T @ design)[0, 0] * rest[0] / (count - 2))
+    return slope, student.ppf(0.975, count - 2) * deviation
+
+
+@pytest.mark.parametrize("repeats", [1, 6])
+def test_intervals_are_those_of_linear_regression_where_the_law_is_a_line(repeats):
+    """A line's slope has an interval in closed form, for five readings as for thirty."""
+    data = readings(np.random.default_rng(3), repeats=repeats)
     result = found(data)
-    design = np.stack([data["in"], np.ones(30)], axis=1)
-    slope = np.linalg.lstsq(design, data["out"], rcond=None)[0][0]
-    rest = data["out"] - design @ np.linalg.lstsq(design, data["out"], rcond=None)[0]
-    # The rise 30 log(SSE / SSE*) of a line is 30 log(1 + t^2 / SSE*) with t in units of the slope's own scale.
-    scale = np.sqrt(np.linalg.inv(design.T @ design)[0, 0] * (rest @ rest) * np.expm1(3.841 / 30))
-    ends = -np.log(slope + np.array([scale, -scale])) / 2.5
+    slope, half = regression(data)
+    ends = -np.log(slope + np.array([half, -half])) / 2.5
     np.testing.assert_allclose([result.lower[0], result.upper[0]], ends, rtol=2e-3)
 
 
-def test_intervals_without_profiles_are_those_of_the_variance_of_a_regression():
-    """Of a line's slope s = exp(-mu phi), with mu sought as its logarithm: mu exp(-+1.96 sd(s) / (s phi mu))."""
-    data = readings(np.random.default_rng(3))
+@pytest.mark.parametrize("repeats", [1, 6])
+def test_intervals_without_profiles_are_those_of_the_variance_of_a_regression(repeats):
+    """Of a line's slope s = exp(-mu phi), with mu sought as its logarithm: mu exp(-+t sd(s) / (s phi mu))."""
+    data = readings(np.random.default_rng(3), repeats=repeats)
     result = found(data, profiles=False)
-    design = np.stack([data["in"], np.ones(30)], axis=1)
-    (slope, _), rest, *_ = np.linalg.lstsq(design, data["out"], rcond=None)
-    deviation = np.sqrt(np.linalg.inv(design.T @ design)[0, 0] * rest[0] / 30)
+    slope, half = regression(data)
     estimate = -np.log(slope) / 2.5
-    ends = estimate * np.exp(np.array([-1.96, 1.96]) * deviation / (slope * 2.5 * estimate))
+    ends = estimate * np.exp(np.array([-half, half]) / (slope * 2.5 * estimate))
     np.testing.assert_allclose([result.lower[0], result.upper[0]], ends, rtol=2e-3)
     assert "those of slopes at the estimate" in summarize_identification(result)
 
@@ -155,8 +161,29 @@ def test_outliers_count_less_under_a_loss_that_is_robust(loss):
     spoilt = {**clean, "out": clean["out"] + np.where(np.arange(30) % 7 == 0, 1.0, 0.0)}
     expected, plain, robust = found(clean), found(spoilt), found(spoilt, loss=loss)
     away = [np.abs(each.estimate.values - expected.estimate.values) for each in (plain, robust)]
-    assert away[1][1] < 0.7 * away[0][1]
-    assert robust.lower[0] <= robust.estimate[0] <= robust.upper[0] < plain.upper[0] + 0.01
+    assert away[1][1] < 0.5 * away[0][1]
+    assert robust.lower[0] <= robust.estimate[0] <= robust.upper[0] < plain.upper[0]
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1"])
+def test_a_reading_that_is_far_from_all_others_is_named_and_alters_no_robust_fit(loss):
+    clean = readings(np.random.default_rng(9))
+    assert "outlier" not in summarize_identification(found(clean, loss=loss))
+    spoilt = {**clean, "out": clean["out"] + np.where(np.arange(30) == 17, 1400.0, 0.0)}
+    robust = found(spoilt, loss=loss)
+    assert "tendon_tension.T1 has 1 outlier, the worst at row 18, " in summarize_identification(robust)
+    if loss != "linear":
+        expected = found(clean)
+        width = (expected.upper - expected.lower).values
+        assert np.all(np.abs(robust.estimate - expected.estimate).values < 0.5 * width)
+        assert np.all((robust.upper - robust.lower).values < 2.0 * width)
+
+
+def test_a_fit_that_meets_a_signal_no_better_than_a_constant_is_said_to_be_none():
+    data = readings(np.random.default_rng(2))
+    assert "no fit" not in summarize_identification(found(data))
+    told = summarize_identification(found({**data, "out": data["out"][::-1]}))
+    assert told.startswith("This is no fit of pull.tendon_tension.T1: what is left over is ")
 
 
 def test_a_loss_that_is_none_is_refused():

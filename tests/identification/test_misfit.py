@@ -26,6 +26,7 @@ def stub(residual, slopes, *, ordered=True, alike=None, weight=1.0):
         models=[SimpleNamespace(recording=recording)],
         groups=np.zeros(1, dtype=int),
         keys=("a",) * slopes.shape[1],
+        box=(np.full(slopes.shape[1], -1e6), np.full(slopes.shape[1], 1e6)),
         slopes=lambda z: [slopes],
     )
     noise = np.full(1, np.sqrt(np.mean(residual**2)))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 import finger_pin as fp
 from finger_pin.views.report import summarize_identification, write_report
@@ -47,9 +48,9 @@ def test_readings_that_are_held_out_are_predicted_with_a_band_by_noise_and_covar
     # A line through the origin: share = exp(-mu phi), its variance noise^2 / sum(load^2).
     share = fitted["in"] @ fitted["out"] / (fitted["in"] @ fitted["in"])
     np.testing.assert_allclose(result.estimate, [-np.log(share) / TURN], rtol=1e-5)
-    noise = np.sqrt(np.mean((fitted["out"] - share * fitted["in"]) ** 2))
+    noise = np.sqrt(np.sum((fitted["out"] - share * fitted["in"]) ** 2) / 11)
     off = other["out"] - share * other["in"]
-    band = 1.96 * noise * np.sqrt(1.0 + other["in"] ** 2 / (fitted["in"] @ fitted["in"]))
+    band = student.ppf(0.975, 11) * noise * np.sqrt(1.0 + other["in"] ** 2 / (fitted["in"] @ fitted["in"]))
     means = other["out"].reshape(3, 40)
     scatter = np.sqrt(np.sum((means - means.mean(axis=1, keepdims=True)) ** 2) / 117)
     expected = {"rms": np.sqrt(np.mean(off**2)), "bias": off.mean(), "within": np.mean(np.abs(off) <= band)}
@@ -98,6 +99,29 @@ def test_what_was_found_for_one_recording_counts_where_that_is_predicted():
     by_name = [fp.predict(result, {name: steady()}, data={name: later}).predicted_value for name in ("day", "new")]
     np.testing.assert_allclose(by_name[0] - by_name[1], float(result.estimate[1]), rtol=1e-9)
     assert float(result.estimate[1]) == pytest.approx(0.5, abs=0.1)
+
+
+def test_the_zero_of_what_pulls_counts_where_the_same_readings_are_predicted():
+    """The load cell tells 0.6 N too much of the pull; what was fitted and what is predicted of it are the same."""
+    data = table(7, [3.0, 6.0, 9.0])
+    data["in"] = data["in"] + 0.6
+    own = steady(parameters={"tendon_command.T1.offset": (-1.0, 1.0)})
+    result = found({"day": own}, {"day": data})
+    again = fp.predict(result, {"day": steady()}, data={"day": data})
+    np.testing.assert_allclose(again.predicted_measured - again.predicted_value, result.residual.values, atol=1e-12)
+
+
+def test_a_prediction_has_a_band_though_two_numbers_are_tied():
+    """Of coefficient and turn only the product is told, by a line through the origin, and predictions need no more."""
+    data, later = table(9, [3.0, 6.0, 9.0]), {"in": np.array([5.0, 20.0]), "out": np.array([4.0, 16.0])}
+    tied = {COULOMB: (0.01, 1.0), "finger.tendons.T1.curvature_offset": (0.1, 6.0)}
+    result = found({"day": steady()}, {"day": data}, parameters=tied)
+    share = data["in"] @ data["out"] / (data["in"] @ data["in"])
+    noise = np.sqrt(np.sum((data["out"] - share * data["in"]) ** 2) / 11)
+    band = student.ppf(0.975, 11) * noise * np.sqrt(1.0 + later["in"] ** 2 / (data["in"] @ data["in"]))
+    bands = fp.predict(result, {"new": steady()}, data={"new": later}).predicted_band
+    np.testing.assert_allclose(bands, band, rtol=1e-3)
+    assert not result.determined.any()
 
 
 @pytest.mark.parametrize(

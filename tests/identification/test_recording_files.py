@@ -28,6 +28,8 @@ GOOD = "in,out\n3,2.1\n6,4.4\n9,6.9\n12,9.3\n"
         ('in,out\n"3,0","2,1"\n"6,0","4,4"\n', '"3,0": column in has no number in row 1'),
         (GOOD.replace("3,", "-3,"), "a tendon only pulls"),
         (GOOD.replace("out", "in"), "must name every column, each once"),
+        (GOOD.replace("in,", "in [kg],"), "column in [kg] is in kg, which is no unit known here; write unit"),
+        (GOOD.replace("out", "out (Newton)"), "column out (Newton) is in Newton, which is no unit known here"),
         (GOOD.replace("out", "out (mm)"), "is a unit of what is in m, and this is in N"),
         (GOOD + "1\n", "row 5 has 1 values, the header names 2"),
         ("", "must have a header"),

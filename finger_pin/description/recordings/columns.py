@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,37 +14,13 @@ from pydantic import Field, model_validator
 
 from finger_pin.description.recordings.bench import Column
 from finger_pin.description.recordings.series import Series
-from finger_pin.description.validation import Description, nearest, suggestion, validate
+from finger_pin.description.recordings.units import APPENDED, BRACKETED, check_header, in_si, split_unit
+from finger_pin.description.validation import Description, suggestion, validate
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand, read_text
 
-_POUND, _GRAVITY = 0.45359237, 9.80665
-#: By SI unit, the units that a column may have and what one of each is.
-UNITS: dict[str, dict[str, float]] = {
-    "N": {
-        "N": 1.0,
-        "mN": 1e-3,
-        "cN": 1e-2,
-        "kN": 1e3,
-        "gf": 1e-3 * _GRAVITY,
-        "kgf": _GRAVITY,
-        "lbf": _POUND * _GRAVITY,
-    },
-    "N m": {"N m": 1.0, "N mm": 1e-3, "mN m": 1e-3, "N cm": 1e-2, "kgf cm": 1e-2 * _GRAVITY},
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
-    "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "rev": 2.0 * math.pi},
-    "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0},
-    "A": {"A": 1.0, "mA": 1e-3},
-    "V": {"V": 1.0, "mV": 1e-3},
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
-}
-
 # What stands in a cell, besides nothing, where nothing was measured.
 _MISSING = ("na", "n/a", "null", "none", "-")
-# A name in a header with its unit: in brackets, or of signals after an underscore as well.
-_BRACKETED = re.compile(r"(.+?)\s*[(\[]\s*(.+?)\s*[)\]]")
-_APPENDED = re.compile(r"(.+)_(s|ms|us|rad|mrad|deg|mN|gf|kgf)")
 _TIMES = ("time", "t")
 # Rows that are so far apart on average, s, over so long a time are asked about.
 _FAR_APART, _LONG = 1.0, 60.0
@@ -78,7 +53,7 @@ class Table:
         if len({values.shape for values in self._columns.values()}) != 1:
             raise InputError(entry, "all columns must have as many rows")
         self.rows = len(next(iter(self._columns.values())))
-        split = [(name, *_split(name, _BRACKETED)) for name in self._columns]
+        split = [(name, *split_unit(name, BRACKETED)) for name in self._columns]
         bare = [each[1] for each in split]
         self._headers = {short: (name, unit) for name, short, unit in split if bare.count(short) == 1}
         self._headers |= {name: (name, unit) for name, _, unit in split}
@@ -105,6 +80,8 @@ class Table:
             row = next(k for k, cell in enumerate(cells) if isinstance(cell, str))
             raise InputError(entry, f"column {name} has no number in row {row + 1}", cells[row])
         unit = given.unit or header_unit
+        if given.unit is None:
+            check_header(entry, name, header_unit, si, asked=given.scale == 1.0)
         factor = 1.0 if unit is None else in_si(f"{entry}.unit" if given.unit else entry, unit, si)
         if given.unit is None and factor != 1.0 and given.scale != 1.0:
             raise InputError(entry, f"has a scale, and its header a unit; write unit too, such as {unit}", given.scale)
@@ -118,6 +95,10 @@ class Table:
             values = values * self.column(f"{key}.supply", Column(column=given.supply), "V")
         values = values + given.offset
         return values
+
+    def names_unit(self, given: Column) -> bool:
+        """Return whether a column that is there has a unit or a scale, in its header or beside its name."""
+        return given.unit is not None or given.scale != 1.0 or self._headers[given.column][1] is not None
 
     def times(self, key: str, given: Column) -> NDArray[np.float64]:
         """Return a column of times, s, shape (m,).
@@ -146,7 +127,7 @@ class Table:
         Raises:
             InputError: If no column is named as times are.
         """
-        found = [(name, *_split(name, _BRACKETED, _APPENDED)) for name in self._columns]
+        found = [(name, *split_unit(name, BRACKETED, APPENDED)) for name in self._columns]
         named = [(short, Column(column=name, unit=unit)) for name, short, unit in found]
         time = file.time or next((column for short, column in named if short.casefold() in _TIMES), None)
         if time is None:
@@ -248,14 +229,6 @@ def chosen_rows(entry: str, columns: Mapping[str, Any], rows: Mapping[str, float
     return {name: [cells[k] for k in np.flatnonzero(chosen)] for name, cells in columns.items()}
 
 
-def _split(name: str, *patterns: re.Pattern[str]) -> tuple[str, str | None]:
-    """Return a name without its unit, and the unit if it is known."""
-    for found in filter(None, (pattern.fullmatch(name) for pattern in patterns)):
-        if any(found[2] in units for units in UNITS.values()):
-            return found[1], found[2]
-    return name, None
-
-
 def _cell(cell: str) -> float | str:
     """Return the number in a cell, NaN for an empty one; a word as it stands."""
     try:
@@ -268,18 +241,3 @@ def _as_array(values: Any) -> NDArray[Any]:
     """Return a column as an array, of objects if it has words."""
     words = not isinstance(values, np.ndarray) and any(isinstance(each, str) for each in values)
     return np.array(list(values), dtype=object) if words else np.asarray(values, dtype=float)
-
-
-def in_si(entry: str, unit: str, wanted: str) -> float:
-    """Return the factor from a unit to SI; of a quantity whose SI unit is not known, any unit will do.
-
-    Raises:
-        InputError: If it is no unit of that; ``entry`` says where it stands.
-    """
-    fitting = UNITS.get(wanted) or {unit: factor for units in UNITS.values() for unit, factor in units.items()}
-    if unit in fitting:
-        return fitting[unit]
-    near = nearest(unit, fitting)
-    other = [si for si, units in UNITS.items() if unit in units]
-    what = f"is a unit of what is in {other[0]}, and this is in {wanted}" if other else f"must be {', '.join(fitting)}"
-    raise InputError(entry, what + (f"; did you mean {near}?" if near and not other else ""), unit)

@@ -1,0 +1,100 @@
+"""Where a recorded motion starts: angles and speeds that its columns begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.identification.recordings import BEYOND, Recording
+from finger_pin.identification.scenario_parameters import NuisanceParameter, own_number
+
+# How far a start that is to be found may be from where it was recorded, rad.
+_NEAR = 0.3
+# Samples at a window's start that its position and velocity are read from.
+_FIRST = 9
+# From which part of a joint's range on a start is far from where the recording begins.
+_FAR = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedStart:
+    """Line through the first samples of a joint's column.
+
+    Attributes:
+        column: Its name.
+        angle: At the first sample, rad.
+        speed: rad/s.
+        delay: Known delay of the column, s.
+    """
+
+    column: str
+    angle: float
+    speed: float
+    delay: float
+
+    def corrected(self, recording: str, own: Mapping[str, float]) -> tuple[float, float]:
+        """Return angle, rad, and speed, rad/s, of the joint with a scale, offset and delay that are being found."""
+        scale, offset, delay = (
+            own_number(own, recording, self.column, what, default)
+            for what, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
+        )
+        return (self.angle + self.speed * (self.delay + delay) - offset) / scale, self.speed / scale
+
+
+def recorded_starts(recording: Recording, rows: NDArray[np.intp], joints: Collection[str]) -> dict[str, RecordedStart]:
+    """Return where rows of a recording begin, by joint; of joints that are not read there, nothing."""
+    found = {}
+    for name, values in recording.outputs.items():
+        variable, _, joint = name.partition(".")
+        there = rows[:_FIRST][np.isfinite(values[rows[:_FIRST]])]
+        if variable != "joint_position" or joint not in joints or not len(there):
+            continue
+        degree = 1 if len(there) > 3 else 0
+        line = np.polyfit(recording.time[there] - recording.time[rows[0]], values[there], degree)
+        delay = recording.settings.outputs[name].delay
+        found[joint] = RecordedStart(name, float(line[-1]), float(line[0]) if degree else 0.0, delay)
+    return found
+
+
+def check_reachable(entry: str, starts: Mapping[str, tuple[float, float]], scenario: Scenario) -> None:
+    """Refuse angles and speeds to start from that are far beyond joints' ranges.
+
+    Raises:
+        InputError: Naming the entry.
+    """
+    for joint, (angle, _) in starts.items():
+        low, high = scenario.finger.joints[joint].range
+        if not low - BEYOND <= angle <= high + BEYOND:
+            allowed = f"cannot be reached: {joint} begins at {angle:.3g} rad, and its range is {low:.3g} to {high:.3g}"
+            raise InputError(entry, allowed)
+
+
+def starts_to_find(
+    recording: str, window: int, starts: Mapping[str, tuple[float, float]]
+) -> tuple[NuisanceParameter, ...]:
+    """Return the starts of joints that are to be found near those that were recorded."""
+    prefix = f"recordings.{recording}.start.{window}"
+    return tuple(
+        NuisanceParameter(f"{prefix}.{joint}", angle - _NEAR, angle + _NEAR, angle)
+        for joint, (angle, _) in starts.items()
+    )
+
+
+def far_start(
+    recording: Recording, starts: Mapping[str, RecordedStart], position: Mapping[str, float], scenario: Scenario
+) -> str:
+    """Return a sentence on a joint that a motion starts far from where its recording begins; empty without any."""
+    for joint, start in starts.items():
+        low, high = scenario.finger.joints[joint].range
+        angle = start.corrected(recording.name, {})[0]
+        if abs(angle - position[joint]) > _FAR * (high - low):
+            return (
+                f"identify.recordings.{recording.name}: {joint} begins at {angle:.3g} rad, and the scenario starts at "
+                f'{position[joint]:.3g} rad; with start = "recorded" it starts where the recording does'
+            )
+    return ""

@@ -1,0 +1,109 @@
+"""Motions that were wrong in silence: starts beside the recording, steps that fail, inputs that nothing reads."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from intervals import COULOMB, DRAG, MOTION, TURN, motion
+
+import finger_pin as fp
+from finger_pin.description.loading import load_bench
+from finger_pin.exceptions import ScenarioWarning
+from finger_pin.identification import motions
+from finger_pin.identification.models import build_problem
+from finger_pin.identification.recordings import read_recording
+
+BENT = {"finger.tendons.T1.curvature_offset": TURN, DRAG: 0.4}
+
+
+def problem(data, **more):
+    entries = {"parameters": {COULOMB: (0.05, 0.5)}, "recordings": {"pull": {**MOTION, "settle": 0.2, **more}}}
+    scenario, settings = load_bench("canal", BENT, entries)
+    return build_problem(scenario, settings, [read_recording("pull", settings.recordings["pull"], data)])
+
+
+@pytest.mark.parametrize("failing", ["all", "the changed one"])
+def test_slopes_where_the_steps_of_a_run_do_not_bear_other_numbers_are_those_of_runs(monkeypatch, failing):
+    data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
+    asked = problem(data)
+    expected = np.concatenate(asked.slopes(asked.start))
+    nearby = motions.nearby
+
+    def failed(trajectory, others):
+        """Return runs of which some have ended early, and tell nothing."""
+        runs = nearby(trajectory, others)
+        ended = [replace(each, failure="singular", interpolate=_nothing(each)) for each in runs]
+        return ended if failing == "all" else [runs[0], *ended[1:]]
+
+    monkeypatch.setattr(motions, "nearby", failed)
+    slopes = np.concatenate(problem(data).slopes(asked.start))
+    assert np.sqrt(np.mean((slopes - expected) ** 2)) < 0.03 * np.sqrt(np.mean(expected**2))
+
+
+def _nothing(trajectory):
+    return lambda times: np.full_like(trajectory.interpolate(times), 1e53)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.1])
+def test_a_recorded_start_is_that_of_a_joint_whose_column_has_a_wrong_zero(late):
+    """The drum turns at 0.2 rad/s; its camera tells 0.3 rad too much, and tells it late."""
+    data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
+    data["angle"] = 0.5 + 0.2 * (data["t"] - late) + 0.3
+    columns = {"joint_position.drum": {"column": "angle", "delay": late}}
+    asked = problem(data, outputs=columns, start="recorded", settle=0.0)
+    model = asked.models[0]
+    key = "recordings.pull.joint_position.drum"
+    for own, angle in (({}, 0.8), ({f"{key}.offset": 0.3}, 0.5), ({f"{key}.offset": 0.3, f"{key}.scale": 2.0}, 0.25)):
+        initial = model._with_own(model.scenario, own).simulation.initial
+        assert initial.position["drum"] == pytest.approx(angle, abs=1e-9)
+        assert initial.velocity["drum"] == pytest.approx(0.2 / own.get(f"{key}.scale", 1.0), abs=1e-9)
+
+
+def test_a_start_far_from_the_first_row_of_a_recording_is_told():
+    data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
+    table = {name: values[:60] for name, values in data.items()}
+    given = {"parameters": {COULOMB: (0.1, 0.2)}, "starts": 1, "profiles": False, "data": {"pull": table}}
+    columns = {"tendon_tension.T1": "out", "joint_position.drum": "angle"}
+    recordings = {"pull": {**MOTION, "start": "rest", "outputs": columns, "settle": 0.2}}
+    with pytest.warns(ScenarioWarning, match=r"drum begins at .* rad, and the scenario starts at 0\.9 rad"):
+        fp.identify(
+            "canal", recordings=recordings, overrides={**BENT, "simulation.initial.position.drum": 0.9}, **given
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ScenarioWarning)
+        fp.identify("canal", recordings=recordings, overrides=BENT, **given)
+
+
+@pytest.mark.parametrize(
+    ("bench", "inputs", "said"),
+    [
+        ("servo_bench", {"spool_angle.M1": "a", "motor_voltage.M1": "b"}, "is of the same motor as motor_voltage.M1"),
+        ("canal", {"joint_reference.drum": "a", "tendon_command.T1": "b"}, "joint_reference.drum: is read by nobody"),
+    ],
+)
+def test_inputs_of_which_one_would_be_dropped_are_refused(bench, inputs, said):
+    data = {"t": np.linspace(0.0, 1.0, 20), "a": np.linspace(0.0, 0.1, 20), "b": np.linspace(1.0, 2.0, 20)}
+    output = "motor_position.M1" if bench == "servo_bench" else "joint_position.drum"
+    recordings = {"pull": {"time": "t", "inputs": inputs, "outputs": {output: "a"}}}
+    key = "finger.joint_friction.viscous"
+    with pytest.raises(fp.InputError) as refused:
+        fp.identify(bench, parameters={key: (1e-5, 1e-2)}, recordings=recordings, data={"pull": data}, starts=1)
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        ("angle", "is beyond the range of drum, "),
+        ("angle_deg", 'column angle_deg seems to be in deg; write { column = "angle_deg", unit = "deg" }'),
+    ],
+)
+def test_degrees_that_nothing_says_are_degrees_are_asked_about(column, said):
+    """9.6 degrees are less than two turns of radians, and more than the drum turns."""
+    data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
+    data[column] = np.linspace(0.0, 9.6, len(data["t"]))
+    with pytest.raises(fp.InputError, match=said.replace("{", r"\{")):
+        problem(data, outputs={"joint_position.drum": column})
+    asked = problem(data, outputs={"joint_position.drum": {"column": column, "unit": "deg"}})
+    assert np.max(asked.signals[0].measured) == pytest.approx(np.deg2rad(9.6))
