@@ -13,6 +13,7 @@ from finger_pin.analysis.pin_wrench import PinWrench, pin_wrench
 from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.reaction import JointReactions, ReactionDifference, fingertip_loads, joint_reactions
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
+from finger_pin.analysis.spring_return import SpringReturn, spring_return
 from finger_pin.analysis.steady import SteadyState, steady_state
 from finger_pin.analysis.tip_force import RequiredTension, largest_force, tension_for_force
 from finger_pin.analysis.tip_statics import Friction
@@ -29,6 +30,7 @@ __all__ = [
     "RequiredTension",
     "SelfLockingMap",
     "SelfLockingMargin",
+    "SpringReturn",
     "SteadyState",
     "TipPosture",
     "closure_over_range",
@@ -47,6 +49,7 @@ __all__ = [
     "quick_margin",
     "self_locking_map",
     "self_locking_margin",
+    "spring_return",
     "steady_state",
     "tension_for_force",
     "tension_limits",

@@ -183,7 +183,8 @@ def transmission_in_motion(finger: FingerLike, result: xr.Dataset) -> Transmissi
         ratio = np.where(command > 0.0, delivered / command, np.nan)
         settled = sliding_tension(command, coefficient, speed, tendons.viscous, tendons.drag) / command
     slid = _since_reversal(result["time"].values, speed)
-    bristle = np.maximum(normal * coefficient + tendons.drag, tendons.floor) / tendons.stiffness
+    level = np.maximum(normal * coefficient + tendons.drag, tendons.floor)
+    bristle = friction.bristle_give(level, tendons.stiffness, tendons.hardening)
     sliding = (slid > _SETTLED * bristle) & np.isfinite(ratio)
     return TransmissionInMotion(curvature, ratio, settled, sliding, np.sign(speed))
 

@@ -18,17 +18,25 @@ SHARES = (0.5, 0.8, 0.9, 1.1, 1.4)
 def self_locking(
     scenario: ScenarioName = "fig6", output: Output = Path("results/self_locking"), format: Format = None
 ) -> None:
-    """Report the joint friction at which a finger locks, draw its map, and show runs on both sides of it."""
+    """Report the joint friction at which a finger locks, draw its map, and show runs on both sides of it.
+
+    Of a finger that springs return it reports the tensions between which the cord holds it, and whether it comes back.
+    """
     talks(quiet=False)
     import numpy as np
 
     import finger_pin as fp
     from finger_pin.analysis import self_locking_map, self_locking_margin
-    from finger_pin.views.locking_text import summarize_locking
+    from finger_pin.views.locking_text import summarize_locking, summarize_return
     from finger_pin.views.plots import plot_critical_friction, plot_runaway, plot_self_locking_map, save_figure
 
     loaded = fp.load_scenario(scenario)
-    finger, margin = loaded.finger, self_locking_margin(loaded)
+    finger = loaded.finger
+    sprung = finger.hand is None and any(joint.spring for joint in finger.joints.values())
+    if sprung and not fp.Finger(finger).routing.force_closure().holds:
+        print_text(summarize_return(fp.analysis.spring_return(finger)))
+        return
+    margin = self_locking_margin(loaded)
     found = self_locking_map(fp.Finger(finger))
     text = summarize_locking(loaded, found)
     output.mkdir(parents=True, exist_ok=True)

@@ -79,7 +79,7 @@ def sweep(
     _check(design, over, samples, seed)
     changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.exceptions import StudyError
-    from finger_pin.studies import DEFAULT_METRICS, sweep
+    from finger_pin.studies import sweep
     from finger_pin.studies.keys import BaseScenario
 
     points = build_design(design, over, samples, seed or 0)
@@ -93,7 +93,7 @@ def sweep(
                 return sweep(
                     scenario,
                     points,
-                    metrics=metric or DEFAULT_METRICS,
+                    metrics=metric or None,
                     overrides=changed,
                     output=folder,
                     executor=executor,

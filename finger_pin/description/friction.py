@@ -5,13 +5,18 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from finger_pin.description.validation import Description, Numbers, choice, problem, quantity, reals, suggestion
+from finger_pin.description.validation import Description, Numbers, choice, expand, problem, quantity, reals, suggestion
 from finger_pin.exceptions import toml_like
+from finger_pin.typing import Array, Number
 
 #: Laws of the joints' friction by name.
 JOINT_LAWS = ("lugre", "dahl", "coulomb")
+# Bristles without a stiffness: the least, N/m and N m/rad, and how far they give, m and rad. They harden over a tenth
+# of that: up to forces of e^8 times those at which they begin to, they give by no more.
+_TENDON_BRISTLES, _JOINT_BRISTLES, _PARTS = (5e4, 2e-5), (5.0, 1e-3), 10.0
 
 
 class TendonFrictionSettings(Description):
@@ -32,8 +37,12 @@ class TendonFrictionSettings(Description):
     stiction_ratio: Annotated[Numbers, reals(1.0, 100.0)] = quantity(
         1.5, unit="1", source="estimate", doc="rho = mu^c / mu^d."
     )
-    stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
-        5e4, unit="N/m", source="estimate", doc="sigma_0, bristle stiffness."
+    stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] | None = quantity(
+        None,
+        unit="N/m",
+        source="estimate",
+        doc="sigma_0, bristle stiffness. Without it bristles give by about 20 um at any load: 5e4 N/m, or what drag "
+        "and floor stretch by 20 um, plus |F^s| / 2 um.",
     )
     viscous: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         1.0, unit="N s/m", source="estimate", doc="b, viscous coefficient."
@@ -80,8 +89,12 @@ class JointFrictionSettings(Description):
         source="the paper has none",
         doc="Dry friction without load, of seals and bushings; adds to R M^d, and lets go at M^c / M^d times as much.",
     )
-    stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
-        5.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness."
+    stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] | None = quantity(
+        None,
+        unit="N m/rad",
+        source="estimate",
+        doc="sigma_0, bristle stiffness. Without it bristles give by about 1 mrad at any load: 5 N m/rad, or what drag "
+        "and floor stretch by 1 mrad, plus |F^s| / 0.1 mrad.",
     )
     viscous: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         1e-3, unit="N m s/rad", source="estimate", doc="b, viscous coefficient."
@@ -122,3 +135,23 @@ class JointFrictionSettings(Description):
             allowed = f"must be at least the Coulomb coefficient {toml_like(self.coulomb)}"
             raise problem("stiction", allowed, self.stiction)
         return self
+
+
+def bristles(law: JointFrictionSettings | TendonFrictionSettings, size: int, more: Number = 0.0) -> dict[str, Array]:
+    """Return the numbers that friction of tendons and of joints share, by the laws' names, one for each of ``size``.
+
+    Args:
+        law: Numbers of friction.
+        size: Number of tendons or joints.
+        more: Level without load besides the drag and the floor of ``law``, of the same unit.
+    """
+    names = ("viscous", "stribeck_velocity", "floor", "stribeck_exponent")
+    found: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}
+    softest, give = _TENDON_BRISTLES if isinstance(law, TendonFrictionSettings) else _JOINT_BRISTLES
+    level = np.maximum(np.maximum(expand(law.drag, size), found["floor"]), more)
+    # In a hand some fingers may give it.
+    stated = law.stiffness if isinstance(law.stiffness, tuple) else (law.stiffness,) * size
+    free = np.array([each is None for each in stated])
+    own = np.array([0.0 if each is None else each for each in stated])
+    found["stiffness"] = np.where(free, np.maximum(softest, level / give), own)
+    return found | {"hardening": _PARTS * free / give, "lag": expand(law.micro_damping, size) / found["stiffness"]}

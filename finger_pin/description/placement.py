@@ -148,8 +148,8 @@ def _one(key: str, values: Sequence[str]) -> str:
     return values[0]
 
 
-def _each(value: Numbers, size: int) -> Sequence[float]:
-    return value if isinstance(value, tuple) else [float(value)] * size
+def _each(value: Numbers | None, size: int) -> Sequence[float | None]:
+    return value if isinstance(value, tuple) else [None if value is None else float(value)] * size
 
 
 class PathSignal(SignalSettings):

@@ -65,7 +65,7 @@ def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool
     for index, (name, tendon) in enumerate(description.tendons.items()):
         numbers = [float(getattr(tendons, each)[index]) for each in _TENDON]
         numbers += [float(tendons.lag[index] * tendons.stiffness[index]), float(tendons.drag[index])]
-        law = (*numbers, float(tendons.routing.curvature_offset[index]))
+        law = (*numbers, float(tendons.routing.curvature_offset[index]), float(tendons.hardening[index]))
         crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
         if tendon.kind == "actuated":
             found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
@@ -91,6 +91,6 @@ def _of_joints(description: FingerDescription, tendons: Tendons) -> list[PluginF
     for index, name in enumerate(description.joints):
         numbers = [float(getattr(friction, each)[index]) for each in _JOINT]
         micro_damping = float(friction.lag[index] * friction.stiffness[index])
-        law = (*numbers, micro_damping, float(friction.drag[index]), 0.0)
+        law = (*numbers, micro_damping, float(friction.drag[index]), 0.0, float(friction.hardening[index]))
         found.append(PluginFriction(PIN, name, name, True, 1.0, law))
     return found

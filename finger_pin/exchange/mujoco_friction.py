@@ -25,7 +25,7 @@ LEAST_LOSS = 1e-6
 TENDON, PIN, MASS, LINK, BRANCH = range(5)
 #: What elements of a friction carry, in order.
 LENGTH, RATIO, KIND, COULOMB, STATIC, STIFFNESS, VISCOUS, STRIBECK = range(8)
-FLOOR, EXPONENT, MICRO, DRAG, OFFSET, SHARE, LOADS, HEAD = range(8, 16)
+FLOOR, EXPONENT, MICRO, DRAG, OFFSET, HARDENING, SHARE, LOADS, HEAD = range(8, 17)
 #: What of each friction stands in `plugin_state`.
 LEVEL, FORCE, LOAD, TURN, SIGNALS = range(5)
 
@@ -41,7 +41,7 @@ class PluginFriction:
         row_of_joint: Whether that is a joint.
         ratio: Its speed over the row's.
         law: coulomb, static, stiffness, viscous, stribeck_velocity, floor, stribeck_exponent, micro_damping, drag,
-            curvature_offset.
+            curvature_offset, hardening.
         more: Elements that bend or load it: whether it is a joint, its name, and a number.
         share: Of a `LINK`, tension over the joint's drive: one over the arm and the number of tendons that pull the
             same way; negative where another one pulls the other way, so that it is slack while that is driven. Of a

@@ -7,6 +7,12 @@ Two options lead from the paper's law to the usual LuGre model (Canudas de Wit e
 40(3), 1995), where F^s = sigma_0 z: the Stribeck exponent, 1 in the paper and 2 there, and the micro-damping sigma_1,
 0 in the paper, whose force is sigma_1 z' = lag F^s' with lag = sigma_1 / sigma_0.
 
+Bristles may harden: sigma_0 (F^s) = sigma_0 + |F^s| / delta, a spring z = delta ln(1 + |F^s| / (delta sigma_0)), so
+that they give by about a length, delta, at any level. A stiffness that followed the level itself would not be passive:
+as a load falls, energy F^s^2 / (2 sigma_0) would come from nowhere. Of the state F^s alone, with an energy V(F^s),
+passivity under any load demands V' sigma_0 = F^s for stretching and for letting go, so that the stiffness may depend on
+F^s, and on nothing else.
+
 Without micro-damping the law is passive whatever happens. With it, while |F^s| <= F^n M^c and F^n is constant, it is
 if b >= sigma_1 (M^c - M^d) / M^d (Barabanov and Ortega, IEEE Trans. Automatic Control 45(4), 2000), and in any case
 as long as |v| <= 4 F^n M (1 + b / sigma_1) / sigma_1, which covers sticking.
@@ -57,17 +63,29 @@ def friction_level(normal: Number, coefficient: Number, floor: Number, drag: Num
     return np.maximum(normal * coefficient + drag, floor)
 
 
+def bristle_stiffness(stiction: Number, stiffness: Number, hardening: Number) -> Number:
+    """Return the stiffness of bristles at F^s, sigma_0 + |F^s| / delta, with the hardening 1 / delta."""
+    return stiffness + hardening * np.abs(stiction)
+
+
+def bristle_give(force: Number, stiffness: Number, hardening: Number) -> Number:
+    """Return how far bristles give under a force before they slip, m or rad."""
+    harder = 1.0 * (hardening > 0.0)
+    length = 1.0 / (hardening + (1.0 - harder))
+    return (1.0 - harder) * force / stiffness + harder * length * np.log1p(force / (stiffness * length))
+
+
 def stiction_rate(stiction: Number, velocity: Number, level: Number, stiffness: Number, side: Number = 0.0) -> Number:
-    """Return F^s' = sigma_0 (v - F^s |v| / level), equation (9a)."""
+    """Return F^s' = sigma_0 (v - F^s |v| / level), equation (9a), with the stiffness at F^s."""
     return stiffness * (velocity - stiction * magnitude(velocity, side) / level)
 
 
 def stiction_rate_slopes(
-    stiction: Number, velocity: Number, level: Number, stiffness: Number, side: Number = 0.0
+    stiction: Number, velocity: Number, level: Number, stiffness: Number, side: Number = 0.0, hardening: Number = 0.0
 ) -> tuple[Number, Number, Number]:
-    """Return the derivatives of (9a) with respect to F^s, v and the level."""
+    """Return the derivatives of (9a) with respect to F^s, v and the level; the stiffness is that at F^s."""
     speed = magnitude(velocity, side)
-    by_stiction = -stiffness * speed / level
+    by_stiction = hardening * np.sign(stiction) * (velocity - stiction * speed / level) - stiffness * speed / level
     by_velocity = stiffness * (1.0 - stiction * direction(velocity, side) / level)
     by_level = stiffness * stiction * speed / (level * level)
     return by_stiction, by_velocity, by_level
@@ -88,9 +106,16 @@ def friction_force(
     return stiction + viscous * velocity + lag * rate
 
 
-def bristle_energy(stiction: Number, stiffness: Number) -> Number:
-    """Return the elastic energy of the bristles, F^s^2 / (2 sigma_0)."""
-    return stiction * stiction / (2.0 * stiffness)
+def bristle_energy(stiction: Number, stiffness: Number, hardening: Number = 0.0) -> Number:
+    """Return the elastic energy of the bristles, F^s^2 / (2 sigma_0), or the integral of F^s / sigma_0 (F^s).
+
+    With the length delta of hardening and u = |F^s| / (delta sigma_0) that is delta^2 sigma_0 (u - ln(1 + u)).
+    """
+    harder = 1.0 * (hardening > 0.0)
+    length = 1.0 / (hardening + (1.0 - harder))
+    stretch = np.abs(stiction) / (length * stiffness)
+    hard = length * length * stiffness * (stretch - np.log1p(stretch))
+    return (1.0 - harder) * stiction * stiction / (2.0 * stiffness) + harder * hard
 
 
 def coulomb_loss(stiction: Number, velocity: Number, level: Number) -> Number:
@@ -123,41 +148,68 @@ def steady_force(velocity: Number, normal: Number, coefficient: Number, viscous:
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
-    kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag, drag, static_drag = p
+    kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag = p
     share = friction_coefficient(row.speed, 0.0, 1.0, stribeck, exponent, row.side)
     coefficient = kinetic + (static - kinetic) * share
     level = friction_level(row.load, coefficient, floor, drag + (static_drag - drag) * share)
+    stiffness = bristle_stiffness(row.state, soft, hardening)
     rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
-    loss = friction_force(row.state, row.speed, viscous, rate, lag)
+    loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
     return -loss, rate, loss, row.load, coefficient, level
 
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag, drag, static_drag = p
+    kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag = p
     _, _, coefficient, level = signals
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
+    stiffness = bristle_stiffness(row.state, soft, hardening)
+    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
     by_level = by_level * (level > floor)
     by_share = row.load * (static - kinetic) + static_drag - drag
     by_speed = by_speed + by_level * by_share * friction_coefficient_slope(
         row.speed, 0.0, 1.0, stribeck, exponent, row.side
     )
-    return (0.0, -viscous, -1.0, -lag, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_level * coefficient, 0.0, 0.0)
+    by_state = micro_slope(row, level, p) - 1.0
+    force = (0.0, -viscous, by_state, -micro_lag(row.state, p), 0.0, 0.0, 0.0)
+    return force, (0.0, by_speed, own, by_level * coefficient, 0.0, 0.0)
+
+
+def micro_lag(stiction: Number, p: Parameters) -> Number:
+    """Return sigma_1 over the stiffness at F^s, s, of the numbers of `PIN_FRICTION` or of a tendon."""
+    return p[7] * (p[2] / bristle_stiffness(stiction, p[2], p[8]))
+
+
+def micro_slope(row: Row, level: Number, p: Parameters) -> Number:
+    """Return minus the derivative of the micro-damping's force by F^s at a constant rate of F^s."""
+    slip = row.speed - row.state * magnitude(row.speed, row.side) / level
+    return micro_lag(row.state, p) * p[8] * np.sign(row.state) * slip
 
 
 def bristle_account(
-    speed: Number, stiction: Number, rate: Number, level: Number, stiffness: Number, viscous: Number, lag: Number
+    speed: Number,
+    stiction: Number,
+    rate: Number,
+    level: Number,
+    stiffness: Number,
+    viscous: Number,
+    lag: Number,
+    hardening: Number = 0.0,
 ) -> Numbers:
     """Return the energy of the bristles, and the powers lost by sliding, in viscous friction and in micro-damping."""
     return (
-        bristle_energy(stiction, stiffness),
+        bristle_energy(stiction, stiffness, hardening),
         coulomb_loss(stiction, speed, level),
         viscous_loss(speed, viscous),
         micro_loss(rate, speed, lag),
     )
 
 
+def row_account(row: Row, rate: Number, level: Number, p: Parameters) -> Numbers:
+    """Return `bristle_account` of a row, of the numbers of `PIN_FRICTION` or of a tendon."""
+    return bristle_account(row.speed, row.state, rate, level, p[2], p[3], micro_lag(row.state, p), p[8])
+
+
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    return bristle_account(row.speed, row.state, rate, signals[3], p[2], p[3], p[7])
+    return row_account(row, rate, signals[3], p)
 
 
 #: Friction between two parts that a load presses together, such as the pin of a joint (17), or a seal without one.
@@ -172,6 +224,7 @@ PIN_FRICTION = Law(
         "floor",
         "stribeck_exponent",
         "lag",
+        "hardening",
         "drag",
         "static_drag",
     ),

@@ -16,11 +16,14 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.laws.bristle import (
-    bristle_account,
+    bristle_stiffness,
     friction_coefficient,
     friction_coefficient_slope,
     friction_force,
     friction_level,
+    micro_lag,
+    micro_slope,
+    row_account,
     stiction_rate,
     stiction_rate_slopes,
 )
@@ -56,7 +59,7 @@ def delivered_tension(command: Number, loss: Number) -> Number:
     return np.maximum(0.0, command - loss)
 
 
-def _haste(p: Parameters) -> Number:
+def _haste(stiffness: Number, viscous: Number) -> Number:
     """Return the least level over the speed, N s/m: beyond the floor's reach, (9a) must not get faster.
 
     As a driven tendon goes slack that slides against its stretched bristles, the tension in (14), y = |F^s| - b v,
@@ -64,7 +67,12 @@ def _haste(p: Parameters) -> Number:
     sqrt(e sigma_0 b) cuts it off. As a passive one goes slack, the time in which its bristles relax falls to the floor
     within floor / (M K v), and no step may be longer than that; e sigma_0 leaves e sigma_0 / (M K).
     """
-    return np.sqrt(_INSTANT * p[2] * p[3]) + _INSTANT * p[2]
+    return np.sqrt(_INSTANT * stiffness * viscous) + _INSTANT * stiffness
+
+
+def _haste_slope(stiffness: Number, viscous: Number) -> Number:
+    """Return its derivative by the stiffness."""
+    return 0.5 * np.sqrt(_INSTANT * viscous / stiffness) + _INSTANT
 
 
 def sliding_tension(
@@ -91,17 +99,20 @@ def sliding_tension(
 
 def _level(normal: Number, sliding: Number, row: Row, p: Parameters) -> Number:
     """Return F^n M + drag, or its floor."""
-    return friction_level(1.0, normal * sliding + p[8], np.maximum(p[5], _haste(p) * magnitude(row.speed, row.side)))
+    haste = _haste(bristle_stiffness(row.state, p[2], p[8]), p[3])
+    return friction_level(1.0, normal * sliding + p[9], np.maximum(p[5], haste * magnitude(row.speed, row.side)))
 
 
 def _rate_slopes(
     row: Row, normal: Number, coefficient: Number, sliding: Number, level: Number, p: Parameters
 ) -> Numbers:
     """Return the derivatives of F^s' by v, F^s, F^n and phi."""
-    surface, ratio, stiffness, stribeck, floor, exponent = p[0], p[1], p[2], p[4], p[5], p[6]
-    own, by_speed, by_any = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
-    haste = _haste(p)
-    hasty = 1.0 * (level > floor) * (level <= haste * magnitude(row.speed, row.side))
+    surface, ratio, viscous, stribeck, floor, exponent, hardening = p[0], p[1], p[3], p[4], p[5], p[6], p[8]
+    stiffness, fast = bristle_stiffness(row.state, p[2], hardening), magnitude(row.speed, row.side)
+    own, by_speed, by_any = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
+    haste = _haste(stiffness, viscous)
+    hasty = 1.0 * (level > floor) * (level <= haste * fast)
+    own = own + hasty * by_any * fast * _haste_slope(stiffness, viscous) * hardening * np.sign(row.state)
     by_speed = by_speed + hasty * by_any * haste * direction(row.speed, row.side)
     by_level = by_any * (level > floor) * (1.0 - hasty)
     slope = friction_coefficient_slope(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
@@ -112,54 +123,56 @@ def _rate_slopes(
 
 
 def _driven(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _, acting = p
+    surface, ratio, soft, viscous, stribeck, _, exponent, _, hardening, _, acting = p
     coefficient = capstan_coefficient(surface, row.curvature)
     pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
     normal = np.abs(pressing) + np.abs(row.command)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     level = _level(normal, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
-    loss = friction_force(row.state, row.speed, viscous, rate, lag)
+    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, soft, hardening), row.side)
+    loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
     force = delivered_tension(row.command, loss) - acting * row.command
     return force, rate, loss, normal, coefficient, sliding, level, pressing
 
 
 def _driven_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    viscous, lag = p[3], p[7]
+    viscous, lag = p[3], micro_lag(row.state, p)
     loss, normal, coefficient, sliding, level, pressing = signals
     by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
     taut = 1.0 * (delivered_tension(row.command, loss) > 0.0)
     pressed = by_normal * (pressing > 0.0)
     by_command = pressed + by_normal * (1.0 - 2.0 * (row.command < 0.0))
-    force = (0.0, -taut * viscous, -taut, -taut * lag, 0.0, taut - p[9], 0.0)
+    by_state = taut * (micro_slope(row, level, p) - 1.0)
+    force = (0.0, -taut * viscous, by_state, -taut * lag, 0.0, taut - p[10], 0.0)
     return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
 
 
 def _driven_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
+    stored, coulomb, viscous, micro = row_account(row, rate, signals[4], p)
     # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
     slack = (row.command - signals[0]) * row.speed * (row.command <= signals[0])
-    return stored, (1.0 - p[9]) * row.command * row.speed, coulomb, viscous, micro, slack
+    return stored, (1.0 - p[10]) * row.command * row.speed, coulomb, viscous, micro, slack
 
 
 def _passive(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _ = p
+    surface, ratio, soft, viscous, stribeck, _, exponent, _, hardening, _ = p
     coefficient = capstan_coefficient(surface, row.curvature)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     level = _level(row.load, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
-    loss = friction_force(row.state, row.speed, viscous, rate, lag)
+    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, soft, hardening), row.side)
+    loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
     return -loss, rate, loss, row.load, coefficient, sliding, level
 
 
 def _passive_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, normal, coefficient, sliding, level = signals
     by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
-    return (0.0, -p[3], -1.0, -p[7], 0.0, 0.0, 0.0), (0.0, by_speed, own, by_normal, 0.0, by_curvature)
+    force = (0.0, -p[3], micro_slope(row, level, p) - 1.0, -micro_lag(row.state, p), 0.0, 0.0, 0.0)
+    return force, (0.0, by_speed, own, by_normal, 0.0, by_curvature)
 
 
 def _passive_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    return bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
+    return row_account(row, rate, signals[4], p)
 
 
 _PARAMETERS = (
@@ -171,6 +184,7 @@ _PARAMETERS = (
     "floor",
     "stribeck_exponent",
     "lag",
+    "hardening",
     "drag",
 )
 
@@ -204,7 +218,7 @@ PASSIVE_FRICTION = Law(
 
 
 def _canal(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _, one_way = p
+    surface, ratio, soft, viscous, stribeck, _, exponent, _, hardening, _, one_way = p
     # What pushes, where it can.
     lowest = -_ANY_FORCE * (one_way <= 0.0)
     tension = np.maximum(row.command, lowest)
@@ -214,14 +228,14 @@ def _canal(row: Row, p: Parameters) -> Numbers:
     normal = np.abs(pressing) + np.abs(tension)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     level = _level(normal, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
-    loss = friction_force(row.state, row.speed, viscous, rate, lag)
+    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, soft, hardening), row.side)
+    loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
     force = np.maximum(-loss, lowest - tension)
     return force, rate, loss, normal, coefficient, sliding, level, pressing
 
 
 def _canal_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    viscous, lag, one_way = p[3], p[7], 1.0 * (p[9] > 0.0)
+    viscous, lag, one_way = p[3], micro_lag(row.state, p), 1.0 * (p[10] > 0.0)
     loss, normal, coefficient, sliding, level, pressing = signals
     by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
     pulled = 1.0 - one_way * (row.command <= 0.0)
@@ -229,12 +243,13 @@ def _canal_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, N
     taut = 1.0 - one_way * (loss >= tension)
     pressed = by_normal * np.sign(pressing)
     by_command = pulled * (pressed + by_normal * np.sign(tension))
-    force = (0.0, -taut * viscous, -taut, -taut * lag, 0.0, pulled * (taut - 1.0), 0.0)
+    by_state = taut * (micro_slope(row, level, p) - 1.0)
+    force = (0.0, -taut * viscous, by_state, -taut * lag, 0.0, pulled * (taut - 1.0), 0.0)
     return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
 
 
 def _canal_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
+    stored, coulomb, viscous, micro = row_account(row, rate, signals[4], p)
     return stored, coulomb, viscous, micro, -(signals[0] + force) * row.speed
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from finger_pin.laws.bristle import (
     PIN_FRICTION,
     bristle_account,
+    bristle_stiffness,
     friction_force,
     friction_level,
     stiction_rate,
@@ -26,23 +27,24 @@ SIGNALS = ("friction", "normal_force", "coefficient", "level")
 
 
 def _dahl_value(row: Row, p: Parameters) -> Numbers:
-    kinetic, stiffness, viscous, floor, drag = p
+    kinetic, soft, viscous, floor, hardening, drag = p
     level = friction_level(row.load, kinetic, floor, drag)
-    rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
+    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, soft, hardening), row.side)
     loss = friction_force(row.state, row.speed, viscous)
     return -loss, rate, loss, row.load, kinetic + 0.0 * row.load, level
 
 
 def _dahl_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    kinetic, stiffness, viscous, floor, _ = p
+    kinetic, soft, viscous, floor, hardening, _ = p
     level = signals[3]
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
+    stiffness = bristle_stiffness(row.state, soft, hardening)
+    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
     by_load = by_level * (level > floor) * kinetic
     return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_load, 0.0, 0.0)
 
 
 def _dahl_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    return bristle_account(row.speed, row.state, rate, signals[3], p[1], p[2], 0.0)
+    return bristle_account(row.speed, row.state, rate, signals[3], p[1], p[2], 0.0, p[4])
 
 
 def _coulomb_value(row: Row, p: Parameters) -> Numbers:
@@ -66,7 +68,7 @@ def _coulomb_account(row: Row, p: Parameters, force: Number, rate: Number, signa
 
 DAHL = Law(
     name="Dahl friction of a pin",
-    parameters=("kinetic", "stiffness", "viscous", "floor", "drag"),
+    parameters=("kinetic", "stiffness", "viscous", "floor", "hardening", "drag"),
     value=_dahl_value,
     slopes=_dahl_slopes,
     account=_dahl_account,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
+from finger_pin.description.friction import bristles
 from finger_pin.description.parameters import Spring
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
@@ -57,6 +57,7 @@ class JointFriction:
         floor: g_min, shape (n,), N m.
         stribeck_exponent: 1 or 2, shape (n,).
         lag: sigma_1 / sigma_0, shape (n,), s.
+        hardening: Growth of sigma_0 with |F^s|, shape (n,), 1/rad; 0 where a stiffness is given.
         drag: Level without load while sliding, shape (n,), N m.
         reversal_speed: v_r of Coulomb's law, shape (n,), rad/s.
         law: The law.
@@ -72,6 +73,7 @@ class JointFriction:
     floor: Array
     stribeck_exponent: Array
     lag: Array
+    hardening: Array
     drag: Array
     reversal_speed: Array
     law: Law
@@ -161,13 +163,6 @@ def _law(name: str) -> Law:
             names = ", ".join(_NUMBERS if kind == "parameters" else SIGNALS)
             raise InputError("finger.joint_friction.law", f"{allowed} {names}: see {', '.join(lacking)}", name)
     return law
-
-
-def bristles(law: JointFrictionSettings | TendonFrictionSettings, size: int) -> dict[str, Array]:
-    """Return the numbers that friction of tendons and of joints share, by the laws' names, one for each of ``size``."""
-    names = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
-    found: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}
-    return found | {"lag": expand(law.micro_damping, size) / found["stiffness"]}
 
 
 @dataclass(frozen=True, eq=False)

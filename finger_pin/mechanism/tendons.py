@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
+from finger_pin.description.friction import bristles
 from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coefficient
 from finger_pin.laws.spring import TENDON_HALF
-from finger_pin.mechanism.joints import OF_TENDONS, bristles, hysteresis_rows
+from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows, drive_matrices
 from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
 from finger_pin.typing import Array, Number
@@ -34,8 +35,7 @@ BRISTLES = Energy("tendon_bristles", "tendon bristles")
 SOURCES_WITH_END, WINCHES = "tension_sources", "winches"
 _WOUND = Energy("winches", "winches, through their cords")
 _HALVES = ("proximal", "distal")
-# What the law calls otherwise.
-_NAMES = {"ratio": "stiction_ratio"}
+_NAMES = {"ratio": "stiction_ratio"}  # What the law calls otherwise.
 _STRETCHING = Energy("passive_hysteresis", "passive tendons stretching")
 
 
@@ -53,14 +53,15 @@ class Tendons:
         floor: g_min, shape (t,), N.
         stribeck_exponent: 1 or 2, shape (t,).
         lag: sigma_1 / sigma_0, shape (t,), s.
+        hardening: Growth of sigma_0 with |F^s|, shape (t,), 1/m; 0 where a stiffness is given.
         drag: Shape (t,), N.
         half_stiffness: K_h = 2 K_t, shape (p,), N/m.
         hysteresis: h, shape (p,).
         mass: m_5, shape (p,), kg.
         canals: Numbers of friction of the finger's tendons and of the canals of its tree, shape (f, t + c).
         wraps: The places where each of them rubs.
-        several: By index of tendons that cross joints and rub at several places, for each place its joints' mask in
-            (15), its offset, rad, and the mask of the joints from there on.
+        several: By index of tendons that rub at several places, for each its joints' mask in (15), its offset, rad, and
+            the mask of the joints from there on.
     """
 
     routing: Routing
@@ -72,6 +73,7 @@ class Tendons:
     floor: Array
     stribeck_exponent: Array
     lag: Array
+    hardening: Array
     drag: Array
     half_stiffness: Array
     hysteresis: Array
@@ -87,7 +89,8 @@ class Tendons:
         law, passive = description.tendon_friction, description.passive_tendon
         size, among = len(routing.tendons), len(routing.tendons) + len(description.canals)
         friction = {"surface": expand(law.coulomb, among), "stiction_ratio": expand(law.stiction_ratio, among)}
-        friction |= bristles(law, among) | {"drag": expand(law.drag, among)}
+        losses = [description.tree.tendons[name].friction for name in description.canals] if description.tree else []
+        friction |= bristles(law, among, np.array([0.0] * size + losses)) | {"drag": expand(law.drag, among)}
         wraps = [find_wraps(description, name) for name in (*routing.tendons, *description.canals)]
         return cls(
             routing=routing,
@@ -205,9 +208,7 @@ class Tendons:
         return [halves, *hysteresis_rows("passive_hysteresis", halves, shares, OF_TENDONS, _STRETCHING)]
 
     def rows(self, drives: Sequence[Rows] = (), motors: int = 0) -> list[Rows]:
-        """Return the tables of the tendons, for coordinates (theta, p, theta_s, theta_m).
-
-        Halves of passive tendons (12), drives, and driven and passive tendons (14), (16).
+        """Return the tables of halves (12), drives, driven and passive tendons (14), for (theta, p, theta_s, theta_m).
 
         Args:
             drives: Motors that pull tendons in place of ideal sources.
@@ -215,7 +216,6 @@ class Tendons:
         """
         if self.held:
             return self._rows(drives, motors)
-        # How they are wired, other numbers of friction leave alone.
         halves, *_, driven, passive = self._wired(drives, motors)
         friction, taken, actuated = self._friction, driven.parameters[-1:], self.routing.actuated
         return [

@@ -192,7 +192,7 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
     limits = [(*each.range, each.limit_stiffness, each.limit_damping) for each in limited.values() if each.range]
     # Law (9) whose level is its floor.
-    dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0, 0, 0) for each in rubbing.values()]
+    dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0, 0, 0, 0) for each in rubbing.values()]
     return [
         ("tendon_spring", DEAD_BAND_SPRING, along(sprung), springs),
         ("tendon_limit", STROKE_LIMITER, along(limited), limits),

@@ -9,6 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings, bristles
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, PluginFriction
 from finger_pin.mujoco.name_matching import RoutedFriction
@@ -52,7 +53,7 @@ def frictions(
         held = _limited_or_coupled(model, model.tendon(name).id)
         found.append(PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio), held))
         # Drag and what the model does not show count once.
-        behind = (*numbers[:8], 0.0, 0.0)
+        behind = (*numbers[:8], 0.0, 0.0, numbers[10])
         for number, (branch, part) in enumerate(branches.get(name, []), start=1):
             crossed = tuple(each for each in _crossed(model, branch, law) if each[1] in joints)
             more = ((False, name, part), *crossed)
@@ -60,8 +61,9 @@ def frictions(
     for name, (law, named) in joints.items():
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
-            numbers = (law.coulomb, law.stiction, law.stiffness, law.viscous, law.stribeck_velocity)
-            numbers += (max(law.floor, loss), law.stribeck_exponent, law.micro_damping, law.drag, 0.0)
+            stiffness, hardening = _bristles(law, loss)
+            numbers = (law.coulomb, law.stiction, stiffness, law.viscous, law.stribeck_velocity)
+            numbers += (max(law.floor, loss), law.stribeck_exponent, law.micro_damping, law.drag, 0.0, hardening)
             found.append(PluginFriction(PIN, name, name, True, 1.0, numbers))
         elif named:
             raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")
@@ -174,8 +176,15 @@ def _row(model: mujoco.MjModel, name: str, first: list[tuple[str, Array]]) -> tu
 
 def _tendon_law(model: mujoco.MjModel, name: str, law: Any) -> tuple[float, ...]:
     drag = law.drag or float(model.tendon_frictionloss[model.tendon(name).id])
-    ratio = (law.coulomb, law.stiction_ratio, law.stiffness, law.viscous, law.stribeck_velocity)
-    return (*ratio, law.floor, law.stribeck_exponent, law.micro_damping, drag, law.curvature_offset)
+    stiffness, hardening = _bristles(law, drag)
+    ratio = (law.coulomb, law.stiction_ratio, stiffness, law.viscous, law.stribeck_velocity)
+    return (*ratio, law.floor, law.stribeck_exponent, law.micro_damping, drag, law.curvature_offset, hardening)
+
+
+def _bristles(law: JointFrictionSettings | TendonFrictionSettings, level: float) -> tuple[float, float]:
+    """Return the stiffness of bristles and its growth with their force, of friction that has a level without load."""
+    numbers = bristles(law, 1, level)
+    return float(numbers["stiffness"][0]), float(numbers["hardening"][0])
 
 
 def _crossed(model: mujoco.MjModel, name: str, law: RoutedFriction) -> tuple[tuple[bool, str, float], ...]:

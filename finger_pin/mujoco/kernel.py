@@ -20,6 +20,7 @@ from finger_pin.exchange.mujoco_friction import (
     EXPONENT,
     FLOOR,
     FORCE,
+    HARDENING,
     KIND,
     LENGTH,
     LEVEL,
@@ -157,7 +158,8 @@ def _exerted(p: Pointer, of_pin: bool, seen: Seen, force: float, dt: float) -> t
     """Return the level by (9b), (16), and a friction's part of its row: F - x, c + b, and the most that it exerts."""
     speed, tension, pressing, most, turn = seen
     level = _level(of_pin, p[COULOMB], p[STATIC], p[STRIBECK], p[EXPONENT], p[FLOOR], p[DRAG], speed, pressing, turn)
-    pull, damp, limit = _law(level, p[STIFFNESS], p[VISCOUS], p[MICRO], speed, tension, most, force, dt)
+    stiffness = p[STIFFNESS] + p[HARDENING] * abs(force)
+    pull, damp, limit = _law(level, stiffness, p[VISCOUS], p[MICRO], speed, tension, most, force, dt)
     return level, p[RATIO] * pull, p[RATIO] * p[RATIO] * damp, abs(p[RATIO]) * limit
 
 
@@ -198,7 +200,8 @@ def advance(m: int, d: int, instance: int, at: Model, of: Data, contact: Contact
         if kind != PIN and states[place + LOAD] == 0.0 and max(level, abs(bristle)) <= NUMERICAL_FLOOR:
             # A tendon that is slack: its bristles stand up, so that the next step need not ask for them.
             bristle = speed = 0.0
-        act[z] = bristle + _slide(bristle, values[e + STIFFNESS] * dt * speed, level)[0]
+        stiffness = values[e + STIFFNESS] + values[e + HARDENING] * abs(bristle)
+        act[z] = bristle + _slide(bristle, stiffness * dt * speed, level)[0]
         if kind == PIN:
             places[objects[e]], pins = x, True
             act[x], act[x + 1], act[x + 2] = 0.0, 0.0, 0.0

@@ -83,6 +83,7 @@ class BaseScenario:
             key.startswith("finger.")
             and split(key)[1] is None
             and not (_is_number(found) if numbers else found is not None)
+            and not self._left_out(key)
         ):
             raise self._nothing(key, numbers)
         problem: InputError | None = None
@@ -111,6 +112,8 @@ class BaseScenario:
             InputError: If it has none.
         """
         held = self._found(key)
+        if self._left_out(key):
+            raise InputError(key, "is left out of the scenario, so that there is no number to start from: state it")
         if not _is_number(held):
             raise self._nothing(key, True)
         return float(held)
@@ -118,6 +121,12 @@ class BaseScenario:
     def _nothing(self, key: str, numbers: bool) -> InputError:
         hint = suggestion(key, _leaves(self.scenario.model_dump(mode="python"), "", numbers))
         return InputError(key, f"the scenario has no such {'number' if numbers else 'entry'}{hint}")
+
+    def _left_out(self, key: str) -> bool:
+        """Return whether a key names an entry that may be left out, and is."""
+        parent, _, name = key.rpartition(".")
+        below = _look_up(self.scenario, parent)
+        return isinstance(below, dict) and below.get(name, 0) is None
 
     def _found(self, key: str) -> Any:
         return _look_up(self.scenario, key)

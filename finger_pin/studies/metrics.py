@@ -13,7 +13,7 @@ import cloudpickle
 import numpy as np
 import xarray as xr
 
-from finger_pin.analysis import force_polytope, self_locking_margin
+from finger_pin.analysis import force_polytope, self_locking_margin, spring_return
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
@@ -22,11 +22,20 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rows import LOST
 from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.energy import entries
-from finger_pin.studies.response import Run, fingertip_hysteresis, grip_margin, rows, settling_time, winding_temperature
+from finger_pin.studies.response import (
+    Run,
+    fingertip_hysteresis,
+    grip_margin,
+    has_reference,
+    rows,
+    settling_time,
+    winding_temperature,
+)
 from finger_pin.typing import Array
 
 #: Greatest tension for the metric of the fingertip force, N.
 FORCE_TENSION = 20.0
+_NO_REFERENCE = "needs a reference: controller.kind is tensions, and reference.joints is empty"
 
 
 @dataclass(frozen=True)
@@ -38,12 +47,14 @@ class Metric:
         unit: SI unit.
         long_name: Its name in words.
         measure: Takes a run and returns the number. Other processes call it.
+        of_reference: Whether it has no meaning without a reference of the joints.
     """
 
     name: str
     unit: str
     long_name: str
     measure: Callable[[Run], float]
+    of_reference: bool = False
 
 
 def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
@@ -71,14 +82,38 @@ def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
     return tuple(chosen.values())
 
 
+def metrics_of(scenario: Scenario, names: Iterable[str | Metric] | None = None) -> tuple[Metric, ...]:
+    """Return metrics by name, or those of `DEFAULT_METRICS` that mean something for a scenario.
+
+    Raises:
+        InputError: As `resolve_metrics`, or if one needs a reference that the scenario does not have.
+    """
+    chosen = resolve_metrics(DEFAULT_METRICS if names is None else names)
+    if has_reference(scenario):
+        return chosen
+    if names is None:
+        return tuple(metric for metric in chosen if not metric.of_reference)
+    for metric in chosen:
+        if metric.of_reference:
+            raise InputError("metric", _NO_REFERENCE, metric.name)
+    return chosen
+
+
 def tracking_rms(run: Run) -> float:
     """Return the root of the mean over time and joints of (theta^d - theta)^2, rad."""
-    return float(np.sqrt(_time_mean(run.result, np.mean(rows(run.result, "tracking_error", "joint") ** 2, axis=1))))
+    return float(np.sqrt(_time_mean(run.result, np.mean(_errors(run) ** 2, axis=1))))
 
 
 def tracking_peak(run: Run) -> float:
     """Return the largest |theta^d - theta| of any joint, rad."""
-    return float(np.max(np.abs(rows(run.result, "tracking_error", "joint"))))
+    return float(np.max(np.abs(_errors(run))))
+
+
+def _errors(run: Run) -> Array:
+    """Return theta^d - theta, shape (m, n), rad, of a run that has a reference."""
+    if not has_reference(run.scenario):
+        raise InputError("metric", _NO_REFERENCE, "tracking error")
+    return rows(run.result, "tracking_error", "joint")
 
 
 def tension_peak(run: Run) -> float:
@@ -133,6 +168,11 @@ def locking_margin(run: Run) -> float:
     return self_locking_margin(run.scenario).margin
 
 
+def return_ratio(run: Run) -> float:
+    """Return the least tension on the way out over that on the way in; of a hand that of its worst finger."""
+    return min(spring_return(finger).ratio for _, finger in run.parts().values())
+
+
 def fingertip_force(run: Run) -> float:
     """Return the largest fingertip force that is possible in every direction, N.
 
@@ -179,8 +219,8 @@ def _final(result: xr.Dataset, name: str) -> float:
 METRICS = {
     metric.name: metric
     for metric in (
-        Metric("tracking_rms", "rad", "tracking error, rms over time and joints", tracking_rms),
-        Metric("tracking_peak", "rad", "largest tracking error of any joint", tracking_peak),
+        Metric("tracking_rms", "rad", "tracking error, rms over time and joints", tracking_rms, True),
+        Metric("tracking_peak", "rad", "largest tracking error of any joint", tracking_peak, True),
         Metric("tension_peak", "N", "largest tension at either end of any tendon", tension_peak),
         Metric("tension_mean", "N", "delivered tension, mean over time and tendons", tension_mean),
         Metric("losses", "J", "energy lost, but for the heat in windings", losses),
@@ -193,12 +233,14 @@ METRICS = {
         Metric("settling_time", "s", "time until all joints stay near their end", settling_time),
         Metric("grip_margin", "1", "friction that contacts have left at the end, share", grip_margin),
         Metric("current_peak", "A", "largest current of any motor", current_peak),
-        Metric("self_locking_margin", "1", "critical over actual joint friction", locking_margin),
+        Metric("self_locking_margin", "1", "critical over actual joint friction", locking_margin, True),
+        Metric("return_ratio", "1", "tension at which springs return over that which winds in", return_ratio),
         Metric(
             "fingertip_force",
             "N",
             f"fingertip force that is possible in every direction with tensions up to {FORCE_TENSION:g} N",
             fingertip_force,
+            True,
         ),
     )
 }

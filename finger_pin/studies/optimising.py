@@ -20,7 +20,7 @@ from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import PointList
 from finger_pin.studies.keys import BaseScenario, Point
-from finger_pin.studies.metrics import Metric
+from finger_pin.studies.metrics import Metric, metrics_of
 from finger_pin.studies.problem import (
     Constraint,
     Goals,
@@ -116,6 +116,7 @@ def optimise(
     effort = effort or Effort()
     goals = Goals.from_metrics(minimise, maximise, constraints)
     base = BaseScenario.load(scenario, overrides, finger)
+    metrics_of(base.scenario, goals.metrics)
     variables = _variables(over, base)
     own = start_of(variables, base)
     described = {**goals.describe(), **vars(effort), "variables": [variable.describe() for variable in variables]}

@@ -18,6 +18,8 @@ from finger_pin.typing import Array
 
 #: Parts of its travel in which the ways of a fingertip are compared.
 HYSTERESIS_BINS = 20
+# Variables that command a finger, besides inputs of rows.
+_COMMANDS = ("tendon_command", "tendon_winding", "spool_angle")
 #: Share of its travel from its end that a joint is settled within.
 SETTLED = 0.02
 #: Share of a run, at its end, that a grip is judged by.
@@ -90,32 +92,64 @@ def fingertip_hysteresis(run: Run) -> float:
     """Return the largest distance of the fingertip on the way out from that on the way back, m.
 
     Way and place are those of the fingertip of the reference along the direction in which it moves most; the ways are
-    compared in `HYSTERESIS_BINS` parts of its travel by the mean of the tip less that of the reference. Of a hand the
-    largest of its fingers; 0 where the reference does not move to and fro.
+    compared in `HYSTERESIS_BINS` parts of its travel by the mean of the tip less that of the reference. Without a
+    reference they are those of the command, and the tip's is less a cubic of it. Of a hand the largest of its fingers.
+
+    Raises:
+        InputError: If neither moves to and fro.
     """
-    return max(_hysteresis(run.result, name, finger) for name, (_, finger) in run.parts().items())
+    found = [_hysteresis(run, name, finger) for name, (_, finger) in run.parts().items()]
+    if all(np.isnan(found)):
+        what = "the reference" if has_reference(run.scenario) else "without a reference the command"
+        raise InputError("fingertip_hysteresis", f"{what} must move to and fro")
+    return float(np.nanmax(found))
 
 
-def _hysteresis(result: xr.Dataset, name: str, finger: Finger) -> float:
-    hand = any("." in str(each) for each in result["joint"].values)
-    joints = [f"{name}.{joint}" if hand else joint for joint in finger.routing.joints]
-    wanted, tip = (
-        finger.motion(angles, np.zeros_like(angles)).tip.reshape(-1, 3)
-        for angles in (rows(result.sel(joint=joints), each, "joint") for each in ("joint_reference", "joint_position"))
-    )
-    centred = wanted - wanted.mean(axis=0)
-    along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+def has_reference(scenario: Scenario) -> bool:
+    """Return whether joints have angles to be at: given tensions have none, unless the scenario states them."""
+    return scenario.controller.kind != "tensions" or bool(scenario.reference.joints)
+
+
+def _commands(result: xr.Dataset, prefix: str) -> Array:
+    """Return all commands of a finger in parts of their ranges, shape (m, k), less those that stand still."""
+    found = [np.zeros((result.sizes["time"], 0))]
+    for name, each in result.data_vars.items():
+        if name in _COMMANDS or str(name).endswith("_input"):
+            own = [column for column in each.dims if column != "time"]
+            columns = np.asarray(each.transpose("time", ...).values).reshape(result.sizes["time"], -1)
+            names = [str(label) for label in each[own[0]].values] if own else [""]
+            found.append(columns[:, [label.startswith(prefix) for label in names]])
+    stacked = np.hstack(found)
+    span = np.ptp(stacked, axis=0)
+    return np.asarray(stacked[:, span > 0.0] / span[span > 0.0])
+
+
+def _hysteresis(run: Run, name: str, finger: Finger) -> float:
+    """Return the hysteresis of one finger, m; nan where nothing goes to and fro."""
+    result = run.result
+    prefix = f"{name}." if any("." in str(each) for each in result["joint"].values) else ""
+    of_finger = result.sel(joint=[prefix + joint for joint in finger.routing.joints])
+
+    def tip_of(variable: str) -> Array:
+        angles = rows(of_finger, variable, "joint")
+        return finger.motion(angles, np.zeros_like(angles)).tip.reshape(-1, 3)
+
+    tracked, tip = has_reference(run.scenario), tip_of("joint_position")
+    course = tip_of("joint_reference") if tracked else _commands(result, prefix)
+    centred = course - course.mean(axis=0)
+    along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0] if centred.any() else np.zeros(len(tip))
     travel = float(np.ptp(along))
     if travel < 1e-9:
-        return 0.0
+        return np.nan
+    wanted = course if tracked else np.vander(along, 4) @ np.linalg.lstsq(np.vander(along, 4), tip, rcond=None)[0]
     place = np.minimum((HYSTERESIS_BINS * (along - along.min()) / travel).astype(int), HYSTERESIS_BINS - 1)
     out = np.gradient(along) > 0.0
-    error, apart = tip - wanted, 0.0
+    error, apart = tip - wanted, np.nan
     for part in range(HYSTERESIS_BINS):
         there, back = (error[(place == part) & way] for way in (out, ~out))
         if len(there) and len(back):
-            apart = max(apart, float(np.linalg.norm(there.mean(axis=0) - back.mean(axis=0))))
-    return apart
+            apart = np.fmax(apart, np.linalg.norm(there.mean(axis=0) - back.mean(axis=0)))
+    return float(apart)
 
 
 def settling_time(run: Run) -> float:

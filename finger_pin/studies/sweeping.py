@@ -16,7 +16,7 @@ from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
 from finger_pin.studies.keys import BaseScenario, Value
-from finger_pin.studies.metrics import DEFAULT_METRICS, Metric, resolve_metrics
+from finger_pin.studies.metrics import Metric, metrics_of
 from finger_pin.studies.records import Progress, evaluate, open_study
 from finger_pin.studies.store import describe_study, write
 
@@ -27,7 +27,7 @@ def sweep(
     scenario: ScenarioLike,
     over: Design | Mapping[str, Sequence[Value]],
     *,
-    metrics: Iterable[str | Metric] = DEFAULT_METRICS,
+    metrics: Iterable[str | Metric] | None = None,
     overrides: Mapping[str, Any] | None = None,
     finger: FingerLike | None = None,
     output: str | Path | None = None,
@@ -48,7 +48,8 @@ def sweep(
         scenario: The scenario to be varied, its name, or the path of a file.
         over: A design, or the values of every key, which make a grid. Keys are those of `load_scenario`; an index as in
             ``environment.fingertip_force[2]`` means one number of a list.
-        metrics: Names of `METRICS`, or metrics of one's own.
+        metrics: Names of `METRICS`, or custom metrics; by default `DEFAULT_METRICS`, without tracking errors where the
+            scenario has no reference.
         overrides: Entries of the scenario that hold at all points.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
         output: Folder for ``study.toml``, ``runs.jsonl`` and ``sweep.nc``; by default nothing is kept.
@@ -69,8 +70,8 @@ def sweep(
         ExecutorError: If the executor cannot go on.
     """
     design = Grid(over) if isinstance(over, Mapping) else over
-    chosen = resolve_metrics(metrics)
     base = BaseScenario.load(scenario, overrides, finger)
+    chosen = metrics_of(base.scenario, metrics)
     for key, values in design.values.items():
         base.check(key, values, alone=len(design.values) == 1)
     asked = {} if output is None else describe_study(base, chosen, {"sweep": design.describe()})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.analysis import SelfLockingMap, SelfLockingMargin, critical_friction, self_locking_margin
+from finger_pin.analysis import SelfLockingMap, SelfLockingMargin, SpringReturn, critical_friction, self_locking_margin
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.views.summary import table
@@ -54,6 +54,38 @@ def summarize_locking(scenario: Scenario, found: SelfLockingMap) -> str:
         what = "With tendons, gears and what motors can pull"
         blocks.append([f"{what}, {place}", _closest(self_locking_margin(scenario, servos=True))])
     return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def summarize_return(found: SpringReturn) -> str:
+    """Return in plain text whether springs bring a finger back, and the tensions between which the cord holds it."""
+    ends = {"least bent": 0, "most bent": -1}
+    rows = [
+        (f"{joint}, {place}", f"{found.winding_in[row, k]:.3g}", f"{max(found.letting_out[row, k], 0.0):.3g}")
+        for k, joint in enumerate(found.joints)
+        for place, row in ends.items()
+    ]
+    joint, position = found.worst
+    where = f"{joint} at ({', '.join(f'{each:.3g}' for each in np.rad2deg(position))}) deg"
+    stays = "it comes back when the cord is let go, from every posture"
+    if not found.returns:
+        stuck = [name for name, column in zip(found.joints, found.letting_out.T, strict=True) if np.any(column <= 0.0)]
+        stays = f"it does not come back when the cord is let go: {', '.join(stuck)}"
+    return "\n".join(
+        [
+            f"Springs against {found.cord}, N: the cord moves a joint in from, and lets it back from",
+            *table(("joint", "in", "back"), rows),
+            "",
+            f"  {stays}",
+            f"  {_of_springs(found.margin)}",
+            f"  tension back over tension in: at least {found.ratio:.3g}, {where}",
+        ]
+    )
+
+
+def _of_springs(margin: float) -> str:
+    if np.isinf(margin):
+        return "nothing resists the springs once the cord is slack"
+    return f"the springs are {margin:.3g} times what resists them once the cord is slack"
 
 
 def _closest(margin: SelfLockingMargin) -> str:

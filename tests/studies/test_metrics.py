@@ -7,7 +7,7 @@ import xarray as xr
 import finger_pin as fp
 from finger_pin.analysis import largest_force
 from finger_pin.description.actuators import Winding
-from finger_pin.studies.metrics import FORCE_TENSION, METRICS, Metric, Run, resolve_metrics
+from finger_pin.studies.metrics import FORCE_TENSION, METRICS, Metric, Run, metrics_of, resolve_metrics
 
 # Uneven times: means over samples would be others.
 TIME = np.array([0.0, 1.0, 2.0, 6.0])
@@ -128,6 +128,51 @@ def test_the_hysteresis_of_a_fingertip_is_the_chord_between_its_two_ways():
     assert METRICS["fingertip_hysteresis"].measure(run) == pytest.approx(2.0 * length * np.sin(behind), rel=0.02)
     run.result["joint_position"] = run.result["joint_reference"]
     assert METRICS["fingertip_hysteresis"].measure(run) == 0.0
+
+
+def open_loop(command):
+    """A run of given tensions whose second joint is 0.05 rad behind the first of them, and that tension, N."""
+    run, time = Run(fp.load_scenario("wound")), np.linspace(0.0, 4.0, 4001)
+    finger = run.scenario.finger
+    pull, joints = command(time), list(finger.joints)
+    reached = 0.3 * pull - 0.05 * np.sign(np.gradient(pull))
+    angles = reached[:, None] * (np.arange(len(joints)) == 1)
+    pulls = pull[:, None] * (np.arange(len(finger.tendons)) == 0)
+    data = {"joint_position": (("time", "joint"), angles), "tendon_command": (("time", "tendon"), pulls)}
+    data["joint_reference"] = data["tracking_error"] = (("time", "joint"), 0.0 * angles)
+    run.result = xr.Dataset(data, {"time": time, "joint": joints, "tendon": list(finger.tendons)})
+    return run
+
+
+def test_without_a_reference_the_hysteresis_is_that_over_the_command():
+    """The chord 2 L sin(0.05) between the ways, L from the joint to the tip; a pull without return has none."""
+    run = open_loop(lambda time: 3.0 - np.cos(np.pi * time))
+    finger = fp.Finger(run.scenario.finger)
+    zero = np.zeros(len(finger.routing.joints))
+    length = np.linalg.norm(finger.rigid_body.jacobian(zero)[:, 1])
+    assert METRICS["fingertip_hysteresis"].measure(run) == pytest.approx(2.0 * length * np.sin(0.05), rel=0.02)
+    with pytest.raises(fp.InputError, match="must move to and fro"):
+        METRICS["fingertip_hysteresis"].measure(open_loop(lambda time: 1.0 + time))
+
+
+def test_what_needs_a_reference_says_so_where_there_is_none():
+    """No metric of joints' errors is a number, by name or by default, of a search as of a sweep."""
+    run = open_loop(lambda time: 3.0 - np.cos(np.pi * time))
+    lacking = [name for name, metric in METRICS.items() if metric.of_reference]
+    assert {"tracking_rms", "tracking_peak"} <= set(lacking)
+    for name in lacking:
+        with pytest.raises(fp.InputError, match="needs a reference"):
+            metrics_of(run.scenario, [name])
+    for name in ("tracking_rms", "tracking_peak"):
+        with pytest.raises(fp.InputError, match="needs a reference"):
+            METRICS[name].measure(run)
+    over, short = {"finger.tendon_friction.coulomb": [0.1]}, {"simulation.duration": 0.01}
+    with pytest.raises(fp.InputError, match="needs a reference"):
+        fp.sweep("wound", over, metrics=["tracking_rms"], overrides=short)
+    with pytest.raises(fp.InputError, match="needs a reference"):
+        fp.optimise("wound", ["finger.tendon_friction.coulomb=0.1:0.2"], minimise=["tracking_rms"], constraints=[])
+    study = fp.sweep("wound", over, overrides=short)
+    assert "tracking_rms" not in study and float(study.tension_peak[0]) >= 0.0
 
 
 def test_the_settling_time_of_a_first_order_response_is_four_time_constants():

@@ -249,3 +249,12 @@ def test_wrong_input_writes_nothing(tmp_path, over, options):
     with pytest.raises(fp.InputError):
         fp.sweep("fig6", over, output=tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
+
+
+def test_an_entry_that_is_left_out_may_be_swept_and_a_search_says_that_it_has_no_start():
+    """Bristles of `canal` state no stiffness."""
+    key, short = "finger.tendon_friction.stiffness", {"simulation.duration": 0.01}
+    study = fp.sweep("canal", {key: [1e4, 1e5]}, metrics=["losses"], overrides=short)
+    assert np.isfinite(study.losses.values).all()
+    with pytest.raises(fp.InputError, match=f"{key}: is left out"):
+        fp.optimise("canal", [f"{key}=1e4:1e5"], minimise=["losses"], constraints=[], overrides=short)

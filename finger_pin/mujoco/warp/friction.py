@@ -49,6 +49,7 @@ class Friction:
         micro_damping: N s/m, N m s/rad.
         drag: Of a tendon its constant friction loss where it was not given.
         curvature_offset: rad, of a tendon.
+        hardening: Growth of the stiffness with the bristles' force, 1/m, 1/rad; 0 where a stiffness was given.
         level: Friction of steady sliding.
         friction: Friction, along the tendon's length or the joint's coordinate, against the motion.
         tension: Load, N: of a tendon its tension, of a joint the reaction (17).
@@ -68,7 +69,7 @@ class Friction:
             s.law.assign(np.broadcast_to(law, (LAW, d.nworld, len(found))).copy())
             self._every = wp.full((d.nworld,), True, dtype=bool)
         self.coulomb, self.stiction, self.stiffness, self.viscous, self.stribeck_velocity = (s.law[k] for k in range(5))
-        self.floor, self.stribeck_exponent, self.micro_damping, self.drag, self.curvature_offset = (
+        self.floor, self.stribeck_exponent, self.micro_damping, self.drag, self.curvature_offset, self.hardening = (
             s.law[k] for k in range(5, LAW)
         )
         self.level, self.friction, self.tension, self.turn = (s.signals[k] for k in (LEVEL, FORCE, LOAD, TURN))

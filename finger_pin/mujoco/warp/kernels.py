@@ -17,7 +17,7 @@ wp.set_module_options({"enable_backward": False})
 # Constants, as Warp reads them.
 _PIN, _LINK, _BRANCH = (wp.constant(each) for each in (table.PIN, table.LINK, table.BRANCH))
 _LEVEL, _FORCE, _LOAD, _TURN, _SIGNALS = (wp.constant(each) for each in range(table.SIGNALS + 1))
-_COULOMB, _STATIC, _STIFFNESS, _VISCOUS, _STRIBECK, _FLOOR, _EXPONENT, _MICRO, _DRAG, _OFFSET = (
+_COULOMB, _STATIC, _STIFFNESS, _VISCOUS, _STRIBECK, _FLOOR, _EXPONENT, _MICRO, _DRAG, _OFFSET, _HARDENING = (
     wp.constant(each) for each in range(places.LAW)
 )
 _BRISTLE, _HELD, _CONTACT, _MEMORY = (
@@ -62,7 +62,8 @@ def finish(
             # A tendon that is slack: its bristles stand up.
             bristle, speed = float(0.0), float(0.0)
         dt = timestep[w % timestep.shape[0]]
-        change, _left = functions.slide(bristle, s.law[_STIFFNESS, w, f] * dt * speed * t.ratio[f], level)
+        stiffness = s.law[_STIFFNESS, w, f] + s.law[_HARDENING, w, f] * wp.abs(bristle)
+        change, _left = functions.slide(bristle, stiffness * dt * speed * t.ratio[f], level)
         s.memory[w, f, _BRISTLE] = bristle + change
         for k in range(_HELD, _MEMORY):
             s.memory[w, f, k] = s.following[w, f, k]
@@ -97,8 +98,9 @@ def _write_terms(t: Table, s: State, w: int, f: int, seen: wp.vec4, most: float,
         seen[2],
         turn,
     )
+    stiffness = law[_STIFFNESS, w, f] + law[_HARDENING, w, f] * wp.abs(seen[3])
     pull, damp, limit = functions.exerted(
-        level, law[_STIFFNESS, w, f], law[_VISCOUS, w, f], law[_MICRO, w, f], seen[0], seen[1], most, seen[3], dt
+        level, stiffness, law[_VISCOUS, w, f], law[_MICRO, w, f], seen[0], seen[1], most, seen[3], dt
     )
     s.signals[_LEVEL, w, f] = level
     s.signals[_LOAD, w, f] = seen[1]

@@ -2,10 +2,10 @@
 
 import warp as wp
 
-from finger_pin.exchange.mujoco_friction import COULOMB, OFFSET, SIGNALS
+from finger_pin.exchange.mujoco_friction import COULOMB, HARDENING, SIGNALS
 
 #: Numbers of the law, from coulomb to curvature_offset.
-LAW = OFFSET + 1 - COULOMB
+LAW = HARDENING + 1 - COULOMB
 #: Of each friction in `State.memory`: the bristles' force, the force of limits and equalities, three of contacts.
 BRISTLE, HELD, CONTACT, MEMORY = 0, 1, 2, 5
 #: Of each row: F - x, c + b, and the most that it exerts.

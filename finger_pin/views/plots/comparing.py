@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.exceptions import InputError
+from finger_pin.simulation.recording import is_tracking
 from finger_pin.views.plots.lines import names, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, styled, thin
@@ -23,8 +24,8 @@ def compare(
 ) -> Figure:
     """Draw two results of fingers with the same joints and tendons over each other.
 
-    (a) theta by joint, deg, with the references. (b) theta^d - theta by joint, deg. (c) The delivered tension f by
-    tendon, N.
+    (a) theta by joint, deg, with the references. (b) theta^d - theta by joint, deg, or where no joints had a reference
+    theta', deg/s. (c) The delivered tension f by tendon, N.
 
     Args:
         first: Dataset of `simulate`.
@@ -45,9 +46,12 @@ def compare(
     figure, parts = sheet([(4.8, height)] * 3, width, titles)
     start = min(result["time"].values[0] for result in (first, second))
     end = max(result["time"].values[-1] for result in (first, second))
+    tracks, degrees = is_tracking(first) or is_tracking(second), 180.0 / np.pi
     columns = (
-        (joints, "°", "(a) joint angles, reference dashed", "joint_position", "joint", 180.0 / np.pi),
-        (joints, "°", "(b) tracking errors", "tracking_error", "joint", 180.0 / np.pi),
+        (joints, "°", f"(a) joint angles{', reference dashed' if tracks else ''}", "joint_position", "joint", degrees),
+        (joints, "°", "(b) tracking errors", "tracking_error", "joint", degrees)
+        if tracks
+        else (joints, "°/s", "(b) joint velocities, without a reference", "joint_velocity", "joint", degrees),
         (tendons, "N", "(c) delivered tensions", "tendon_tension", "tendon", 1.0),
     )
     for part, (rows, unit, text, variable, coordinate, scale) in zip(parts, columns, strict=True):
@@ -56,7 +60,9 @@ def compare(
         for result, label, colour in zip((first, second), labels, (BLUE, VERMILLION), strict=True):
             time = result["time"].values
             drawn = {variable: {"label": label, "color": colour, "linewidth": thin()}}
-            if variable == "joint_position":
+            if variable == "tracking_error" and not is_tracking(result):
+                continue
+            if variable == "joint_position" and is_tracking(result):
                 drawn["joint_reference"] = {"color": BLACK, "linestyle": "--", "linewidth": thin(0.6), "zorder": 1.5}
             for name, look in drawn.items():
                 values = scale * result[name].transpose("time", coordinate).values

@@ -1,0 +1,70 @@
+"""Bristles without a stiffness: they give by a length at any level, and what sticks stays."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import finger_pin as fp
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings, bristles
+from finger_pin.laws.bristle import bristle_energy, bristle_give, bristle_stiffness
+
+GIVE = {TendonFrictionSettings: 20e-6, JointFrictionSettings: 1e-3}
+NO_PIN = {"finger.joint_friction.coulomb": 0.0, "finger.joint_friction.stiction": 0.0}
+
+
+@pytest.mark.parametrize("kind", GIVE)
+@pytest.mark.parametrize("level", [1e-3, 1e-1, 1e1, 1e3])
+@pytest.mark.parametrize("declared", [True, False], ids=["drag", "load"])
+def test_at_four_fifths_of_any_level_bristles_have_given_by_a_length(kind, level, declared):
+    """By (9a) without inertia dF / dx = sigma_0 (F) (1 - F / level)."""
+    numbers = bristles(kind(), 1, level if declared else 0.0)
+    stiffness, hardening = numbers["stiffness"][0], numbers["hardening"][0]
+    by_share = lambda f: level / (bristle_stiffness(f * level, stiffness, hardening) * (1.0 - f))  # noqa: E731
+    given = quad(by_share, 0.0, 0.8, limit=500)[0]
+    assert given < 1.7 * GIVE[kind]
+    assert not bristles(kind(stiffness=3.0), 1, level)["hardening"].any()
+
+
+def test_energy_and_length_of_hardening_bristles_are_integrals_of_their_stiffness():
+    for force, stiffness, hardening in ((3.0, 50.0, 40.0), (0.01, 50.0, 40.0), (3.0, 50.0, 0.0)):
+        softness = lambda f, s=stiffness, h=hardening: 1.0 / bristle_stiffness(f, s, h)  # noqa: E731
+        energy = quad(lambda f, of=softness: f * of(f), 0.0, force)[0]
+        assert bristle_energy(force, stiffness, hardening) == pytest.approx(energy, rel=1e-9)
+        assert bristle_give(force, stiffness, hardening) == pytest.approx(quad(softness, 0.0, force)[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("level", [1e-2, 0.5, 50.0])
+@pytest.mark.parametrize("declared", [True, False], ids=["drag", "load"])
+def test_a_joint_under_four_fifths_of_its_level_creeps_by_less_than_1e_4_in_a_second(level, declared):
+    """The level is a drag, or what the cord's tension makes on the pin: its arm is then 0.8 of the coefficient.
+
+    A level that grows with the load slips all the way: x = integral of dF / (sigma_0 (F) (1 - 0.8)).
+    """
+    radius = 0.02
+    stays = 1e-3 if declared else 1.05 * bristle_give(0.8 * level, 5.0, 1e4) / 0.2
+    friction = {"drag": level} if declared else {"coulomb": radius / 0.8, "stiction": radius / 0.8}
+    keys = {
+        "finger.tendon_friction.coulomb": 0.0,
+        "finger.joints.drum.spring.stiffness": 0.0,
+        "controller.tensions.T1.height": 0.8 * level / radius,
+        "controller.tensions.T1.duration": 0.5,
+        "simulation.duration": 2.0,
+    }
+    keys |= (NO_PIN if declared else {}) | {f"finger.joint_friction.{name}": value for name, value in friction.items()}
+    result = fp.simulate(fp.load_scenario("canal", keys)).joint_position.sel(joint="drum")
+    after = [float(result.sel(time=time, method="nearest")) for time in (1.0, 2.0)]
+    assert 0.0 < after[0] < stays and abs(after[1] - after[0]) < 1e-4
+
+
+def test_a_cord_that_turns_often_delivers_the_capstan_law():
+    """Round 1.5 turns at mu 0.35: exp(-0.35 x 3 pi) = 0.0369 arrives, of a pull that has slid by a millimetre."""
+    keys = {
+        "finger.tendon_friction.coulomb": 0.35,
+        "finger.tendons.T1.curvature_offset": 3.0 * np.pi,
+        "finger.joints.drum.spring.stiffness": 0.8,
+        "controller.tensions.T1.height": 55.0,
+    }
+    result = fp.simulate(fp.load_scenario("canal", keys | NO_PIN)).sel(time=3.1, method="nearest")
+    assert float(result.tendon_tension[0] / result.tendon_command[0]) == pytest.approx(
+        np.exp(-0.35 * 3 * np.pi), rel=0.05
+    )
