@@ -75,7 +75,7 @@ class JointFrictionSettings(Description):
         "lugre",
         strict=True,
         description='"lugre": (9). "dahl": no Stribeck curve. "coulomb": M^d R tanh(v / v_r) + b v, cannot stick. '
-        '"module:NAME": a `Law` of your own, in a Python module that can be imported.',
+        '"module:NAME": a `Law` of your own, in a Python module that is imported, or that FINGER_PIN_LAWS names.',
     )
     coulomb: Annotated[Numbers, reals(0.0, 0.1, hint=" m (is it in millimetres?)")] = quantity(
         2.5e-4, unit="m", source="estimate", doc="M^d, Coulomb coefficient times pin radius."

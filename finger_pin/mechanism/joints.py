@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,11 +13,10 @@ from finger_pin.description.friction import bristles
 from finger_pin.description.parameters import Spring
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
-from finger_pin.laws.bristle import PIN_FRICTION
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
-from finger_pin.laws.pin import PIN_LAWS, SIGNALS
 from finger_pin.laws.spring import HYSTERESIS, JOINT_SPRING, STIFFER, spring_torque
+from finger_pin.mechanism.joint_laws import joint_law
 from finger_pin.mechanism.rows import Energy, Rows, energy
 from finger_pin.typing import Array
 
@@ -38,8 +36,6 @@ LOSSES = (
     Energy("joint_micro_damping", "joints' micro-damping"),
 )
 _POWERS = {each.name.removeprefix("joint_"): each for each in LOSSES}
-# Numbers of the joints that a law may name.
-_NUMBERS = (*PIN_FRICTION.parameters, "reversal_speed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +82,7 @@ class JointFriction:
         bearing = np.array([tree is None or tree.joints[name].bearing for name in description.joints])
         numbers = bristles(law, size)
         numbers["viscous"] = bearing * numbers["viscous"]
-        chosen = _law(law.law)
+        chosen = joint_law(law.law)
         if np.any(law.drag) and "drag" not in chosen.parameters:
             raise InputError("finger.joint_friction.drag", f"has no effect with law = {law.law!r}, which lacks it")
         return cls(
@@ -140,29 +136,6 @@ class JointFriction:
                 _POWERS.get(name) or energy(f"joint_{name}") for name in (*self.law.supplies, *self.law.losses)
             ),
         )
-
-
-def _law(name: str) -> Law:
-    """Return a law of joint friction by its name, or the user's by that of its module and its own.
-
-    Raises:
-        InputError: If there is none, or it cannot be the friction of a joint.
-    """
-    if name in PIN_LAWS:
-        return PIN_LAWS[name]
-    module, _, own = name.partition(":")
-    try:
-        law = getattr(importlib.import_module(module), own)
-    except (ImportError, AttributeError) as error:
-        raise InputError("finger.joint_friction.law", f"cannot be imported: {error}", name) from None
-    if not isinstance(law, Law):
-        raise InputError("finger.joint_friction.law", f"must be a Law, not {type(law).__name__}", name)
-    for kind, has, known in (("parameters", _NUMBERS, law.parameters), ("signals", law.signals, SIGNALS)):
-        if lacking := [each for each in known if each not in has]:
-            allowed = f"the law's {kind} must be some of" if kind == "parameters" else "the law must have the signals"
-            names = ", ".join(_NUMBERS if kind == "parameters" else SIGNALS)
-            raise InputError("finger.joint_friction.law", f"{allowed} {names}: see {', '.join(lacking)}", name)
-    return law
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,7 @@
 """Laws of joint friction chosen by name: Dahl's, Coulomb's and a user's, against what they are by definition."""
 
+import contextlib
+import importlib
 import sys
 
 import numpy as np
@@ -7,6 +9,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.description.loading import read_scenario
+from finger_pin.views.summary import summarize
+from finger_pin.views.viewer import write_animation
 
 SHORT = {"simulation.duration": 0.3}
 LAW = "finger.joint_friction.law"
@@ -43,6 +47,7 @@ def own(tmp_path, monkeypatch):
     """A module with laws, which can be imported."""
     (tmp_path / "laws_of_mine.py").write_text(OWN, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("FINGER_PIN_LAWS", "no_such_module, laws_of_mine")
     yield
     sys.modules.pop("laws_of_mine", None)
 
@@ -133,6 +138,33 @@ def test_a_law_that_there_is_not_and_keys_that_it_does_not_have_are_refused_in_o
     with pytest.raises(fp.InputError, match=says) as caught:
         fp.simulate(scenario(law, **more))
     assert "\n" not in str(caught.value) and caught.value.entry.startswith("finger.joint_friction")
+
+
+def test_a_scenario_imports_no_module_unless_the_user_has_or_allows_it(own, monkeypatch, tmp_path):
+    """However the scenario is read: from a table, a file, or the netCDF of a result."""
+    law, mark = "laws_of_mine:SOFT", tmp_path / "ran"
+    with (tmp_path / "laws_of_mine.py").open("a") as module:
+        module.write(f"open({str(mark)!r}, 'w').close()\n")
+    result = fp.simulate(scenario("lugre"))
+    result.attrs["finger"] = result.attrs["finger"].replace('"lugre"', f'"{law}"', 1)
+    assert law in result.attrs["finger"]
+    doors = {
+        "simulate": lambda: fp.simulate(scenario(law)),
+        "finger": lambda: fp.Finger(scenario(law)),
+        "view": lambda: write_animation(result, tmp_path / "page.html"),
+        "summary": lambda: summarize(result),
+    }
+    for allowed in ("", "laws", "laws_of_mine.more"):
+        monkeypatch.setenv("FINGER_PIN_LAWS", allowed)
+        for name, door in doors.items():
+            with contextlib.suppress(fp.InputError):
+                door()
+            assert not mark.exists(), name
+    with pytest.raises(fp.InputError, match="import laws_of_mine first or set FINGER_PIN_LAWS=laws_of_mine") as caught:
+        fp.Finger(scenario(law))
+    assert "\n" not in str(caught.value)
+    importlib.import_module("laws_of_mine")
+    assert mark.exists() and fp.Finger(scenario(law))
 
 
 SPRING, DRAG = 0.05, 0.01

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 import viser
 
+from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 from finger_pin.views.playground.charts import Charts
 from finger_pin.views.playground.inputs import SCENARIO, Slider
@@ -22,6 +23,8 @@ PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 _RECORD, _STOP = "Record", "Stop and save"
 # Springs at the tips, N/m.
 _SOFTEST, _STIFFEST = 1.0, 100.0
+# Where such a spring may end, m from the base.
+_FARTHEST = 10.0
 _DEGREE = np.pi / 180.0
 # Sliders that move nothing follow at every fifth report, so that one can type beside them.
 _EVERY = 5
@@ -163,7 +166,7 @@ class Panel:
             stiffness = self._gui.add_slider(
                 "Stiffness, N/m", min=_SOFTEST, max=_STIFFEST, step=1.0, initial_value=session.stiffness
             )
-            stiffness.on_update(lambda _: setattr(session, "stiffness", float(stiffness.value)))
+            stiffness.on_update(lambda _: self._player.later(lambda: setattr(session, "stiffness", _number(stiffness))))
 
     def _ticked(self, index: int, event: Any) -> None:
         shown = bool(event.target.value)
@@ -176,12 +179,14 @@ class Panel:
 
     def _dragging(self, index: int) -> Callable[[Any], Coroutine[Any, Any, None]]:
         async def dragged(event: Any) -> None:
-            place = np.array(event.target.position)
+            place = np.array(event.target.position, dtype=float)
             self._player.later(lambda: self._drag(index, place))
 
         return dragged
 
     def _drag(self, index: int, place: Array) -> None:
+        if not (np.abs(place) <= _FARTHEST).all():
+            raise InputError("spring", f"must end within {_FARTHEST:g} m of the base", place.tolist())
         if self._stage.crosses[index].visible:
             self._player.session.handles[index] = place
 
@@ -194,8 +199,8 @@ class Panel:
             handle.on_update(partial(self._change, index))
 
     def _change(self, index: int, event: Any) -> None:
-        value = float(event.target.value)
-        self._player.later(lambda: self._player.session.change(index, value))
+        handle = event.target
+        self._player.later(lambda: self._player.session.change(index, _number(handle)))
 
     def let_go(self) -> None:
         """Hide all crosses."""
@@ -228,6 +233,14 @@ class Panel:
         for kind in self._sliders:
             if kind != inputs.kind:
                 self._set(kind, inputs.present(kind, now.position))
+
+
+def _number(handle: Any) -> float:
+    """Return the value of a slider; a message may have set it beyond its ends."""
+    value = float(handle.value)
+    if not handle.min <= value <= handle.max:
+        raise InputError(handle.label, f"must be from {handle.min:g} to {handle.max:g}", value)
+    return value
 
 
 def shown(slider: Slider) -> tuple[str, float, float, float]:

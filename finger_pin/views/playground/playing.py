@@ -17,6 +17,7 @@ import viser
 from finger_pin.exceptions import FingerPinError
 from finger_pin.simulation.progress import in_notebook
 from finger_pin.simulation.simulator import Simulator
+from finger_pin.views.playground.access import own_page_only
 from finger_pin.views.playground.pacing import Pacer
 from finger_pin.views.playground.panel import PAUSE, PLAY, RESET, STEP, Panel
 from finger_pin.views.playground.session import Session, save_pieces
@@ -47,7 +48,8 @@ class Playground:
         self._folder, self._pacer = folder, Pacer()
         self._jobs: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._closed, self._reported = threading.Event(), 0.0
-        self._server = viser.ViserServer(host=host, port=port, label=session.scenario.name, verbose=False)
+        with own_page_only(host):
+            self._server = viser.ViserServer(host=host, port=port, label=session.scenario.name, verbose=False)
         self.url = f"http://{host}:{self._server.get_port()}/"
         self._stage = Stage(self._server, session)
         self._panel = Panel(self._server, self, self._stage)
@@ -117,9 +119,7 @@ class Playground:
                 self._closed.wait(_IDLE)
                 continue
             try:
-                with suppress(queue.Empty):
-                    while True:
-                        self._jobs.get_nowait()()
+                self._work()
                 if self.playing:
                     self._pacer.stepped(self._advance(self._pacer.due()))
                 else:
@@ -128,6 +128,18 @@ class Playground:
             except FingerPinError as error:
                 self._refuse(str(error), error)
             self._closed.wait(self._pacer.rest())
+
+    def _work(self) -> None:
+        """Do what the page has asked for; whatever is wrong with it is refused, and the playing goes on."""
+        with suppress(queue.Empty):
+            while True:
+                job = self._jobs.get_nowait()
+                try:
+                    job()
+                except FingerPinError as error:
+                    self._refuse(str(error), error)
+                except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+                    self.message = f"refused: {type(error).__name__}: {error}"
 
     def _refuse(self, text: str, error: FingerPinError) -> None:
         self.message = text
