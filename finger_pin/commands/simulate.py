@@ -41,6 +41,9 @@ def simulate(
     mujoco: Annotated[
         Path | None, typer.Option(metavar="XML", help="Instead of a scenario: move the hand of a MuJoCo model.")
     ] = None,
+    variables: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="Variables to store, such as joint_position,tendon_tension.")
+    ] = None,
     quiet: Quiet = False,
     listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers, hands, methods, and exit.")] = False,
 ) -> None:
@@ -51,12 +54,14 @@ def simulate(
         return
     from finger_pin.description.loading import load_scenario
     from finger_pin.simulation.convergence import tightened
+    from finger_pin.simulation.recording import only
     from finger_pin.simulation.results import ResultFolder
 
     loaded = load_scenario(scenario, changed) if mujoco is None else _hand(mujoco, changed, quiet)
     output = output or Path("results", default_name(loaded, settings, duration, method))
     if check:
         tightened(loaded)
+    stored = None if variables is None else _stored(variables, loaded)
     with ResultFolder(output) as folder:
         token = CancelToken()
         result, problem = compute(loaded, token, quiet, check)
@@ -66,7 +71,7 @@ def simulate(
             raise problem
         with noted("earlier results are as they were"):
             with token:
-                folder.write(result)
+                folder.write(result if stored is None else only(result, [*stored, "convergence_difference"]))
             trouble = draw(result, folder, token, figures, format)
             problem = (problem or trouble) if token.cancelled else (trouble or problem)
             with token:
@@ -82,6 +87,17 @@ def simulate(
         from finger_pin.views.viewer import view as show
 
         show(result)
+
+
+def _stored(text: str, scenario: Scenario) -> list[str]:
+    """Return the names of the variables to store; pictures and summary are of all."""
+    from finger_pin.control.closed_loop import ClosedLoop
+    from finger_pin.simulation.recording import refuse_unknown
+    from finger_pin.simulation.variables import variables
+
+    names = [name.strip() for name in text.split(",")]
+    refuse_unknown("--variables", names, variables(ClosedLoop.from_scenario(scenario)))
+    return names
 
 
 def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:

@@ -22,6 +22,10 @@ _OBJECTS = {
     "object_pose": ("object_position", "object_orientation"),
     "object_velocity": ("object_velocity", "object_angular_velocity"),
 }
+#: Attribute of a result: how many pairs of contacts it leaves out, as they never came near.
+LEFT_OUT = "contacts_left_out"
+# Pairs whose gap stays above this never come near, m.
+_NEAR = 1e-3
 _CONTACT, _SPACE = ("time", "contact"), ("time", "contact", "axis")
 
 
@@ -115,14 +119,35 @@ def last_touching(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
     parts = {"contact_bend": ("contact_bend",)} | (_OBJECTS if around.free else {})
     for dimension, expected in (("contact", around.contacts.names), ("object", tuple(around.free))):
         found = tuple(map(str, last[dimension].values)) if dimension in last.coords else ()
-        if found != expected:
+        left_out = last.attrs.get(LEFT_OUT, 0) if dimension == "contact" else 0
+        if found != expected and not (left_out and left_out + len(found) == len(expected) and {*found} < {*expected}):
             raise InputError("initial", f"is a result with other {dimension}s: they must be {', '.join(expected)}")
+    # Bristles of pairs that never came near are not bent.
+    last = last[[name for names in parts.values() for name in names]]
+    last = last.reindex(contact=list(around.contacts.names), fill_value=0.0)
     values = {part: np.concatenate([last[name].values for name in names], axis=-1) for part, names in parts.items()}
     if around.free:
         # A state has angular velocities in the objects' own frames.
         rates, back = values["object_velocity"], last["object_orientation"].values * [-1.0, -1.0, -1.0, 1.0]
         values["object_velocity"] = np.concatenate([rates[..., :3], _turned(back, rates[..., 3:])], axis=-1)
     return {part: each.reshape(-1) for part, each in values.items()}
+
+
+def without_far_pairs(result: xr.Dataset) -> xr.Dataset:
+    """Return a result without the pairs of contacts that never came near; the attribute `LEFT_OUT` counts them.
+
+    Near is a millimetre, and twice what a gap changes by between samples, as pairs may touch between these.
+    """
+    if not {"contact_gap", "contact_bend"} <= {*result.data_vars} or not result.sizes["time"]:
+        return result
+    gap = result["contact_gap"].transpose("time", "contact").values
+    bent = (result["contact_bend"] != 0.0).any(("time", "tangent")).values
+    with np.errstate(invalid="ignore"):
+        change = np.max(np.abs(np.diff(gap, axis=0)), axis=0, initial=0.0)
+        far = (gap.min(axis=0) > _NEAR + 2.0 * change) & ~bent
+    if not far.any():
+        return result
+    return result.isel(contact=~far).assign_attrs({LEFT_OUT: int(result.attrs.get(LEFT_OUT, 0) + far.sum())})
 
 
 def _turned(quaternion: Array, vector: Array) -> Array:

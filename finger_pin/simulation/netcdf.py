@@ -8,6 +8,7 @@ from pathlib import Path
 import xarray as xr
 
 from finger_pin.files import replacing, write_table
+from finger_pin.simulation.contact_variables import without_far_pairs
 from finger_pin.typing import Array
 
 
@@ -15,11 +16,13 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a result to a file, whole or not at all: netCDF4, or its signals as CSV under a name with .csv.
 
     A column of CSV is a signal of one joint, tendon or the like, such as ``joint_position[distal] (rad)``; a row is a
-    sample. Numbers are written so that reading them gives the same floats.
+    sample. Numbers are written so that reading them gives the same floats. Pairs of contacts that never came near are
+    not written: the attribute ``contacts_left_out`` says how many.
 
     Raises:
         OSError: If it cannot be written, such as on a full disk.
     """
+    dataset = without_far_pairs(dataset)
     if Path(path).suffix == ".csv":
         columns = _columns(dataset)
         write_table(path, [columns, *zip(*(column.tolist() for column in columns.values()), strict=True)])

@@ -53,8 +53,16 @@ def recorded(motions: SampledTrajectory, names: Sequence[str] | None = None, ent
         return {name: (each.dims, kept(each.value(motions)), each.attributes) for name, each in chosen.items()}
 
 
+def only(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
+    """Return a result with variables of some names, and all coordinates."""
+    kept = {*names}
+    return result.drop_vars([name for name in result.data_vars if name not in kept])
+
+
 def refuse_unknown(entry: str, names: Iterable[str], known: Iterable[str]) -> None:
     """Raise unless a result has all variables of some names."""
+    if isinstance(names, str):
+        raise InputError(entry, "must be a list of names", names)
     known = list(known)
     for name in names:
         if name not in known:

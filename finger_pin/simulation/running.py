@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -27,9 +27,10 @@ from finger_pin.exceptions import (
 )
 from finger_pin.references.reference import LoopReference
 from finger_pin.simulation.accuracy import CHUNK, judge_error, left_open, open_account, ringing, too_stiff
-from finger_pin.simulation.recording import RunArrays, check_memory, finite_part, record
+from finger_pin.simulation.recording import RunArrays, check_memory, finite_part, only, record, refuse_unknown
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
+from finger_pin.simulation.variables import variables
 from finger_pin.typing import Array
 
 Found = TypeVar("Found", xr.Dataset, RunArrays)
@@ -43,6 +44,7 @@ def run(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
+    names: Sequence[str] | None = None,
 ) -> xr.Dataset:
     """Simulate as `simulate` does, given the loop; Ctrl-C is left to the caller.
 
@@ -54,8 +56,10 @@ def run(
         progress: Called with the simulated time, s.
         observe: Called with the simulated time, s, and all signals.
         stop: Asked now and then.
+        names: Of the variables to keep; by default all.
     """
     loop = loop or ClosedLoop.from_scenario(scenario)
+    needed = None if names is None else [*names, *_judged(loop, names)]
     check_memory(scenario.simulation, loop.finger)
     driving = micro_damping_advice(scenario.finger)
     if driving:
@@ -76,7 +80,7 @@ def run(
     if close:
         warnings.warn(close, SelfLockingWarning, stacklevel=5)
     sampled = SampledTrajectory(loop, trajectory, scenario.sample_times())
-    result = record(scenario, sampled, setup.method, text=to_toml(scenario))
+    result = record(scenario, sampled, setup.method, needed, text=to_toml(scenario))
     error, inaccurate = judge_error(scenario, trajectory, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
     # It says why, where an error that is large or unknown says that alone.
@@ -93,7 +97,21 @@ def run(
     warned = {"self_locking": close, "micro_damping": driving, "accuracy": inaccurate, "account": gap, "ringing": slow}
     notes = {**warned, "custom": custom}
     result.attrs |= {name: text for name, text in notes.items() if text}
+    if names is not None:
+        result = only(result, names)
     return _raise_if_incomplete(setup, trajectory, result, slow)
+
+
+def _judged(loop: ClosedLoop, names: Sequence[str]) -> list[str]:
+    """Return the further variables by which a run is judged: its energy account, and how close contacts came.
+
+    Raises:
+        InputError: If a result has none of some name.
+    """
+    table = variables(loop)
+    refuse_unknown("variables", names, table)
+    judged = [name for name, each in table.items() if each.energy_term is not None and each.units == "J"]
+    return [name for name in (*judged, "energy_residual", "contact_gap") if name in table and name not in names]
 
 
 def _raise_if_incomplete(setup: Setup, trajectory: Trajectory, result: xr.Dataset, slow: str) -> xr.Dataset:

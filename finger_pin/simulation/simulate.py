@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import xarray as xr
 from numpy.typing import ArrayLike
@@ -34,6 +34,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
+    variables: Sequence[str] | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario, from rest on its reference unless something else is asked for.
 
@@ -58,6 +59,7 @@ def simulate(
         progress: Called with the simulated time, s, now and then; in a notebook there is a bar by default.
         observe: Called with the simulated time, s, and all signals every few steps.
         stop: Asked now and then; true ends the simulation there.
+        variables: Names of the variables to keep, such as ``["joint_position"]``; by default all.
 
     Returns:
         Every signal of the model at the scenario's sample rate, and the energy account. Where that does not close to
@@ -65,7 +67,7 @@ def simulate(
 
     Raises:
         InputError: If the method cannot sample, the controller must be sampled, what is given has a wrong size or is
-            not finite, or the result cannot fit into memory.
+            not finite, the result cannot fit into memory, or has no such variable.
         IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
         Interrupted: After Ctrl-C, a KeyboardInterrupt, or ``stop``; its ``result`` holds what was computed.
 
@@ -84,4 +86,6 @@ def simulate(
         warnings.warn(text, ScenarioWarning, stacklevel=2)
     custom = custom_parts(controls, reference, fingertip_force, initial, given)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
-    return interruptible(lambda asked: run(scenario, loop, custom, control_period, progress, observe, asked), stop)
+    return interruptible(
+        lambda asked: run(scenario, loop, custom, control_period, progress, observe, asked, variables), stop
+    )

@@ -51,6 +51,15 @@ def test_the_resolved_scenario_gives_the_same_trajectory(run, here, quick):
     assert (here / "first" / "scenario.toml").read_bytes() == (here / "second" / "scenario.toml").read_bytes()
 
 
+def test_variables_that_are_not_asked_for_are_not_stored(run, here, quick):
+    code, out, lines = run("s.toml", "--variables", "joint_position, tendon_tension", "--output", "out")
+    assert (code, lines) == (0, []) and "residual" in out
+    assert {*fp.load(here / "out").data_vars} == {"joint_position", "tendon_tension"}
+    code, _, (line,) = run("s.toml", "--variables", "joint_positon", "--output", "none")
+    assert code == 2 and "--variables" in line and "did you mean joint_position" in line
+    assert not (here / "none").exists()
+
+
 def test_a_run_may_be_repeated_in_its_own_folder(run, here, quick):
     assert run("s.toml")[0] == 0
     before = contents(here / "results" / "s")
