@@ -10,6 +10,14 @@ import finger_pin as fp
 from finger_pin.description.simulation_settings import METHODS
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark what needs a browser as slow."""
+    for item in items:
+        if "browser" in item.fixturenames:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(scope="session")
 def ub():
     return fp.load_finger("ub")

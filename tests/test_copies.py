@@ -18,6 +18,8 @@ import pytest
 import finger_pin as fp
 from finger_pin.learning import Environment, Normal, Sensor, Uniform, VectorEnvironment
 
+pytestmark = pytest.mark.slow
+
 FIG6 = {"simulation.rtol": 1e-4, "simulation.atol_scale": 1e-4, "simulation.duration": 0.02}
 PULLS = (np.full(4, 2.0), np.array([6.0, 1.0, 3.0, 1.5]))
 RUBBING = {"finger.tendon_friction.coulomb": Uniform(0.05, 0.3)}

@@ -13,6 +13,8 @@ import pytest
 
 import finger_pin as fp
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).resolve().parents[1] / "scripts" / "examples"
 PICTURES = FOLDER.parents[1] / ".readme" / "examples"
 

@@ -13,6 +13,7 @@ import finger_pin as fp
 for each in ("mkdocs", "material", "mkdocstrings", "latex2mathml"):
     pytest.importorskip(each)
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[1]
 
 

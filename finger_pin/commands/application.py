@@ -55,7 +55,7 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
     if function is None and given == ["--version"]:
         print_text(f"{program} {__version__}")
         return DONE
-    app = typer.Typer(help="Tendon-driven robot fingers.", add_completion=False, rich_markup_mode=None)
+    app = typer.Typer(help="Tendon-driven robot fingers.", add_completion=function is None, rich_markup_mode=None)
     for each in COMMANDS if function is None else (function,):
         app.command(each.__name__.replace("_", "-"))(_with_exit_code(each, program))
     try:
@@ -106,7 +106,7 @@ def _usage(error: typer.TyperException, given: Sequence[str]) -> str:
     if context is None or not text.startswith("No such option"):
         return text
     there = [name for each in context.command.params for name in (*each.opts, *each.secondary_opts) if name[:1] == "-"]
-    # All commands together have no parameters.
-    there = [*(there or ["--version"]), "--help"]
+    there += ["--version"] if hasattr(context.command, "commands") else []
+    there = [*there, "--help"]
     near = "".join(f"; did you mean {each}?" for each in get_close_matches(str(option), there, n=1))
     return f"{option}: no such option; there are {', '.join(there)}{near}"

@@ -71,4 +71,4 @@ def force_capability(
     if view:
         from finger_pin.views.viewer import view_forces
 
-        view_forces(built.description, polytope, tension=needed[Friction.NONE].strands)
+        view_forces(built.description, polytope, tension=needed[Friction.NONE].strands, block=True)

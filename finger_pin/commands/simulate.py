@@ -86,7 +86,7 @@ def simulate(
     if view:
         from finger_pin.views.viewer import view as show
 
-        show(result)
+        show(result, block=True)
 
 
 def _stored(text: str, scenario: Scenario) -> list[str]:

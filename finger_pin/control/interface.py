@@ -40,12 +40,12 @@ class ControlSignals:
 
 
 class Controller(Protocol):
-    """A controller: from references and measured motion to tendon tensions."""
+    """A user's controller: from references and measured motion to tendon tensions, one time at a time."""
 
     def command(
-        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
-    ) -> ControlSignals:
-        """Return the commands for shapes (..., n)."""
+        self, time: float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals | ArrayLike:
+        """Return the commands at a time, s, for angles and speeds of shape (n,); tensions alone will do, N."""
 
 
 class Dynamics(Protocol):

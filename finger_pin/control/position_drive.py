@@ -18,7 +18,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.control.interface import Controller, ControlSignals
+from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.core.drives import Drives, sample
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.scenario import Scenario
@@ -99,7 +99,7 @@ class PositionDrives:
     def __init__(
         self,
         finger: Finger,
-        controller: Controller,
+        controller: LoopController,
         reference: Reference,
         duration: float,
         start_time: float = 0.0,
@@ -163,7 +163,7 @@ class PositionDrives:
 
 def spool_goals(
     finger: Finger,
-    controller: Controller,
+    controller: LoopController,
     times: Array,
     wanted: ReferenceSignals,
     wound: Mapping[int, tuple[Signal, float]] = {},

@@ -104,7 +104,7 @@ def _observed(*names: str, **functions: Function) -> dict[str, Sensor | Function
 
 def _reach() -> dict[str, Any]:
     return {
-        "scenario": _scenario("fig6"),
+        "scenario": _scenario("fig6", (("title", "the fingertip reaches a point"),)),
         "limits": (0.0, _LIGHT),
         "reward": _reached,
         "observation": _observed("joint_position", "joint_velocity", "fingertip_position", to_goal=to_goal),
@@ -116,7 +116,14 @@ def _reach() -> dict[str, Any]:
 def _press() -> dict[str, Any]:
     plate = "environment.objects.plate.path.z"
     return {
-        "scenario": _scenario("press", ((f"{plate}.amplitude", 0.002), (f"{plate}.frequency", 0.5))),
+        "scenario": _scenario(
+            "press",
+            (
+                ("title", "the fingertip presses on a plate that moves"),
+                (f"{plate}.amplitude", 0.002),
+                (f"{plate}.frequency", 0.5),
+            ),
+        ),
         "limits": (0.0, _FIRM),
         "reward": _pressed,
         # Frictions hide what pulls: without tensions a policy knows neither what it did last nor what arrived of it.
@@ -130,7 +137,7 @@ def _press() -> dict[str, Any]:
 
 def _grasp() -> dict[str, Any]:
     return {
-        "scenario": _scenario("pinch"),
+        "scenario": _scenario("pinch", (("title", "two fingers hold a ball while the palm is shaken"),)),
         "limits": (0.0, _FIRM * 2),
         "reward": _held,
         "done": _lost,

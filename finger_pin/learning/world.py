@@ -264,7 +264,8 @@ class World:
         method = self._scenario.simulation.method
         motions = snapshot(self.loop, self.stepper.time, self.stepper.x)
         found = record(self._scenario, motions, method, list(known_variables(self.origin)))
-        return draw_picture(found, self._stage)
+        goal = self.context.get("goal")
+        return draw_picture(found, self._stage, goal if goal is not None and goal.shape == (3,) else None)
 
     @cached_property
     def _stage(self) -> Array:

@@ -1,12 +1,38 @@
-"""Units of joints and of what drives them, which differ from joint to joint in a hand that is given as a tree."""
+"""Units in which results are shown: degrees for angles, SI prefixes, and units that differ from joint to joint."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+import numpy as np
 import xarray as xr
 
 from finger_pin.description.scene_metadata import read_scene
+from finger_pin.typing import Array
+
+_DEGREES = {"rad": "°", "rad/s": "°/s", "rad/s^2": "°/s²"}
+# Thousands of the unit, from 1e-9 to 1e6 times it.
+_PREFIXES = ("n", "\N{MICRO SIGN}", "m", "", "k", "M")
+
+
+def shown_unit(unit: str) -> tuple[float, str]:
+    """Return the factor and the unit in which figures show a quantity: angles are in degrees, all else as it is."""
+    return (180.0 / np.pi, _DEGREES[unit]) if unit in _DEGREES else (1.0, unit)
+
+
+def in_shown_units(result: xr.Dataset) -> xr.Dataset:
+    """Return a Dataset with all variables and coordinates in the units that figures show."""
+    for name in [name for name, each in result.variables.items() if each.attrs.get("units") in _DEGREES]:
+        factor, unit = shown_unit(result[name].attrs["units"])
+        result = result.assign({name: (factor * result[name]).assign_attrs(result[name].attrs, units=unit)})
+    return result
+
+
+def prefixed(values: Array, unit: str) -> tuple[float, str]:
+    """Return the factor and the unit with an SI prefix in which the largest of some values is between 1 and 1000."""
+    largest = float(np.max(np.abs(values), initial=0.0))
+    thousands = int(np.clip(np.floor(np.log10(largest) / 3.0), -3, 2)) if largest > 0.0 else -1
+    return 1000.0**-thousands, _PREFIXES[thousands + 3] + unit
 
 
 def joints_by_unit(result: xr.Dataset) -> dict[str, list[str]]:

@@ -136,7 +136,7 @@ def test_the_version_is_told_and_options_of_all_commands_are_listed(capsys):
     assert application.run_function(None, ["--version"]) == 0
     assert capsys.readouterr().out == f"finger-pin {fp.__version__}\n"
     assert application.run_function(None, ["--verson"]) == 2
-    assert capsys.readouterr().err.endswith("there are --version, --help; did you mean --version?\n")
+    assert capsys.readouterr().err.endswith("--show-completion, --version, --help; did you mean --version?\n")
 
 
 def test_a_bench_that_is_not_there_is_told_with_the_benches_that_ship(capsys):

@@ -10,6 +10,8 @@ import pytest
 
 import finger_pin as fp
 
+pytestmark = pytest.mark.slow
+
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 
 

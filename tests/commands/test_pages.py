@@ -5,10 +5,12 @@ So that this takes seconds, what is shown is made smaller, here and nowhere else
 have tests of their own), browsers and windows are closed at once. What another page has shown is not repeated.
 """
 
+import builtins
 import importlib
 import re
 import shlex
 import shutil
+import symtable
 import tomllib
 import webbrowser
 from functools import partial
@@ -130,6 +132,7 @@ def run_scenario(text, name):
     assert result.sizes["time"] == 6
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop is deprecated:DeprecationWarning")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, capsys):
@@ -164,6 +167,33 @@ def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, ca
             Path(file).write_text(block, encoding="utf-8")
         else:
             assert not kind, f"nothing here knows what {kind} is"
+
+
+def tables(table):
+    return [table, *(each for child in table.get_children() for each in tables(child))]
+
+
+def names(code):
+    """Return the names that a snippet defines, and those that it asks for and does not define."""
+    top = symtable.symtable(code, "page", "exec")
+    defined = {each.get_name() for each in top.get_symbols() if each.is_assigned() or each.is_imported()}
+    asked = {
+        each.get_name()
+        for table in tables(top)
+        for each in table.get_symbols()
+        if each.is_referenced() and (table is top or each.is_global())
+    }
+    return defined, asked - defined - set(dir(builtins)) - {"__file__", "__name__"}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_snippet_of_a_page_runs_alone_or_says_that_it_continues_those_above(page):
+    above = set()
+    for block in re.findall(r"^```python\n(.*?)^```$", page.read_text("utf-8"), re.DOTALL | re.MULTILINE):
+        defined, missing = names(block)
+        goes_on = block.startswith("# Continues the snippets above.\n")
+        assert bool(missing) == goes_on and missing <= above, (block[:80], missing)
+        above |= defined
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -15,6 +15,8 @@ from validation.report import Family, Report, headline, text
 from finger_pin.commands.application import run_function
 from finger_pin.description.actuators import PositionLoop
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def stiffened():

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from typed_controller import pulled
 
 import finger_pin as fp
 from finger_pin.control.interface import ControlSignals
@@ -175,3 +176,8 @@ def test_a_result_of_one_s_own_is_not_checked_against_the_scenario_s_controller(
     result = fp.simulate(scenario(), controller=fixed(PULL))
     with pytest.raises(InputError, match="had controller of its own: give the same here"):
         fp.check_convergence(scenario(), result)
+
+
+def test_a_controller_may_be_written_with_types_and_return_tensions_alone():
+    """At rest on the reference nothing is missing: T3 begins at 4 N."""
+    assert pulled(2e-3)[0] == pytest.approx(4.0, abs=1e-9)

@@ -12,6 +12,8 @@ from finger_pin.description.recordings.columns import read_columns
 from finger_pin.identification.models import recording_models
 from finger_pin.identification.recordings import read_recording
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_made_up_recording_that_ships_tells_the_numbers_it_was_made_with():
     result = fp.identify("to_and_fro", starts=1)

@@ -278,13 +278,3 @@ def test_wrong_actions_and_rewards_are_refused():
     environment.reset(seed=0)
     with pytest.raises(fp.InputError, match="there are joint_position, joint_velocity, action"):
         environment.step(PULLS[0])
-
-
-def test_pictures_of_worlds_are_those_of_each():
-    task = dict(reward=nothing, start="random", render_mode="rgb_array")
-    worlds, alone = VectorEnvironment(2, FIG6, **task), Environment(FIG6, **task)
-    worlds.reset(seed=4)
-    first, second = worlds.render()
-    alone.reset(seed=5)
-    np.testing.assert_array_equal(second, alone.render())
-    assert (first != second).any()

@@ -22,6 +22,8 @@ from paper.runs import weightless, with_joint_friction, with_tendon_friction
 
 import finger_pin as fp
 
+pytestmark = pytest.mark.slow
+
 STILL = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}
 
 

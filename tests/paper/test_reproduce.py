@@ -9,6 +9,8 @@ import finger_pin as fp
 from finger_pin.commands.application import run_function
 from finger_pin.exceptions import IntegrationError
 
+pytestmark = pytest.mark.slow
+
 FIGURES = {"fig2.png", "fig3.png", "fig6.png", "losses.png", "energy.png"}
 
 

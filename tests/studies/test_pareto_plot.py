@@ -70,3 +70,12 @@ def test_a_search_in_vain_is_drawn_without_a_front(minimise):
     figure = plot_pareto(made(minimise, feasible=(False,) * 4))
     figure.draw_without_rendering()
     assert "front" not in {line.get_label() for axes in figure.axes for line in axes.lines if len(line.get_xdata())}
+
+
+def test_one_design_is_one_panel_and_nothing_is_magnified():
+    alone = made(["a", "b"]).isel(sample=[1])
+    figure = plot_pareto(alone)
+    (axes,) = figure.axes
+    assert axes.get_title(loc="left") == "1 design" and not axes.patches
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["front", "start"]

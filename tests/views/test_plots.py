@@ -14,7 +14,7 @@ from finger_pin.views.plots.lines import BINS, extremes
 from finger_pin.views.plots.panels import labelled
 
 A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
-UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(s)", "(mm)", "(mm/s)", "/ intake")
+UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(\N{MICRO SIGN}J)", "(J)", "(s)", "(mm)", "(mm/s)", "/ intake")
 
 
 @pytest.fixture(scope="module", params=SIZES.values(), ids=SIZES.keys())
@@ -136,7 +136,7 @@ def test_positions_and_forces_of_a_hand_stand_in_panels_by_their_units():
     hand = fp.simulate(fp.load_scenario("underactuated", {"simulation.duration": 0.05}))
     shown = {axes.get_ylabel(): [line.get_label() for line in axes.get_lines()] for axes in plot_hand_motion(hand).axes}
     assert shown["position (m)"] == ["block"]
-    assert shown["angle (rad)"] == ["left_proximal", "left_distal", "right_proximal", "right_distal"]
+    assert shown["angle (°)"] == ["left_proximal", "left_distal", "right_proximal", "right_distal"]
     assert shown["tension (N)"] == ["trunk"]
 
 

@@ -42,7 +42,7 @@ def play(
         port: Of the page; by default a free one.
         folder: Where records go.
         open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
-        block: Whether to play until Ctrl-C; by default where Python is not interactive.
+        block: Whether to play until Ctrl-C; by default where Python is not interactive and a browser opens.
 
     Returns:
         The playground, with its address; already closed if the call has blocked.

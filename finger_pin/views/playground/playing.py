@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import queue
-import sys
 import threading
 import time
-import webbrowser
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -15,13 +13,13 @@ from typing import Self
 import viser
 
 from finger_pin.exceptions import FingerPinError
-from finger_pin.simulation.progress import in_notebook
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.views.playground.access import own_page_only
 from finger_pin.views.playground.pacing import Pacer
 from finger_pin.views.playground.panel import PAUSE, PLAY, RESET, STEP, Panel
 from finger_pin.views.playground.session import Session, save_pieces
 from finger_pin.views.playground.stage import Stage
+from finger_pin.views.viewer.viewing import opened
 
 # Height of the page in a notebook, pixels.
 _CELL = 620
@@ -191,11 +189,7 @@ def serve(
 ) -> Playground:
     """Play a session, as `finger_pin.views.playground.play` says."""
     playing = Playground(session, host, port, folder)
-    if not in_notebook() if open_browser is None else open_browser:
-        webbrowser.open(playing.url, new=2)
-    if block is None:
-        block = not (sys.flags.interactive or "ps1" in vars(sys) or in_notebook())
-    if block:
+    if opened(playing.url, open_browser, block):
         if host not in ("127.0.0.1", "localhost"):
             print(f"Whoever reaches {host} on the network can play too", flush=True)
         print(f"Play at {playing.url} (Ctrl-C ends this)", flush=True)

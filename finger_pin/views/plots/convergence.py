@@ -10,16 +10,17 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series
 from finger_pin.views.plots.panels import legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import GREY, Width, colour, limit_line, styled
+from finger_pin.views.units import joints_by_unit, shown_unit
 
 # A difference changes sign all the time: on a logarithmic axis only its greatest values show something.
 _BINS = 400
-# Below this runs agree to rounding, rad.
-_LEAST = 1e-14
+# Below this runs agree to rounding, deg.
+_LEAST = 1e-12
 
 
 @styled
 def plot_convergence(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw the difference of every joint from the run at a tighter tolerance, rad, and the time at which they part.
+    """Draw every joint's difference from the run at a tighter tolerance, deg or m, and the time at which they part.
 
     Args:
         result: Dataset of `simulate`, of any finger, with what `Convergence.attach` adds.
@@ -27,16 +28,18 @@ def plot_convergence(result: xr.Dataset, *, width: Width = None, titles: bool = 
         titles: Whether panels have titles.
     """
     figure, (part,) = sheet([(8.0, 4.2)], width, titles)
-    (axes,) = stack(part, ["greatest difference (rad)"])
-    values = np.abs(result["convergence_difference"].transpose("time", "joint").values)
+    units = {joint: shown_unit(unit) for unit, joints in joints_by_unit(result).items() for joint in joints}
+    factors, shown = zip(*(units[name] for name in names(result, "joint")), strict=True)
+    (axes,) = stack(part, [f"greatest difference ({' or '.join(dict.fromkeys(shown))})"])
+    values = np.abs(np.array(factors) * result["convergence_difference"].transpose("time", "joint").values)
     reached = np.isfinite(values).all(axis=1)
     time, values = result["time"].values[reached], np.maximum(values[reached], _LEAST)
     for index, name in enumerate(names(result, "joint")):
         axes.plot(*_envelope(time, values[:, index]), label=name, **series(index))
     logarithmic(axes)
     axes.set_xlim(time[0], max(time[-1], time[0] + 1e-9))
-    limit, parting = result.attrs["convergence_limit"], result.attrs["convergence_parting_time"]
-    axes.axhline(limit, label=f"limit, {limit:g} rad", **limit_line())
+    limit, parting = np.rad2deg(result.attrs["convergence_limit"]), result.attrs["convergence_parting_time"]
+    axes.axhline(limit, label=f"limit, {limit:.2g}°", **limit_line())
     lines = list(axes.get_lines())
     if np.isfinite(parting):
         axes.axvline(parting, **limit_line())

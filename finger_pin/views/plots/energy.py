@@ -30,6 +30,7 @@ from finger_pin.views.plots.style import (
     styled,
     thin,
 )
+from finger_pin.views.units import prefixed
 
 #: Of losses, in their order; they begin anew where there are more.
 _COLOURS = (
@@ -37,7 +38,6 @@ _COLOURS = (
     *("saddlebrown", "darkcyan", "palevioletred", "tan", "firebrick", "slategrey", "lightsteelblue", "olive"),
     *("yellowgreen", "darkolivegreen", "sienna", "mediumpurple", "rosybrown"),
 )
-_MILLI = 1e3
 # Parts of the intake: less is stored as good as never, and less of a loss is thinner than a line.
 _STORED, _LOST = 1e-9, 1e-3
 
@@ -46,7 +46,7 @@ _STORED, _LOST = 1e-9, 1e-3
 def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw the energy account from a result.
 
-    (a) Every stored energy but traces, mJ. (b) What has been supplied, mJ, and on top of each other what has been
+    (a) Every stored energy but traces. (b) What has been supplied, and on top of each other what has been
     lost, named where it shows; with the change of the stored energy this must reach what was supplied. (c) What the
     account cannot explain, as a part of the intake: the most that was supplied, or taken from store.
 
@@ -63,13 +63,15 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
     traces = [np.max(np.abs(each.values)) <= _STORED * intake for each in stored.values()]
     shown = [each for index, each in enumerate(stored.values()) if not (index and traces[index])]
     figure, (left, right) = sheet([(5.1, max(6.6, 1.35 * len(shown))), (5.9, 6.6)], width, titles)
-    strips = stack(left, [labelled(each.attrs["label"], "mJ") for each in shown])
+    scales = [prefixed(each.values, "J") for each in shown]
+    labels = [labelled(each.attrs["label"], unit) for each, (_, unit) in zip(shown, scales, strict=True)]
+    strips = stack(left, labels)
     title(strips[0], "(a) stored energy")
-    for axes, energy in zip(strips, shown, strict=True):
-        trace(axes, time, _MILLI * energy.values, color=BLUE, linewidth=thin())
-    labels = ["energy (mJ)", "|residual| / intake"]
-    above, below = stack(right, labels, heights=[2.2, 1.0])
-    _balance(above, time, supplied, lost, total, _LOST * intake)
+    for axes, energy, (factor, _) in zip(strips, shown, scales, strict=True):
+        trace(axes, time, factor * energy.values, color=BLUE, linewidth=thin())
+    factor, unit = prefixed(np.array([intake]), "J")
+    above, below = stack(right, [f"energy ({unit})", "|residual| / intake"], heights=[2.2, 1.0])
+    _balance(above, time, supplied, lost, total, _LOST * intake, factor)
     handles = above.get_legend_handles_labels()[0]
     legend(right, [handles[-1], *handles[-2::-1]])
     _residual(below, result, intake)
@@ -77,21 +79,21 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
 
 
 def _balance(
-    axes: Axes, time: Array, supplied: Array, lost: dict[str, xr.Variable], stored: Array, least: float
+    axes: Axes, time: Array, supplied: Array, lost: dict[str, xr.Variable], stored: Array, least: float, factor: float
 ) -> None:
     level = np.zeros(len(time))
     for each, look in zip(lost.values(), cycle(_COLOURS), strict=False):
         if np.any(each.values):
-            above = level + _MILLI * each.values
+            above = level + factor * each.values
             named = {"label": each.attrs["label"]} if np.max(np.abs(each.values)) > least else {}
             shade(axes, time, level, above, color=look, alpha=0.8, **named)
             level = above
-    change = _MILLI * (stored - stored[0])
+    change = factor * (stored - stored[0])
     shade(axes, time, level, level + np.maximum(change, 0.0), color=GREY, alpha=0.35, label="put into store")
-    if np.min(change) < -_MILLI * least:
+    if np.min(change) < -factor * least:
         taken = {"facecolor": "none", "edgecolor": colour(BLACK), "hatch": "////", "alpha": 0.5}
         shade(axes, time, level + np.minimum(change, 0.0), level, label="taken from store", **taken)
-    trace(axes, time, _MILLI * supplied, label="supplied", color=BLACK, linewidth=thin(1.15))
+    trace(axes, time, factor * supplied, label="supplied", color=BLACK, linewidth=thin(1.15))
     if axes.dataLim.y0 >= 0.0:
         axes.set_ylim(bottom=0.0)
     title(axes, "(b) supplied energy and its uses")

@@ -12,7 +12,7 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, trace
 from finger_pin.views.plots.panels import sheet, stack, title
 from finger_pin.views.plots.style import Width, styled
-from finger_pin.views.units import actuators_by_unit, joints_by_unit
+from finger_pin.views.units import actuators_by_unit, joints_by_unit, shown_unit
 
 # The label of a panel's vertical axis, and its lines by name.
 Panel: TypeAlias = tuple[str, dict[str, Array]]
@@ -23,7 +23,7 @@ _MOST = 5
 
 @styled
 def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw positions of all joints, rad or m, tensions of tendons and forces of actuators, N or N m, by their units.
+    """Draw positions of all joints, deg or m, tensions of tendons and forces of actuators, N or N m, by their units.
 
     Args:
         result: Dataset of `simulate`, of a hand with a tree.
@@ -46,12 +46,12 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
 
 
 def _moved(result: xr.Dataset) -> list[Panel]:
-    position = result["joint_position"]
-    return [
-        panel
-        for unit, found in joints_by_unit(result).items()
-        for panel in _panels(position, "joint", found, f"{'angle' if unit == 'rad' else 'position'} ({unit})")
-    ]
+    panels = []
+    for unit, found in joints_by_unit(result).items():
+        factor, shown = shown_unit(unit)
+        label = f"{'angle' if unit == 'rad' else 'position'} ({shown})"
+        panels += _panels(factor * result["joint_position"], "joint", found, label)
+    return panels
 
 
 def _driven(result: xr.Dataset) -> list[Panel]:

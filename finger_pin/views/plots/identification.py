@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import trace
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
+from finger_pin.views.units import shown_unit
 
 #: Rise of minus twice the likelihood at the ends of a 95 % interval.
 _LEVEL = 3.841
@@ -35,7 +36,8 @@ def plot_identification(result: xr.Dataset) -> Figure:
         steady = bool(result["signal_steady"].values[k])
         by_load = steady and bool(np.isfinite(load).all())
         over, label = (load, "load (N)") if by_load else (instant, "reading" if steady else "time (s)")
-        unit = str(result["signal_units"].values[k])
+        factor, unit = shown_unit(str(result["signal_units"].values[k]))
+        measured, residual = factor * measured, factor * residual
         if steady:
             met.plot(over, measured, "o", color=BLUE, markersize=3.5, alpha=0.6, label="measured")
             _computed(met, over, measured - residual)
@@ -46,7 +48,7 @@ def plot_identification(result: xr.Dataset) -> Figure:
             trace(left, over, residual, color=BLUE, linewidth=0.8)
         left.axhline(0.0, color=GREY, linewidth=0.8)
         met.set(title=str(signals[k]), xlabel=label, ylabel=f"({unit})" if unit else "")
-        left.set(title=f"left over, rms {result['noise'].values[k]:.3g} {unit}", xlabel=label)
+        left.set(title=f"left over, rms {factor * result['noise'].values[k]:.3g} {unit}", xlabel=label)
     grid[0, 0].legend(loc="best")
     return figure
 
@@ -71,7 +73,8 @@ def plot_predictions(result: xr.Dataset) -> Figure:
         by_load = steady and bool(np.isfinite(load).all())
         over = load if by_load else instant
         order = np.argsort(over, kind="stable")
-        over, measured, value, band = (each[order] for each in (over, measured, value, band))
+        factor, unit = shown_unit(str(result["prediction_units"].values[k]))
+        over, measured, value, band = (each[order] for each in (over, factor * measured, factor * value, factor * band))
         if steady:
             axes.errorbar(over, value, band, fmt="_", color=VERMILLION, label="predicted, 95 %")
             axes.plot(over, measured, "o", color=BLUE, markersize=3.5, alpha=0.6, label="measured")
@@ -79,8 +82,7 @@ def plot_predictions(result: xr.Dataset) -> Figure:
             axes.fill_between(over, value - band, value + band, color=VERMILLION, alpha=0.2, linewidth=0.0)
             trace(axes, over, measured, color=BLUE, label="measured")
             trace(axes, over, value, color=VERMILLION, label="predicted, 95 %", linewidth=1.0)
-        unit = str(result["prediction_units"].values[k])
-        rms = f"rms {result['prediction_rms'].values[k]:.3g} {unit}"
+        rms = f"rms {factor * result['prediction_rms'].values[k]:.3g} {unit}"
         label = "load (N)" if by_load else "reading" if steady else "time (s)"
         axes.set(title=f"{names[k]}, held out, {rms}", xlabel=label, ylabel=f"({unit})" if unit else "")
     panels[0].legend(loc="best")
@@ -118,21 +120,21 @@ def plot_profiles(result: xr.Dataset) -> Figure:
 
 
 def _profile(axes: Axes, one: xr.Dataset) -> None:
-    value, rise = one["profile_value"].values, one["profile_rise"].values
+    factor, unit = shown_unit(str(one["units"].values))
+    value, rise = factor * one["profile_value"].values, one["profile_rise"].values
     there = np.isfinite(value) & np.isfinite(rise)
     value, rise = value[there], np.maximum(rise[there], 0.0)
-    estimate = float(one["estimate"])
+    estimate = factor * float(one["estimate"])
     # The root of the rise is nearly straight on either side.
     fine = np.linspace(value.min(), value.max(), 81)
     root = np.interp(fine, value, np.where(value < estimate, -1.0, 1.0) * np.sqrt(rise))
     axes.plot(fine, root**2, color=BLUE)
     axes.plot(value, rise, "o", color=BLUE, markersize=3.0)
     axes.axhline(_LEVEL, color=GREY, linewidth=0.8, linestyle="--")
-    for end in (float(one["lower"]), float(one["upper"])):
+    for end in (factor * float(one["lower"]), factor * float(one["upper"])):
         if math.isfinite(end):
             axes.axvline(end, color=GREY, linewidth=0.8)
     axes.plot([estimate], [0.0], "o", color=VERMILLION, markersize=5.0)
-    unit = str(one["units"].values)
     axes.set_title(short_name(str(one["parameter"].values)), color=BLACK)
     axes.locator_params(axis="x", nbins=3)
     axes.set(xlabel="" if unit == "1" else f"({unit})", ylim=(-0.3, max(8.0, 1.2 * _LEVEL)))

@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from finger_pin.views.plots.panels import grid, legend, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin
+from finger_pin.views.units import in_shown_units
 
 # Percentiles of the designs that are in view whatever they are, and the room around them, in shares of their span.
 _IN_VIEW, _ROOM = (0.0, 95.0), 0.08
@@ -34,14 +35,16 @@ def plot_pareto(result: xr.Dataset, *, width: Width = None, titles: bool = True)
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
+    result = in_shown_units(result)
     names = [name for kind in ("minimise", "maximise") for name in result.attrs[kind].split(", ") if name]
     if len(names) == 1:
         return _course(result, names[0], width, titles)
     if len(names) == 2:
-        figure, (whole, close) = grid(2, 2, (5.5, 5.2), width, titles)
-        _pair(whole, result, *names)
-        _magnify(whole, close, result, *names)
-        panels = [whole]
+        # A front of one design is a point: there is nothing to magnify.
+        figure, panels = grid(1 if int((result["front"] > 0).sum()) == 1 else 2, 2, (5.5, 5.2), width, titles)
+        _pair(panels[0], result, *names)
+        if panels[1:]:
+            _magnify(panels[0], panels[1], result, *names)
     else:
         pairs = list(combinations(names, 2))
         figure, panels = grid(len(pairs), 3, (4.6, 4.4), width, titles)
@@ -55,8 +58,9 @@ def _pair(axes: Axes, result: xr.Dataset, first: str, second: str) -> None:
     """Draw designs that keep the bounds, front and start, with all but the farthest designs in view."""
     x, y, front = (result[name].values for name in (first, second, "front"))
     kept = result["feasible"].values & (front == 0)
-    axes.plot(x[kept], y[kept], "o", label="kept bounds", **_kept_look())
-    axes.plot(x[front > 0], y[front > 0], "o", color=colour(VERMILLION), markersize=5.0, label="front")
+    if kept.any():
+        axes.plot(x[kept], y[kept], "o", label="kept bounds", **_kept_look())
+    axes.plot(x[front > 0], y[front > 0], "o", color=colour(VERMILLION), markersize=5.0, label="front", zorder=3)
     if result["status"].values[0] == "done":
         note = "start" if result["feasible"].values[0] else "start, breaks a bound"
         axes.plot(x[:1], y[:1], "*", color=colour(BLACK), markersize=12.0, label=note)
@@ -72,7 +76,7 @@ def _pair(axes: Axes, result: xr.Dataset, first: str, second: str) -> None:
             limit(shown.min() - _ROOM * np.ptp(shown), shown.max() + _ROOM * np.ptp(shown))
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     beyond = int((kept & ~((x >= left) & (x <= right) & (y >= low) & (y <= high))).sum())
-    title(axes, f"{int(result['feasible'].sum())} designs" + (f", {beyond} beyond the edges" if beyond else ""))
+    title(axes, _count(int(result["feasible"].sum())) + (f", {beyond} beyond the edges" if beyond else ""))
 
 
 def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: str) -> None:
@@ -122,6 +126,10 @@ def _course(result: xr.Dataset, name: str, width: Width, titles: bool) -> Figure
     axes.set_ylabel(_label(result, name))
     axes.legend(loc="best")
     return figure
+
+
+def _count(designs: int) -> str:
+    return f"{designs} design{'s' if designs > 1 or not designs else ''}"
 
 
 def _kept_look() -> dict[str, Any]:

@@ -94,7 +94,7 @@ def plot_runaway(results: dict[str, xr.Dataset], *, width: Width = None, titles:
     plain(top.yaxis)
     top.set_ylabel("largest command (N)")
     title(top, "tension: settles below the critical coefficient, grows above it")
-    bottom.set_ylabel("largest error (deg)")
+    bottom.set_ylabel("largest error (°)")
     bottom.set_xlabel("time (s)")
     top.margins(x=0.0)
     legend(part, top.get_lines())
@@ -104,7 +104,7 @@ def plot_runaway(results: dict[str, xr.Dataset], *, width: Width = None, titles:
 def _map(figure: Figure, axes: Axes, found: SelfLockingMap, values: Array, label: str) -> None:
     angles = [np.rad2deg(each) for each in found.angles]
     shown = np.ma.masked_invalid(values)
-    axes.set_xlabel(f"{found.joints[0]} (deg)")
+    axes.set_xlabel(f"{found.joints[0]} (°)")
     if not shown.count():
         axes.set(xlim=angles[0][[0, -1]], yticks=[])
         axes.text(0.5, 0.5, "locked everywhere", transform=axes.transAxes, ha="center", color=colour(GREY))
@@ -114,7 +114,7 @@ def _map(figure: Figure, axes: Axes, found: SelfLockingMap, values: Array, label
         axes.margins(x=0.0)
     else:
         axes.grid(visible=False)
-        axes.set_ylabel(f"{found.joints[1]} (deg)")
+        axes.set_ylabel(f"{found.joints[1]} (°)")
         drawn = axes.contourf(*angles, shown.T, levels=12, cmap="cividis")
         figure.colorbar(drawn, ax=axes, label=label)
         if shown.count() < values.size:

@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from finger_pin.typing import Array
 from finger_pin.views.plots.panels import grid, heading, labelled, plain, title
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, Width, colour, inches, new_figure, styled
+from finger_pin.views.units import in_shown_units
 
 _MAP = "cividis"
 # Values that differ by more than this factor are coloured by their logarithm.
@@ -40,7 +41,7 @@ def plot_sweep(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
         titles: Whether panels have titles.
     """
     keys = [str(name) for name in result.coords]
-    result = _numbered(result)
+    result = _numbered(in_shown_units(result))
     if "sample" not in result.dims:
         keys = [key for key in keys if result.sizes[key] > 1] or keys[:1]
         result = result.squeeze([name for name in result.dims if name not in keys], drop=True)

@@ -34,6 +34,8 @@ _FIXED, _FREE = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
 _THICK, _WIDE = 0.015, 0.35
 #: Length of the longest arrow, in parts of the finger's length.
 _ARROW = 0.22
+#: Slant of the largest friction cone, in parts of the finger's length: about the width of a finger.
+_CONE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +113,7 @@ class SceneObjects:
                 "free": [f"object_{name}" for name in self.moving],
                 "steepness": np.round(self.steepness, 4).tolist(),
                 "length": length,
+                "cone": _CONE * self.size,
                 "note": f"contact forces, {1e3 * length:.4g} mm per N, in their friction cones",
             },
             "alsoInView": np.round(self.seen() @ turn.T, 5).tolist(),

@@ -94,18 +94,22 @@ def write_video(
 
 
 @styled
-def draw_picture(result: xr.Dataset, stage: Array) -> NDArray[np.uint8]:
+def draw_picture(result: xr.Dataset, stage: Array, goal: Array | None = None) -> NDArray[np.uint8]:
     """Return a picture of the last sample of a result, shape (height, width, 3).
 
     Args:
         result: Dataset of `simulate`, or a part of it with the signals shown.
         stage: Points that are in view whatever the posture, shape (k, 3), m, base frame.
+        goal: Point that is marked, shape (3,), m, base frame.
     """
     figure = new_figure(*_INCHES, layout=None)
     figure.set_dpi(_GIF_WIDTH / _INCHES[0])
     figure.set_facecolor(_BACKGROUND)
     motion = Playback.of(result)
-    _Film(figure, motion, stage).show(len(motion.time) - 1)
+    film = _Film(figure, motion, stage)
+    film.show(len(motion.time) - 1)
+    if goal is not None:
+        film.mark(goal)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]
     return np.array(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
@@ -157,7 +161,7 @@ class _Film:
         # Rows: to the right, up, and towards the camera, in the base frame.
         self.camera = np.array([right, np.cross(away, right), away]) @ scene.view()
         self.tips = scene.tips(self.links) @ self.camera[:2].T
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        self.axes = axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_axis_off()
         few = np.unique(np.linspace(0, len(motion.time) - 1, _FEW).round().astype(int))
         seen = np.concatenate(
@@ -175,7 +179,8 @@ class _Film:
         left, below = 0.5 * (low + high) - unit * np.array([0.58, 0.47]) * _INCHES
         axes.set(xlim=(left, left + unit * _INCHES[0]), ylim=(below, below + unit * _INCHES[1]))
         axes.text(0.025, 0.93, motion.title, color=_INK, transform=axes.transAxes, fontsize=13, parse_math=False)
-        self._legend(figure)
+        if scene.strands:
+            self._legend(figure)
         self.clock = axes.text(0.975, 0.05, "", color=_INK, transform=axes.transAxes, ha="right", fontsize=13)
         self.bodies = PolyCollection([], linewidths=0.8)
         axes.add_collection(self.bodies)
@@ -198,7 +203,7 @@ class _Film:
         self.bodies.set_facecolor(colours)
         self.bodies.set_edgecolor([(0.8, 0.8, 0.8, 1.3 * opacity) for *_, opacity in colours])
         lines, tension = self._lines(frame), motion.tension[frame]
-        strands = np.concatenate([tendon["strand"][:-1] for tendon in scene.tendons])
+        strands = np.array([strand for tendon in scene.tendons for strand in tendon["strand"][:-1]], dtype=int)
         self.tubes.set_segments([pair for line in lines for pair in np.stack([line[:-1], line[1:]], axis=1)])
         self.tubes.set_color(strand_colours(tension, self.scale)[strands])
         for index, trace in enumerate(self.traces):
@@ -206,6 +211,13 @@ class _Film:
         if motion.objects is not None:
             self.arrows.set_segments(list(motion.objects.arrows()[frame] @ self.camera[:2].T))
         self.clock.set_text(f"{motion.time[frame]:.2f} s")
+
+    def mark(self, goal: Array) -> None:
+        """Mark a point of the last frame, shape (3,), m, base frame or that of a moving palm."""
+        palm = self.motion.palm
+        x, y = self.camera[:2] @ (goal if palm is None else palm.rotation[-1] @ goal + palm.translation[-1])
+        self.axes.plot(x, y, "+", color=_TRACE, markersize=16.0, markeredgewidth=2.0, zorder=4)
+        self.axes.annotate("goal", (x, y), (9.0, 6.0), textcoords="offset points", color=_INK, fontsize=11)
 
     def _lines(self, frame: int) -> list[Array]:
         """Return the paths of the strands."""

@@ -132,7 +132,7 @@ def view(
         ghost: Another result, whose finger moves faintly beside this one at the same times.
         finger: The finger that moved, if it stands on a model of the user's own (`Finger.from_model`).
         open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
-        block: Whether to serve until Ctrl-C; by default where Python is not interactive.
+        block: Whether to serve until Ctrl-C; by default where Python is not interactive and a browser opens.
 
     Returns:
         The page in service, with its address; already closed if the call has blocked.
@@ -158,7 +158,7 @@ def view_forces(
         forces: Polytope of `force_polytope`.
         tension: Of every strand, shape (s,), N, such as `RequiredTension.strands`; slack by default.
         open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
-        block: Whether to serve until Ctrl-C; by default where Python is not interactive.
+        block: Whether to serve until Ctrl-C; by default where Python is not interactive and a browser opens.
 
     Returns:
         The page in service, with its address; already closed if the call has blocked.
@@ -169,13 +169,30 @@ def view_forces(
     return _served(posture_page(finger, forces, tension), open_browser, block)
 
 
+def opened(url: str, open_browser: bool | None, block: bool | None) -> bool:
+    """Open a page in the user's browser, and return whether to serve it until Ctrl-C.
+
+    Where no browser can be opened, nobody would look at it: then it is served for ever only if that was asked for.
+
+    Args:
+        url: Address of the page.
+        open_browser: Whether to open it; by default unless a notebook shows it.
+        block: Whether to serve until Ctrl-C; by default where Python is not interactive.
+    """
+    wanted = not in_notebook() if open_browser is None else open_browser
+    failed = wanted and not webbrowser.open(url, new=2)
+    if block is not None:
+        return block
+    if sys.flags.interactive or "ps1" in vars(sys) or in_notebook():
+        return False
+    if failed:
+        print(f"No browser opens here. With block=True {url} is served until Ctrl-C", file=sys.stderr, flush=True)
+    return not failed
+
+
 def _served(page: str, open_browser: bool | None, block: bool | None) -> PageHandle:
     viewing = PageHandle(page)
-    if not in_notebook() if open_browser is None else open_browser:
-        webbrowser.open(viewing.url, new=2)
-    if block is None:
-        block = not (sys.flags.interactive or "ps1" in vars(sys) or in_notebook())
-    if block:
+    if opened(viewing.url, open_browser, block):
         print(f"The finger moves at {viewing.url} (Ctrl-C ends this)", flush=True)
         viewing.wait()
     return viewing

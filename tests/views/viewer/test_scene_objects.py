@@ -8,9 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from pages import opened, seek
 
 import finger_pin as fp
-from finger_pin.views import draw
+from finger_pin.views import draw, write_animation
 from finger_pin.views.plots.style import new_figure
 from finger_pin.views.viewer.animation import Playback, animation_page
 from finger_pin.views.viewer.drawing import FORCE_COLOUR
@@ -61,6 +62,20 @@ def test_arrows_are_the_forces_of_the_contacts_that_close_and_cones_as_steep_as_
     assert 0.02 < found["objects"]["length"] * strongest < 0.06
 
 
+@pytest.mark.parametrize("friction", [0.3, 3.0])
+def test_no_cone_is_larger_than_a_finger_is_wide(browser, pinched, tmp_path, friction):
+    """The hypotenuse of its height and radius is its slant, whatever friction and force are."""
+    slippery = pinched.assign(contact_level=friction * pinched.contact_normal_force)
+    page = opened(browser, write_animation(slippery, tmp_path / "pinch.html").as_uri())
+    seek(page, 0.5)
+    slants = page.execute_script("""
+    return fingerPlayer.scene.contacts.filter((each) => each.group.visible).map(({ cone }) => {
+      const { radius, height } = cone.geometry.parameters;
+      return cone.scale.x * Math.hypot(radius, height);
+    });""")
+    assert len(slants) == 2 and 0.002 < min(slants) and max(slants) < 0.018
+
+
 def test_a_result_without_objects_has_none_on_its_page():
     found, _ = played(fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.1})))
     assert "objects" not in found and set(found["chunks"][0]) == {"time", "pose", "path", "tension", "tip", "joint"}
@@ -107,3 +122,12 @@ def test_forces_have_one_colour_on_the_page_in_a_window_and_in_films():
     script = resources.files("finger_pin.views.viewer").joinpath("web/scene.js").read_text("utf-8")
     colour = re.search(r"new ArrowHelper\(.*, 0x(\w{6})\)", script)[1]
     assert [round(255 * each) for each in FORCE_COLOUR[0]] == list(bytes.fromhex(colour))
+
+
+def test_a_goal_is_marked_where_it_is_on_a_palm_that_moves(pinched):
+    motion = Playback.of(pinched)
+    film, goal = _Film(new_figure(4.0, 3.0), motion), np.array([0.1, -0.02, 0.03])
+    film.mark(goal)
+    # The palm moves without turning.
+    expected = film.camera[:2] @ (pinched.palm_position.values[-1] + goal)
+    assert np.ravel(film.axes.lines[-1].get_data()) == pytest.approx(expected, abs=1e-12)

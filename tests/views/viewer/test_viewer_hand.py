@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pages import console_errors, opened, ring_centres, seek
+from pages import console_errors, opened, painted, ring_centres, seek
 
 import finger_pin as fp
 from finger_pin.mechanism.geometry import TendonGeometry
@@ -35,3 +35,18 @@ def test_the_page_of_a_hand_moves_all_fingers_and_has_a_column_for_each(browser,
         "return document.getElementById('panel').scrollWidth <= document.getElementById('panel').clientWidth"
     )
     assert panel and not console_errors(page)
+
+
+@pytest.mark.parametrize("size, most", [((390, 844), 0.25), ((844, 390), 0.5)])
+def test_on_a_phone_the_tables_of_a_hand_are_folded_until_somebody_asks_for_them(browser, hand, tmp_path, size, most):
+    shape = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", shape)
+    try:
+        page = opened(browser, write_animation(hand, tmp_path / "hand.html").as_uri())
+        panel, joints = (page.find_element("id", name) for name in ("panel", "joints"))
+        assert panel.size["height"] <= most * size[1] and not joints.is_displayed()
+        page.find_element("css selector", "#readings summary").click()
+        painted(page)
+        assert joints.is_displayed() and joints.text.split()[0] == FINGERS[0]
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

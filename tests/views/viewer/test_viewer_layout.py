@@ -12,7 +12,10 @@ from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scene_metadata import scene_metadata
 from finger_pin.exchange.from_mujoco import from_mujoco
+from finger_pin.views.plots.style import new_figure
 from finger_pin.views.viewer import write_animation
+from finger_pin.views.viewer.animation import Playback
+from finger_pin.views.viewer.video import _Film
 
 
 @pytest.fixture(scope="module")
@@ -86,9 +89,22 @@ def test_a_hand_that_no_tendon_pulls_shows_its_joints_and_no_scale_of_tensions(b
         "tendon_tension": (("time", "tendon"), np.zeros((2, 0))),
     }
     result = xr.Dataset(still, {"time": [0.0, 1.0]}, scene_metadata(scenario))
+    film = _Film(figure := new_figure(4.0, 3.0), Playback.of(result))
+    film.show(0)
+    assert figure.axes == [film.axes]
     page = opened(browser, write_animation(result, tmp_path / "alone.html").as_uri())
     assert page.find_element("id", "joints").text.startswith("knuckle")
     assert [each.is_displayed() for each in page.find_elements("css selector", "#legend, #tensions")] == [False, False]
+
+
+@pytest.mark.parametrize("pull", [0.0, 2.0])
+def test_colours_of_tensions_have_a_scale_only_where_there_is_tension(browser, result, tmp_path, pull):
+    still = result.isel(time=slice(3)).copy(deep=True)
+    for name in ("tendon_tension", "passive_tension_proximal"):
+        still[name][:] = pull
+    page = opened(browser, write_animation(still, tmp_path / "still.html").as_uri())
+    shown = [page.find_element("id", each).is_displayed() for each in ("legend", "tensions")]
+    assert shown == [pull > 0.0, True]
 
 
 @pytest.mark.parametrize("size", [(390, 844), (844, 390), (1400, 900)])
@@ -99,6 +115,7 @@ def test_no_table_is_cut_and_nothing_lies_over_the_page(browser, tmp_path, resul
     try:
         for each in (result, hand):
             page = opened(browser, write_animation(each, tmp_path / "page.html").as_uri())
+            page.execute_script("document.getElementById('readings').open = true")
             # A joint that rounding has turned by less than nothing.
             page.execute_script("fingerPlayer.frames.columns.joint.data.fill(-1e-5); fingerPlayer.seek(0)")
             assert page.find_elements("css selector", "#joints td.value")[-1].text in ("0°", "0.0°")

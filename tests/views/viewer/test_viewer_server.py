@@ -75,6 +75,17 @@ def test_a_blocking_view_ends_with_an_interrupt(result, monkeypatch, capsys):
         fetch(viewing.url)
 
 
+def test_without_a_browser_a_view_waits_only_if_it_was_asked_to(result, monkeypatch, capsys):
+    monkeypatch.setattr("webbrowser.open", lambda url, new: False)
+    monkeypatch.setattr("finger_pin.views.viewer.viewing.PageServer.join", interrupt)
+    with view(result) as viewing:
+        assert viewing.url.encode() and fetch(viewing.url)
+        told = capsys.readouterr()
+        assert "block=True" in told.err and viewing.url in told.err and not told.out
+    view(result, block=True)
+    assert "Ctrl-C ends this" in capsys.readouterr().out
+
+
 def interrupt(_):
     raise KeyboardInterrupt
 

@@ -27,6 +27,7 @@ class Player {
     this.frames.append(chunk);
     for (const tension of tensions.data.subarray(known * tensions.width, tensions.count * tensions.width)) {
       while (tension > this.scale) this.scale = nextScale(this.scale);
+      if (tension > 0) this.element.scale.hidden = false;
     }
     if (this.drawnScale !== this.scale) this.drawLegend();
     for (const trace of this.scene.traces) trace.rebuild();
@@ -116,7 +117,7 @@ class Player {
   }
 
   build() {
-    const names = ["play", "restart", "scrub", "clock", "speed", "loop", "legend", "ticks"];
+    const names = ["play", "restart", "scrub", "clock", "speed", "loop", "legend", "ticks", "scale", "readings"];
     this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
     document.getElementById("title").textContent = this.config.title;
     for (const [name, text] of [["forces", this.config.forces], ["cords", this.config.cords], ["ghost", this.config.ghost?.title], ["objects", this.config.objects?.note]]) {
@@ -129,6 +130,14 @@ class Player {
     document.getElementById("panel").classList.toggle("hand", this.hand);
     const tendons = this.config.strands.length > 0;
     for (const section of document.querySelectorAll(".tendons")) section.hidden = !tendons;
+    // Without any tension its colours say nothing.
+    this.element.scale.hidden = true;
+    // The tables of a hand would cover half of a phone.
+    const narrow = window.matchMedia("(max-width: 600px), (max-height: 500px)");
+    const fold = () => { this.element.readings.open = !(this.hand && narrow.matches); };
+    narrow.addEventListener("change", fold);
+    this.element.readings.addEventListener("toggle", () => this.scene.reframe());
+    fold();
     const [tensions, joints] = ["tensions", "joints"].map((name) => document.getElementById(name));
     this.rows = this.hand ? byFinger(tensions, this.config.strands, 1) : this.config.strands.map((name) => {
       const row = tensions.insertRow();

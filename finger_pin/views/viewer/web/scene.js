@@ -113,11 +113,13 @@ class Trace {
 }
 
 // A closed contact: an arrow for the force on the second body, which ends where bodies touch, and the friction cone
-// around the normal, in which the arrow lies as long as the contact sticks.
+// around the normal, in which the arrow lies as long as the contact sticks. Only its angle says something: it is as
+// long as the arrow's part along the normal, but no larger than a finger is wide.
 class ContactView {
   constructor(viewer, config, steepness, index) {
     const { ArrowHelper, ConeGeometry, DoubleSide, Group, Mesh, MeshPhongMaterial, Vector3 } = MeshCat.THREE;
     this.length = config.objects.length;
+    this.tallest = config.objects.cone / Math.hypot(1, steepness);
     this.group = new Group();
     this.arrow = new ArrowHelper(new Vector3(0, 0, 1), new Vector3(), 1, 0xff5a5a);
     // Its apex at the origin, open along -y.
@@ -140,7 +142,7 @@ class ContactView {
     this.arrow.setLength(size, Math.min(0.3 * size, 0.008), Math.min(0.15 * size, 0.004));
     this.cone.position.copy(point);
     this.cone.quaternion.setFromUnitVectors(new Vector3(0, -1, 0), normal.normalize());
-    this.cone.scale.setScalar(Math.max(-this.length * force.dot(normal), 1e-6));
+    this.cone.scale.setScalar(Math.min(Math.max(-this.length * force.dot(normal), 1e-6), this.tallest));
   }
 }
 
