@@ -1,10 +1,10 @@
-"""Write the table of all keys of scenario files, from the models that check them, or check that it is current."""
+"""Write the tables of all keys of scenario files and of all variables of results, or check that they are current."""
 
 from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
@@ -14,14 +14,20 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from finger_pin.commands.application import run_function
+from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.controller import ControllerSettings
 from finger_pin.description.finger import FingerDescription
+from finger_pin.description.loading import list_scenarios, load_scenario
 from finger_pin.description.objects import EnvironmentSettings
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description
+from finger_pin.simulation.sampled_trajectory import Quantity
+from finger_pin.simulation.setup import Setup
+from finger_pin.simulation.variables import variables
 
-PAGE = Path(__file__).resolve().parents[1] / "finger_pin" / "description" / "KEYS.md"
+PACKAGE = Path(__file__).resolve().parents[1] / "finger_pin"
+PAGE, VARIABLES = PACKAGE / "description" / "KEYS.md", PACKAGE / "simulation" / "VARIABLES.md"
 HEAD = """# All keys of a scenario file
 
 Names in angle brackets are yours. A key without a default must be given; `-` is left out. A finger alone (`fingers/`)
@@ -34,16 +40,18 @@ Written by `python scripts/generate_keys.py`.
 def generate_keys(
     check: Annotated[bool, typer.Option("--check", help="Write nothing; fail if the page is not current.")] = False,
 ) -> int:
-    """Write finger_pin/description/KEYS.md, or check that it is current."""
-    text = page()
-    if PAGE.exists() and PAGE.read_text(encoding="utf-8") == text:
-        return 0
-    if check:
-        print(f"{PAGE.name} is not current; run python scripts/generate_keys.py", file=sys.stderr)
-        return 1
-    PAGE.write_text(text, encoding="utf-8", newline="\n")
-    print(f"wrote {PAGE}")
-    return 0
+    """Write finger_pin/description/KEYS.md and finger_pin/simulation/VARIABLES.md, or check that they are current."""
+    stale = 0
+    for path, text in ((PAGE, page()), (VARIABLES, variables_page())):
+        if path.exists() and path.read_text(encoding="utf-8") == text:
+            continue
+        stale += 1
+        if check:
+            print(f"{path.name} is not current; run python scripts/generate_keys.py", file=sys.stderr)
+        else:
+            path.write_text(text, encoding="utf-8", newline="\n")
+            print(f"wrote {path}")
+    return 1 if check and stale else 0
 
 
 def page() -> str:
@@ -127,6 +135,96 @@ def _default(field: FieldInfo) -> str:
     if isinstance(value, tuple):
         return "[" + ", ".join(f"{each:g}" if isinstance(each, float) else str(each) for each in value) + "]"
     return f"{value:g}" if isinstance(value, float) else f"`{value}`" if value else '`""`'
+
+
+VARIABLES_HEAD = """# All variables of a result
+
+Every variable has `time` for its first dimension; the table names the others. Numbers in brackets are the paper's
+[equations](../EQUATIONS.md). Units are those of `result[name].attrs["units"]`. `torque_shortfall` is left out of a
+whole result where nothing limits tensions. What stands last belongs to tables of rows that paths through space,
+`place = "bends"` or your own [`fp.Rows`](../README.md#to-add-a-law) make: each has its table's name for `<table>`, an
+input from the controller is `<table>_input`, and "SI" is the unit of what the variable is.
+Written by `python scripts/generate_keys.py`.
+"""
+#: When variables exist: a loop has those whose condition it meets, and no others.
+CONDITIONS: dict[str, Callable[[ClosedLoop], object]] = {
+    "Always": lambda loop: True,
+    'With bristles in the joints, any law but `"coulomb"`': lambda loop: loop.finger.layout.names_of("joint_stiction"),
+    "With passive tendons": lambda loop: loop.finger.routing.passive,
+    "With hysteresis of passive or elastic tendons": lambda loop: loop.finger.layout.names_of("elastic_stiction"),
+    'With `tendon_friction.place = "bends"`, or paths that bend': lambda loop: loop.finger.wraps,
+    "With motors or winches": lambda loop: loop.finger.actuators.names or loop.finger.routing.winched.any(),
+    "With winches": lambda loop: loop.finger.routing.winched.any(),
+    "With motors": lambda loop: loop.finger.actuators.names,
+    "With play in gears": lambda loop: loop.finger.actuators.loose_names,
+    "With motors in position drive": lambda loop: loop.finger.actuators.holds.any(),
+    "With motors in position drive or winches": lambda loop: (
+        loop.finger.actuators.holds.any() or loop.finger.routing.winched.any()
+    ),
+    "With objects, or links that touch each other": lambda loop: loop.finger.scene,
+    "With free objects": lambda loop: loop.finger.scene and loop.finger.scene.free,
+    "With objects that are moved along paths": lambda loop: loop.guides,
+    "With a palm that moves": lambda loop: loop.palm,
+    "With tendons of a tree that are springs": lambda loop: (
+        (tree := loop.finger.description.tree) and any(each.stiffness for each in tree.tendons.values())
+    ),
+    "With a sampled controller: what its sensors measure, after `measured_`": lambda loop: loop.controller.sensors,
+}
+#: What shows each of them, besides the scenarios that ship.
+_FURTHER: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("fig6", {"finger.joint_friction": {"law": "coulomb"}}),
+    ("fig6", {"finger.passive_tendon.hysteresis": 0.1}),
+    ("fig6", {"controller.sampling.period": 1e-3}),
+    ("canal", {"finger.tendons.T1.winch": {}, "controller": {"tendon_winding": {"T1": {"offset": 0.001}}}}),
+    ("servo_bench", {"finger.actuators.*.motor.friction.backlash": 0.01}),
+    ("press", {"environment.objects.*.path.x.amplitude": 1e-3}),
+)
+
+
+def variables_page() -> str:
+    """Return the page: a table for each condition."""
+    loops = [
+        Setup.of(load_scenario(*each), estimate_error=False).loop
+        for each in (*((name,) for name in list_scenarios()), *_FURTHER)
+    ]
+    found: dict[str, dict[tuple[int, str], Quantity]] = {}
+    for k, loop in enumerate(loops):
+        tables = [table.group for table in loop.finger.extra_rows]
+        for name, each in variables(loop).items():
+            group = next((group for group in tables if each.dims[1:] == (group,)), "")
+            found.setdefault(name.replace(group, "<table>", 1) if group else name, {})[k, group] = each
+    met = {title: {k for k, loop in enumerate(loops) if holds(loop)} for title, holds in CONDITIONS.items()}
+    parts = {title: [] for title in met}
+    rows: list[str] = []
+    for name, shown in found.items():
+        if name.startswith("<table>"):
+            rows.append(_variable_row(name, shown))
+        elif not name.startswith("energy_exchanged_"):
+            title = next((title for title, where in met.items() if where == {k for k, _ in shown}), None)
+            if title is None:
+                raise LookupError(f"{name}: no condition says when it exists")
+            parts[title].append(_variable_row(name, shown))
+    head = "| name | unit | dimensions | meaning |\n|---|---|---|---|\n"
+    tables = [
+        f"## {title}\n\n{head}" + "\n".join(each) + "\n"
+        for title, each in (parts | {"Of tables of rows": rows}).items()
+    ]
+    return "\n".join([VARIABLES_HEAD, *tables])
+
+
+def _variable_row(name: str, shown: dict[tuple[int, str], Quantity]) -> str:
+    first = next(iter(shown.values()))
+    kinds = dict.fromkeys(", ".join(each.dims[1:]) for each in shown.values())
+    dims = " or ".join(each or "none" for each in kinds) if len(kinds) > 1 else next(iter(kinds))
+    units = " or ".join(dict.fromkeys(each.units for each in shown.values()))
+    label, unit = f"`{name}`", "" if units == "1" else units
+    if name.startswith("power_"):
+        label, unit = f"{label}, `{name.replace('power', 'energy_exchanged', 1)}`", "W, J"
+    if name.startswith("<table>"):
+        dims, says = "`<table>`", "; ".join(dict.fromkeys(each.long_name for each in shown.values()))
+    else:
+        says = first.long_name + (f" ({first.equation})" if first.equation else "")
+    return f"| {label} | {unit} | {dims} | {says} |"
 
 
 main = partial(run_function, generate_keys)

@@ -208,7 +208,7 @@ def build_worlds(task: str, count: int, **fields: Any) -> Any:
     try:
         from finger_pin.learning.stable_baselines import StableBaselinesEnvironment
     except ModuleNotFoundError as error:
-        raise wrong("train", f"needs {error.name}: pip install stable-baselines3") from None
+        raise wrong("train", f"needs {error.name}: python -m pip install stable-baselines3") from None
     from finger_pin.learning.tasks import make_vector
 
     return StableBaselinesEnvironment(make_vector(f"{task}-v0", count, **fields))

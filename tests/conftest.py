@@ -1,6 +1,7 @@
 """Shared fixtures: the paper's finger, networks made on the spot, and the few expensive runs."""
 
 import importlib
+import shutil
 import sys
 from types import SimpleNamespace
 
@@ -114,3 +115,34 @@ def refuses(tmp_path, monkeypatch, capsys):
         assert [each.name for each in tmp_path.iterdir()] == ["file"]
 
     return refuses
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    """A headless browser."""
+    names = ("chromium", "chromium-browser", "google-chrome", "chrome")
+    chromium = next(filter(None, map(shutil.which, names)), None)
+    driver = shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        pytest.skip("needs Chromium and chromedriver on the path (Debian: apt install chromium chromium-driver)")
+    webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium, which the extra 'test' brings")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in (
+        "headless=new",
+        "no-sandbox",
+        "disable-gpu",
+        "enable-unsafe-swiftshader",
+        "disable-background-networking",
+        "disable-component-update",
+        "disable-sync",
+        "no-first-run",
+        "window-size=1200,800",
+        f"user-data-dir={tmp_path_factory.mktemp('chromium')}",
+    ):
+        options.add_argument(f"--{argument}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    window = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    window.set_script_timeout(120)
+    yield window
+    window.quit()

@@ -6,6 +6,8 @@ import tomllib
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+from finger_pin.version import installing
+
 PACKAGE = Path(__file__).resolve().parents[1] / "finger_pin"
 MODULES = {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in PACKAGE.rglob("*.py")}
 
@@ -33,3 +35,53 @@ def test_the_version_is_the_newest_of_the_changes_and_the_one_to_cite():
     changes = (PACKAGE / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.findall(r"^## (.*)$", changes, re.MULTILINE)[0] == version
     assert f"version: {version}\n" in (root / ".github" / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def names_of(path):
+    """Return the names that a file defines, those of classes with their class."""
+    found = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        scope = getattr(node, "name", "")
+        found |= {scope} if scope else set(assigned(node))
+        if isinstance(node, ast.ClassDef):
+            inner = [name for each in node.body for name in (getattr(each, "name", None), *assigned(each)) if name]
+            found |= {f"{scope}.{name}" for name in inner}
+    return found
+
+
+def assigned(node):
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    return [each.id for each in targets if isinstance(each, ast.Name)]
+
+
+def test_every_equation_of_the_paper_has_its_place_in_the_code():
+    page = (PACKAGE / "EQUATIONS.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| \((\w+)\) \| `(\S+)` \| (.*) \|$", page, re.MULTILINE)
+    numbers = {number for number, *_ in rows}
+    # Of those that have parts, the page has the parts.
+    parts = {"9": "abc", "14": "abc", "21": "ab"}
+    expected = {f"{n}{part}" for n in range(1, 23) for part in parts.get(str(n), [""])}
+    assert numbers == expected == set(re.findall(r"\\text\{\((\w+)\*?\)\}", page))
+    for number, file, names in rows:
+        path = PACKAGE / file
+        whole = number.rstrip("abc")
+        assert re.search(rf"\({whole}[abc]?\)", path.read_text(encoding="utf-8")), f"{file} does not cite ({whole})"
+        assert set(re.findall(r"`([\w.]+)`", names)) <= names_of(path), (number, file, names)
+
+
+def test_extras_are_installed_as_one_place_says():
+    root = PACKAGE.parent
+    extras = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    page = (root / "scripts" / "README.md").read_text(encoding="utf-8")
+    section = page.partition("## Extras\n")[2].partition("\n## ")[0]
+    assert set(re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)) == set(extras)
+    assert f"`{installing('mujoco').partition(',')[0]}`" in section
+    for path in (each for room in ("finger_pin", "scripts", ".site", ".github") for each in (root / room).rglob("*")):
+        if path.suffix not in (".py", ".md", ".ipynb", ".yml"):
+            continue
+        text = path.read_text(encoding="utf-8")
+        # Nothing is on a registry before a release; of one, only `installing` and the section say it.
+        assert not re.search(r"pip install \S*finger[-_]pin", text), path
+        named = re.findall(r"\[?[Ee]xtra\]?(?:\([^)]*\))?[ \n]`(\w+)`|installing\('(\w+)'\)|'\.\[([\w,]+)\]'", text)
+        for extra in ",".join("".join(each) for each in named).split(","):
+            assert not extra or extra in extras, (path, extra)

@@ -75,7 +75,7 @@ class SpringReturn(BriefRepr):
 def spring_return(finger: FingerLike, cord: str | None = None) -> SpringReturn:
     """Return the tensions between which a cord holds a finger that springs return.
 
-    All bends of the cord slide the same way, with mu^d; joints let go at M^c. Other tendons are slack.
+    Counts as if all bends of the cord slid the same way, with mu^d; joints let go at M^c. Other tendons are slack.
 
     Args:
         finger: One finger, its description, its name, or the path of its file.

@@ -56,7 +56,7 @@ def optimise(
     minimise: Annotated[list[str], typer.Option(metavar="NAME", help="Metric to be made small; repeatable.")] = [],  # noqa: B006
     maximise: Annotated[list[str], typer.Option(metavar="NAME", help="Metric to be made large; repeatable.")] = [],  # noqa: B006
     constraint: _Constraint = [],  # noqa: B006
-    no_constraints: Annotated[bool, typer.Option("--no-constraints", help="Require force closure alone.")] = False,
+    no_constraints: Annotated[bool, typer.Option("--no-constraints", help="Keep every design that runs.")] = False,
     population: Annotated[int | None, typer.Option(metavar="N", help="Designs of a generation; default 24.")] = None,
     generations: Annotated[int | None, typer.Option(metavar="N", help="Default 20.")] = None,
     seed: Annotated[int | None, typer.Option(metavar="S", help="Of the search; default 0.")] = None,
@@ -71,8 +71,9 @@ def optimise(
 ) -> None:
     """Search for designs that no other one is better than: small, large and bounded metrics over chosen numbers.
 
-    Without arguments: the winding radii of the paper's finger, tracking error against peak tension. Force closure is
-    always required. The same command again continues where an earlier one ended, however it ended. For example:
+    Without arguments: the winding radii of the paper's finger, tracking error against peak tension. Designs that
+    cannot keep their tendons taut do not count. The same command again continues where an earlier one ended, however it
+    ended. For example:
 
     optimise fig6 --over controller.gain=0.5:4 --minimise tracking_rms --minimise losses --no-constraints
 
@@ -126,7 +127,11 @@ def summary(result: xr.Dataset) -> str:
     count = int(result["front"].max())
     head = f"{status.size} designs: {feasible.sum()} keep all bounds, {count} on the front"
     failed = int((status == "failed").sum())
-    note = f"; {failed} cannot be run (no force closure, or a run that failed: see optimise.nc)" if failed else ""
+    note = (
+        f"; {failed} cannot be run (tendons that cannot be kept taut, or a run that failed: see optimise.nc)"
+        if failed
+        else ""
+    )
     columns = {name: [f"{value:.4g}" for value in result[name].values] for name in (*metrics, *keys)}
     shown = [("start", 0), *((f"{n:02d}", int((result["front"].values == n).argmax())) for n in range(1, count + 1))]
     width = max(len(label(result, name)) for name in columns)

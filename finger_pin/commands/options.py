@@ -15,6 +15,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from finger_pin.version import installing
+
 # A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
 _BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
 
@@ -95,7 +97,7 @@ def _dask(address: str) -> Iterator[Executor]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError:
-        raise wrong("--scheduler", "needs Dask: python -m pip install distributed") from None
+        raise wrong("--scheduler", f"needs Dask: {installing('dask')}") from None
     # An error says what the client would log about a lost scheduler.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:

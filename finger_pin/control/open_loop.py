@@ -80,7 +80,7 @@ class OpenLoopTensions(LoopController):
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
-        """Return the tensions at one time, or at times of shape (m,)."""
+        """Return the tensions at one time, or at times of shape (m,), with their torque by (7)."""
         # Rounding may take what is at zero below it.
         given, actuated = self.signal.at(time)[0], self.routing.actuated
         winched = self.routing.winched

@@ -28,13 +28,13 @@ class DataSheet(Description):
     """A maker's data sheet; K_t, R and c0 follow, and both its ends come out exactly."""
 
     stall_torque: Annotated[float, real(0.0, 1e4, above=True, hint=" N m (is it in kg cm?)")] = quantity(
-        ..., unit="N m", source="maker's sheet", doc="T_s, at the voltage."
+        ..., unit="N m", source="maker's sheet", doc="T_s, torque at rest at the voltage."
     )
     stall_current: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
-        ..., unit="A", source="maker's sheet", doc="I_s, at the voltage."
+        ..., unit="A", source="maker's sheet", doc="I_s, current at rest at the voltage."
     )
     no_load_speed: Annotated[float, real(0.0, 1e5, above=True, hint=" rad/s (is it in rpm?)")] = quantity(
-        ..., unit="rad/s", source="maker's sheet", doc="w_0, at the voltage."
+        ..., unit="rad/s", source="maker's sheet", doc="w_0, speed without load at the voltage."
     )
 
 
@@ -44,7 +44,9 @@ class GearFriction(Description):
     coulomb: Annotated[float, real(0.0, 1e4)] | None = quantity(
         None, unit="N m", source="data sheet", doc="c0, level without load; a data sheet says it if it is left out."
     )
-    by_load: Annotated[float, real(0.0, 100.0)] = quantity(0.0, unit="1", source="fit", doc="m0, level over N.")
+    by_load: Annotated[float, real(0.0, 100.0)] = quantity(
+        0.0, unit="1", source="fit", doc="m0, level over N, the torque that the gears carry."
+    )
     stribeck: Annotated[float, real(0.0, 1e4)] = quantity(
         0.0, unit="N m", source="fit", doc="c1, level that is added at rest without load."
     )
@@ -57,7 +59,9 @@ class GearFriction(Description):
     stribeck_exponent: Annotated[float, real(0.0, 10.0, above=True)] = quantity(
         1.0, unit="1", source="fit", doc="p, exponent of |v| / w."
     )
-    viscous: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="N m s/rad", source="fit", doc="b.")
+    viscous: Annotated[float, real(0.0, 1e4)] = quantity(
+        0.0, unit="N m s/rad", source="fit", doc="b, viscous torque at the spool per speed."
+    )
     stiffness: Annotated[float, real(0.0, 1e9, above=True)] = quantity(
         50.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness: how far gears give before they slip."
     )
@@ -106,7 +110,7 @@ class Winding(Description):
         ..., unit="s", source="maker's sheet", doc="R_th C, in which it comes within 37 % of where it ends."
     )
     ambient: Annotated[float, real(-100.0, 300.0)] = quantity(
-        25.0, unit="degC", source="maker's sheet", doc="T_a, where it begins."
+        25.0, unit="degC", source="maker's sheet", doc="T_a, temperature of the surroundings, where the winding begins."
     )
 
 
@@ -120,12 +124,14 @@ class Motor(Description):
         ..., unit="V", source="maker's sheet", doc="V, of the supply: |U| <= V."
     )
     torque_constant: Annotated[float, real(0.0, 1e4, above=True)] | None = quantity(
-        None, unit="N m/A", source="fit", doc="K_t."
+        None, unit="N m/A", source="fit", doc="K_t, torque at the spool per current."
     )
-    resistance: Annotated[float, real(0.0, 1e6, above=True)] | None = quantity(None, unit="ohm", source="fit", doc="R.")
+    resistance: Annotated[float, real(0.0, 1e6, above=True)] | None = quantity(
+        None, unit="ohm", source="fit", doc="R, of the winding."
+    )
     data_sheet: DataSheet | None = Field(None, description="In place of torque_constant and resistance.")
     maximum_current: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
-        ..., unit="A", source="maker's sheet", doc="I_max."
+        ..., unit="A", source="maker's sheet", doc="I_max, to which the electronics limit the current."
     )
     inertia: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
         ..., unit="kg m2", source="fit", doc="J, of the rotor times the square of the gear ratio, and of the gears."
@@ -173,10 +179,14 @@ class PositionLoop(Description):
         1.15,
         unit="1/rad",
         source="XL330 recorded: gain 400 as it ships, of 256, 4096 steps a turn, 885 all",
-        doc="k_p.",
+        doc="k_p, share of the supply's voltage per error of the angle.",
     )
-    derivative: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="s/rad", source="as it ships", doc="k_d.")
-    integral: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="1/(rad s)", source="as it ships", doc="k_i.")
+    derivative: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.0, unit="s/rad", source="as it ships", doc="k_d, the same per rate of the error."
+    )
+    integral: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.0, unit="1/(rad s)", source="as it ships", doc="k_i, the same per integral of the error."
+    )
     torque_off: Annotated[float, real(0.0, 1e6)] | None = quantity(
         None, unit="s", source="chosen", doc="Time at which the motor is let go: from then on no current flows."
     )

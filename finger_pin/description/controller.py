@@ -67,7 +67,9 @@ class PassiveTensionSettings(Description):
     proportional: Annotated[float, real(0.0, 10.0)] = quantity(
         0.0, unit="1", source="chosen", doc="k_P, change of the planned tension over the error of the measured one."
     )
-    integral: Annotated[float, real(0.0, 1e4)] = quantity(10.0, unit="1/s", source="chosen", doc="k_I, likewise.")
+    integral: Annotated[float, real(0.0, 1e4)] = quantity(
+        10.0, unit="1/s", source="chosen", doc="k_I, gain of the integral of that error."
+    )
     limit: Annotated[float, real(0.0, 1e5)] = quantity(
         5.0, unit="N", source="chosen", doc="Largest correction of the planned tension by the integral."
     )
@@ -153,8 +155,12 @@ class ControllerSettings(Description):
     spring_compensation: bool = Field(
         False, strict=True, description="Whether the torque of springs is added to tau^d; always without force closure."
     )
-    tendon_friction_feedforward: TendonFeedforwardSettings | None = Field(None, description="By (9) and (16).")
-    joint_friction_compensation: JointCompensationSettings | None = Field(None, description="By (9) and (17).")
+    tendon_friction_feedforward: TendonFeedforwardSettings | None = Field(
+        None, description="Tendon friction by (9) and (16), added to commands."
+    )
+    joint_friction_compensation: JointCompensationSettings | None = Field(
+        None, description="Joint friction by (9) and (17), added to tau^d."
+    )
     passive_tension_loop: PassiveTensionSettings | None = Field(None, description="Closed loop on f5; sampled.")
     distribution: DistributionSettings | None = Field(None, description="Quadratic programme with tension limits.")
     sampling: SamplingSettings | None = Field(None, description="Sampled execution; continuous without it.")

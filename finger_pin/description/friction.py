@@ -35,7 +35,7 @@ class TendonFrictionSettings(Description):
         0.0, unit="N", source="the paper has none", doc="Drag without load, of seals and sheaths; adds to F^n M."
     )
     stiction_ratio: Annotated[Numbers, reals(1.0, 100.0)] = quantity(
-        1.5, unit="1", source="estimate", doc="rho = mu^c / mu^d."
+        1.5, unit="1", source="estimate", doc="rho = mu^c / mu^d, stiction over Coulomb friction."
     )
     stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] | None = quantity(
         None,

@@ -108,11 +108,15 @@ class Link(Description):
 class Spring(Description):
     """A torsion spring between a joint's two sides."""
 
-    stiffness: Annotated[float, real(0.0, 1e7)] = quantity(..., unit="N m/rad", source="design", doc="k.")
+    stiffness: Annotated[float, real(0.0, 1e7)] = quantity(
+        ..., unit="N m/rad", source="design", doc="k, torque of the spring per angle from where it is relaxed."
+    )
     rest: Annotated[float, real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)] = quantity(
         0.0, unit="rad", source="design", doc="theta_0, where it is relaxed; it may lie outside the range."
     )
-    damping: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="N m s/rad", source="design", doc="c.")
+    damping: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.0, unit="N m s/rad", source="design", doc="c, viscous torque of the spring per joint velocity."
+    )
     hysteresis: Annotated[float, real(0.0, 0.9)] = quantity(
         0.0, unit="1", source="the paper has none", doc="h, part of its torque that it holds against its motion."
     )
@@ -222,7 +226,7 @@ class PassiveTendon(Description):
         5e4, unit="N/m", source="estimate", doc="K_t, stiffness of the whole tendon; each half has 2 K_t."
     )
     mass: Annotated[Numbers, reals(0.0, 1.0, above=True, hint=" kg (is it in grams?)")] = quantity(
-        8.8e-6, unit="kg", source="estimate", doc="m_5, lumped mass."
+        8.8e-6, unit="kg", source="estimate", doc="m_5, lumped mass of the tendon between its halves."
     )
     hysteresis: Annotated[Numbers, reals(0.0, 0.9)] = quantity(
         0.0, unit="1", source="the paper has none", doc="h, part of its tension that a half holds against its stretch."
@@ -232,5 +236,9 @@ class PassiveTendon(Description):
 class StrokeLimiterSettings(Description):
     """Hunt-Crossley stroke limiter (2): one number for all, or one per joint."""
 
-    stiffness: Annotated[Numbers, reals(0.0, 1e7)] = quantity(50.0, unit="N m/rad", source="estimate", doc="k.")
-    damping: Annotated[Numbers, reals(0.0, 1e5)] = quantity(0.5, unit="s/rad", source="estimate", doc="c.")
+    stiffness: Annotated[Numbers, reals(0.0, 1e7)] = quantity(
+        50.0, unit="N m/rad", source="estimate", doc="k of tau^r = k d (1 + c d'), torque per depth d beyond the range."
+    )
+    damping: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
+        0.5, unit="s/rad", source="estimate", doc="c of tau^r = k d (1 + c d'), which takes energy from an impact."
+    )

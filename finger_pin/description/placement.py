@@ -155,9 +155,15 @@ def _each(value: Numbers | None, size: int) -> Sequence[float | None]:
 class PathSignal(SignalSettings):
     """A coordinate of the palm over time: m for x, y, z, rad for roll, pitch, yaw."""
 
-    offset: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Mean.")
-    amplitude: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Half the swing.")
-    height: Annotated[float, _COORDINATE] | None = quantity(None, unit="m or rad", source="chosen", doc="Of none.")
+    offset: Annotated[float, _COORDINATE] = quantity(
+        0.0, unit="m or rad", source="chosen", doc="Added to all of it; the mean of a sinusoid."
+    )
+    amplitude: Annotated[float, _COORDINATE] = quantity(
+        0.0, unit="m or rad", source="chosen", doc="Amplitude of the sinusoid, half its swing."
+    )
+    height: Annotated[float, _COORDINATE] | None = quantity(
+        None, unit="m or rad", source="chosen", doc="Of steps and ramps, which are refused here."
+    )
     values: Annotated[tuple[float, ...] | Series, series(-12.5, 12.5)] | None = quantity(
         None, unit="m or rad", source="chosen", doc="At the points or samples."
     )

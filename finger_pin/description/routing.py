@@ -136,7 +136,7 @@ class Routing:
 
     @cached_property
     def pseudo_inverse(self) -> Array:
-        """Pseudo-inverse of H_c^T, shape (t, n), 1/m."""
+        """Pseudo-inverse of H_c^T of (21), shape (t, n), 1/m."""
         return np.asarray(np.linalg.pinv(self.coupling.T))
 
     @cached_property
@@ -164,7 +164,7 @@ class Routing:
         return curvature
 
     def strand_tension(self, tension: Array) -> Array:
-        """Return the tensions of all strands, shape (..., s): both halves of a passive tendon have its own."""
+        """Return the tensions of all strands without friction (8), shape (..., s): both halves have their tendon's."""
         halves = np.repeat(tension[..., self.actuated :], 2, axis=-1)
         return np.concatenate([tension[..., : self.actuated], halves], axis=-1)
 

@@ -53,13 +53,17 @@ class SignalSettings(Description):
     kind: Annotated[Literal["sine", "step", "ramp", "points", "samples"], choice(*_NEEDED)] = quantity(
         "sine", unit="1", source="chosen", doc="Function that is added to the sinusoid: none, or one of these."
     )
-    frequency: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="Hz", source="chosen", doc="Of the sinusoid.")
-    phase: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="chosen", doc="At t = 0.")
+    frequency: Annotated[float, real(0.0, 1e4)] = quantity(
+        0.0, unit="Hz", source="chosen", doc="Frequency of the sinusoid."
+    )
+    phase: Annotated[float, real(-1e3, 1e3)] = quantity(
+        0.0, unit="rad", source="chosen", doc="Phase of the sinusoid at t = 0."
+    )
     time: Annotated[float, real(-_LATEST, _LATEST)] | None = quantity(
         None, unit="s", source="chosen", doc="Instant of the step, or start of the ramp."
     )
     duration: Annotated[float, real(1e-6, _LATEST)] | None = quantity(
-        None, unit="s", source="chosen", doc="Of the ramp."
+        None, unit="s", source="chosen", doc="Time that the ramp takes."
     )
     times: Annotated[tuple[float, ...] | Series, series(-_LATEST, _LATEST)] | None = quantity(
         None, unit="s", source="chosen", doc="Of the points or samples, increasing."
@@ -115,8 +119,12 @@ class SignalSettings(Description):
 class JointReference(SignalSettings):
     """theta^d of a joint."""
 
-    offset: Annotated[float, _ANGLE] = quantity(0.0, unit="rad", source="chosen", doc="Mean.")
-    amplitude: Annotated[float, _ANGLE] = quantity(0.0, unit="rad", source="chosen", doc="Half the swing.")
+    offset: Annotated[float, _ANGLE] = quantity(
+        0.0, unit="rad", source="chosen", doc="Added to all of it; the mean of a sinusoid."
+    )
+    amplitude: Annotated[float, _ANGLE] = quantity(
+        0.0, unit="rad", source="chosen", doc="Amplitude of the sinusoid, half its swing."
+    )
     height: Annotated[float, _ANGLE] | None = quantity(None, unit="rad", source="chosen", doc="Of the step or ramp.")
     values: Annotated[tuple[float, ...] | Series, series(-MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] | None = quantity(
         None, unit="rad", source="chosen", doc="At the points or samples."
@@ -126,8 +134,12 @@ class JointReference(SignalSettings):
 class InputSignal(SignalSettings):
     """Input of an actuator of a tree, in the unit that its gain takes."""
 
-    offset: Annotated[float, _FORCE] = quantity(0.0, unit="1", source="chosen", doc="Mean.")
-    amplitude: Annotated[float, _FORCE] = quantity(0.0, unit="1", source="chosen", doc="Half the swing.")
+    offset: Annotated[float, _FORCE] = quantity(
+        0.0, unit="1", source="chosen", doc="Added to all of it; the mean of a sinusoid."
+    )
+    amplitude: Annotated[float, _FORCE] = quantity(
+        0.0, unit="1", source="chosen", doc="Amplitude of the sinusoid, half its swing."
+    )
     height: Annotated[float, _FORCE] | None = quantity(None, unit="1", source="chosen", doc="Of the step or ramp.")
     values: Annotated[tuple[float, ...] | Series, series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
         None, unit="1", source="chosen", doc="At the points or samples."
@@ -137,8 +149,12 @@ class InputSignal(SignalSettings):
 class SpoolAngle(SignalSettings):
     """Angle of the spool of a motor in position drive."""
 
-    offset: Annotated[float, _TURN] = quantity(0.0, unit="rad", source="chosen", doc="Mean.")
-    amplitude: Annotated[float, _TURN] = quantity(0.0, unit="rad", source="chosen", doc="Half the swing.")
+    offset: Annotated[float, _TURN] = quantity(
+        0.0, unit="rad", source="chosen", doc="Added to all of it; the mean of a sinusoid."
+    )
+    amplitude: Annotated[float, _TURN] = quantity(
+        0.0, unit="rad", source="chosen", doc="Amplitude of the sinusoid, half its swing."
+    )
     height: Annotated[float, _TURN] | None = quantity(None, unit="rad", source="chosen", doc="Of the step or ramp.")
     values: Annotated[tuple[float, ...] | Series, series(-_MOST_TURN, _MOST_TURN)] | None = quantity(
         None, unit="rad", source="chosen", doc="At the points or samples."
@@ -148,8 +164,12 @@ class SpoolAngle(SignalSettings):
 class WoundLength(SignalSettings):
     """Length of a tendon that is wound in, from where it is just taut with all joints at zero."""
 
-    offset: Annotated[float, _WOUND] = quantity(0.0, unit="m", source="chosen", doc="Mean.")
-    amplitude: Annotated[float, _WOUND] = quantity(0.0, unit="m", source="chosen", doc="Half the swing.")
+    offset: Annotated[float, _WOUND] = quantity(
+        0.0, unit="m", source="chosen", doc="Added to all of it; the mean of a sinusoid."
+    )
+    amplitude: Annotated[float, _WOUND] = quantity(
+        0.0, unit="m", source="chosen", doc="Amplitude of the sinusoid, half its swing."
+    )
     height: Annotated[float, _WOUND] | None = quantity(None, unit="m", source="chosen", doc="Of the step or ramp.")
     values: Annotated[tuple[float, ...] | Series, series(-_MOST_WOUND, _MOST_WOUND, _MILLIMETRES)] | None = quantity(
         None, unit="m", source="chosen", doc="At the points or samples."
@@ -159,8 +179,12 @@ class WoundLength(SignalSettings):
 class VoltageSignal(SignalSettings):
     """Voltage of a motor in place of its loop; of pulse widths the mean, their part of the supply."""
 
-    offset: Annotated[float, _VOLTAGE] = quantity(0.0, unit="V", source="chosen", doc="Mean.")
-    amplitude: Annotated[float, _VOLTAGE] = quantity(0.0, unit="V", source="chosen", doc="Half the swing.")
+    offset: Annotated[float, _VOLTAGE] = quantity(
+        0.0, unit="V", source="chosen", doc="Added to all of it; the mean of a sinusoid."
+    )
+    amplitude: Annotated[float, _VOLTAGE] = quantity(
+        0.0, unit="V", source="chosen", doc="Amplitude of the sinusoid, half its swing."
+    )
     height: Annotated[float, _VOLTAGE] | None = quantity(None, unit="V", source="chosen", doc="Of the step or ramp.")
     values: Annotated[tuple[float, ...] | Series, series(-_MOST_VOLTAGE, _MOST_VOLTAGE)] | None = quantity(
         None, unit="V", source="chosen", doc="At the points or samples."
@@ -170,8 +194,12 @@ class VoltageSignal(SignalSettings):
 class ForceSignal(SignalSettings):
     """Tension of a tendon, or a component of a force."""
 
-    offset: Annotated[float, _FORCE] = quantity(0.0, unit="N", source="chosen", doc="Mean.")
-    amplitude: Annotated[float, _FORCE] = quantity(0.0, unit="N", source="chosen", doc="Half the swing.")
+    offset: Annotated[float, _FORCE] = quantity(
+        0.0, unit="N", source="chosen", doc="Added to all of it; the mean of a sinusoid."
+    )
+    amplitude: Annotated[float, _FORCE] = quantity(
+        0.0, unit="N", source="chosen", doc="Amplitude of the sinusoid, half its swing."
+    )
     height: Annotated[float, _FORCE] | None = quantity(None, unit="N", source="chosen", doc="Of the step or ramp.")
     values: Annotated[tuple[float, ...] | Series, series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
         None, unit="N", source="chosen", doc="At the points or samples."

@@ -49,13 +49,17 @@ class InitialSettings(Description):
 class SimulationSettings(Description):
     """Duration, sample rate, integrator and tolerances of a run."""
 
-    duration: Annotated[float, real(0.0, 1e6, above=True)] = quantity(8.0, unit="s", source="chosen", doc="Length.")
+    duration: Annotated[float, real(0.0, 1e6, above=True)] = quantity(
+        8.0, unit="s", source="chosen", doc="Simulated time of the run."
+    )
     sample_rate: Annotated[float, real(0.0, 1e7, above=True)] = quantity(
         1000.0, unit="Hz", source="chosen", doc="Of the saved signals."
     )
-    method: Annotated[str, choice(*METHODS)] = quantity("Rodas5P", unit="1", source="benchmark", doc="Integrator.")
+    method: Annotated[str, choice(*METHODS)] = quantity(
+        "Rodas5P", unit="1", source="benchmark", doc="Integrator: a Rosenbrock method compiled here, or one of scipy's."
+    )
     rtol: Annotated[float, real(LEAST_RTOL, 0.1)] = quantity(
-        1e-6, unit="1", source="energy account", doc="Relative tolerance."
+        1e-6, unit="1", source="energy account", doc="Relative tolerance of the error of a step."
     )
     atol_scale: Annotated[float, real(LEAST_ATOL_SCALE, 0.1)] = quantity(
         1e-6, unit="1", source="energy account", doc="Absolute tolerance over the scale of each kind of state."

@@ -27,7 +27,10 @@ class Surface(Description):
     """
 
     stiffness: Annotated[float, real(0.0, 1e12, above=True)] = quantity(
-        1e4, unit="N/m^exponent", source="a soft fingertip", doc="k of f_n = k d^p (1 + c d')."
+        1e4,
+        unit="N/m^exponent",
+        source="a soft fingertip",
+        doc="k of f_n = k d^p (1 + c d'), stiffness of the contact.",
     )
     damping: Annotated[float, real(0.0, 1e4)] = quantity(
         2.0, unit="s/m", source="estimate", doc="c; slow impacts come back with 1 - 2 c v / 3 of their speed v."

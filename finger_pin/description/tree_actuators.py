@@ -77,11 +77,21 @@ class TreeActuator(Description):
 
     joint: Name | None = Field(None, description="The joint that it drives.")
     tendon: Name | None = Field(None, description="The tendon that it drives.")
-    gear: Annotated[float, real(-1e6, 1e6)] = quantity(1.0, unit="1", source="design", doc="gear.")
-    gain: Annotated[float, real(-_LARGE, _LARGE)] = quantity(1.0, unit="N per input", source="design", doc="gain.")
-    offset: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N", source="design", doc="b_0.")
-    by_length: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="b_1.")
-    by_speed: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N s/m", source="design", doc="b_2.")
+    gear: Annotated[float, real(-1e6, 1e6)] = quantity(
+        1.0, unit="1", source="design", doc="Its length, and the arm of its force, over those of what it drives."
+    )
+    gain: Annotated[float, real(-_LARGE, _LARGE)] = quantity(
+        1.0, unit="N per input", source="design", doc="Force per input."
+    )
+    offset: Annotated[float, real(-_LARGE, _LARGE)] = quantity(
+        0.0, unit="N", source="design", doc="b_0, force without input at length zero."
+    )
+    by_length: Annotated[float, real(-_LARGE, _LARGE)] = quantity(
+        0.0, unit="N/m", source="design", doc="b_1, force per length l."
+    )
+    by_speed: Annotated[float, real(-_LARGE, _LARGE)] = quantity(
+        0.0, unit="N s/m", source="design", doc="b_2, force per speed l'."
+    )
     input_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
         None, unit="1", source="design", doc="Between which u is held."
     )

@@ -43,7 +43,7 @@ class TreeSolid(Description):
         0.0, unit="m", source="design", doc="Of a cylinder, or of a capsule without its round ends, along z."
     )
     sides: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
-        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box."
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box, along x, y and z."
     )
     position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, or a mesh's origin, in the body's frame."
@@ -69,8 +69,10 @@ class Body(Description):
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of its frame in the parent's: quaternion x, y, z, w."
     )
-    mass: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="kg", source="design", doc="Mass.")
-    centre: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre.")
+    mass: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="kg", source="design", doc="Mass of the body.")
+    centre: Annotated[Triple, PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre in the body's frame."
+    )
     inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
         (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
     )
@@ -146,7 +148,9 @@ class TreeTendon(Description):
         source="design",
         doc="In place of rest: a cord, which only pulls, this much longer than its way at the joints' references.",
     )
-    damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N s/m", source="design", doc="Damping.")
+    damping: Annotated[float, real(0.0, _LARGE)] = quantity(
+        0.0, unit="N s/m", source="design", doc="Force per speed at which its length grows."
+    )
     range: Annotated[Pair, vector(2, -1e3, 1e3)] | None = quantity(
         None, unit="m", source="design", doc="Least and largest length, guarded as (2) guards a joint."
     )
@@ -193,16 +197,24 @@ class Coupling(Description):
 
     joint: Name = Field(description="The joint that follows.")
     other: Name | None = Field(None, description="The joint that it follows; none: it is held.")
-    ratio: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="1", source="design", doc="ratio.")
-    offset: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="design", doc="offset.")
+    ratio: Annotated[float, real(-1e3, 1e3)] = quantity(
+        0.0, unit="1", source="design", doc="Angle of this joint per angle of the other."
+    )
+    offset: Annotated[float, real(-1e3, 1e3)] = quantity(
+        0.0, unit="rad", source="design", doc="Angle of this joint where the other is at zero."
+    )
     powers: Annotated[Numbers, reals(-1e6, 1e6)] = quantity(
         0.0, unit="1", source="design", doc="Coefficients of the square of q_other and of higher powers, at most six."
     )
     rolling: Annotated[tuple[float, float], vector(2, 1e-6, 10.0)] | None = quantity(
         None, unit="m", source="design", doc="Radii of surfaces that roll, of this joint and the other."
     )
-    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(100.0, unit="N m/rad", source="estimate", doc="k.")
-    damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.1, unit="N m s/rad", source="estimate", doc="c.")
+    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(
+        100.0, unit="N m/rad", source="estimate", doc="k, of the spring that holds the joint on its course."
+    )
+    damping: Annotated[float, real(0.0, _LARGE)] = quantity(
+        0.1, unit="N m s/rad", source="estimate", doc="c, damping of that spring."
+    )
 
     @property
     def slope(self) -> float:
@@ -236,8 +248,12 @@ class Loop(Description):
     other_position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point in the second body's frame."
     )
-    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(1e4, unit="N/m", source="estimate", doc="k.")
-    damping: Annotated[float, real(0.0, _LARGE)] = quantity(10.0, unit="N s/m", source="estimate", doc="c.")
+    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(
+        1e4, unit="N/m", source="estimate", doc="k, of the springs that hold the points together."
+    )
+    damping: Annotated[float, real(0.0, _LARGE)] = quantity(
+        10.0, unit="N s/m", source="estimate", doc="c, damping of these springs."
+    )
 
 
 class Tip(Description):

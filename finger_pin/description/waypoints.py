@@ -38,7 +38,7 @@ class Waypoint(Description):
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of a wrap in the body's frame; a cylinder's axis is z."
     )
     radius: Annotated[float, real(0.0, 1.0, hint=_MILLIMETRES)] = quantity(
-        0.0, unit="m", source="design", doc="Of a wrap."
+        0.0, unit="m", source="design", doc="Of a sphere or cylinder around which it wraps."
     )
     side: Annotated[Triple, PLACE] | None = quantity(
         None, unit="m", source="design", doc="Side point of a wrap, in its frame; nearer than the radius: inside."

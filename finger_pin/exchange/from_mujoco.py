@@ -28,6 +28,7 @@ from finger_pin.exchange.mujoco_tendons import STOP, TendonReader
 from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest, apply_flags
 from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.typing import Array
+from finger_pin.version import installing
 
 # Stiffness with which the range of a joint stops it where it slides, N/m.
 _STOP_SLIDING = 1e4
@@ -63,7 +64,7 @@ def from_mujoco(
     try:
         import mujoco
     except ImportError:
-        raise InputError("model", "needs MuJoCo: pip install 'finger-pin[mujoco]'") from None
+        raise InputError("model", f"needs MuJoCo: {installing('mujoco')}") from None
     if isinstance(model, str | Path | mujoco.MjSpec):
         try:
             spec = model.copy() if isinstance(model, mujoco.MjSpec) else mujoco.MjSpec.from_file(str(model))

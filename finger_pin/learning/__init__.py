@@ -4,10 +4,12 @@ Importing this room registers ``finger_pin/Reach-v0``, ``finger_pin/Press-v0`` a
 Gymnasium, which comes with the extra ``gymnasium``.
 """
 
+from finger_pin.version import installing
+
 try:
     import gymnasium as _gymnasium  # noqa: F401 - asked for first, so that who lacks it is told what to install
 except ModuleNotFoundError as error:
-    raise ModuleNotFoundError("finger_pin.learning needs Gymnasium: pip install 'finger-pin[gymnasium]'") from error
+    raise ModuleNotFoundError(f"finger_pin.learning needs Gymnasium: {installing('gymnasium')}") from error
 
 from finger_pin.learning.distributions import Choice, LogUniform, Normal, Uniform
 from finger_pin.learning.environment import Environment

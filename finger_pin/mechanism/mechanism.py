@@ -153,7 +153,7 @@ class Mechanism:
         return linear
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
-        """Return everything at packed states.
+        """Return everything at packed states: accelerations of joints (18) and of masses of passive tendons (13).
 
         Args:
             x: Shape (size,) or (m, size).

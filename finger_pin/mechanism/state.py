@@ -126,7 +126,8 @@ class State:
         default=_ZEROS, metadata=_of("N m", (1e-2,), "joint_stiction", "joint stiction torque", "joint", "9a")
     )
     gearbox_stiction: Array = field(
-        default=_ZEROS, metadata=_of("N m", (1e-2,), "gearbox_stiction", "its stiction torque", "motor", "9a")
+        default=_ZEROS,
+        metadata=_of("N m", (1e-2,), "gearbox_stiction", "stiction torque of the gearbox", "motor", "9a"),
     )
     further: Array = field(default=_ZEROS, metadata=_of("1"))
 

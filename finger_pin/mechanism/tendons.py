@@ -115,7 +115,7 @@ class Tendons:
     def in_sliding(self, position: Array, direction: Array) -> tuple[Array, Array]:
         """Return the shares of tendons' tensions that arrive at every joint in steady sliding at M^d, and the drags.
 
-        All places of a tendon slide the same way.
+        Counts as if all places of a tendon slid the same way, as they do unless joints turn against each other.
 
         Args:
             position: theta, shape (..., n), rad.

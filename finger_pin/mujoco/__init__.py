@@ -7,11 +7,12 @@ import importlib
 from typing import Any
 
 from finger_pin.exceptions import InputError
+from finger_pin.version import installing
 
 try:
     import mujoco as _mujoco  # noqa: F401
 except ImportError:
-    raise InputError("mujoco", "is not installed: pip install 'finger-pin[mujoco]'") from None
+    raise InputError("mujoco", f"is not installed: {installing('mujoco')}") from None
 
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.mujoco.self_test import try_self_test

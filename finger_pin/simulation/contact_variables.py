@@ -53,9 +53,9 @@ def contact_variables(finger: Finger) -> Variables:
         axes, turns = ("time", "object", "axis"), ("time", "object", "quaternion")
         table |= {
             "object_position": (axes, "m", "position of a free object"),
-            "object_orientation": (turns, "1", "its orientation, a unit quaternion"),
-            "object_velocity": (axes, "m/s", "its velocity"),
-            "object_angular_velocity": (axes, "rad/s", "its angular velocity"),
+            "object_orientation": (turns, "1", "orientation of a free object, a unit quaternion"),
+            "object_velocity": (axes, "m/s", "velocity of a free object"),
+            "object_angular_velocity": (axes, "rad/s", "angular velocity of a free object"),
         }
     return table
 

@@ -29,8 +29,8 @@ def motor_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     table |= {
         name: Quantity(_MOTOR, partial(driven, name=inner), units, long_name, equation)
         for name, inner, units, long_name, equation in (
-            ("motor_current", "current", "A", "current", ""),
-            ("motor_voltage", "voltage", "V", "voltage", ""),
+            ("motor_current", "current", "A", "current of the winding", ""),
+            ("motor_voltage", "voltage", "V", "voltage at the winding", ""),
             ("motor_torque", "torque", "N m", "torque of the motor, at the spool", ""),
             ("gearbox_friction", "friction", "N m", "friction torque of the gearbox", "9c"),
             ("gearbox_load", "load", "N m", "torque that the gears carry", ""),
@@ -58,8 +58,8 @@ def _of_loops() -> dict[str, Quantity]:
 
     texts = (
         ("errors", "rad", "commanded less measured angle at the last sample of a position loop, else 0"),
-        ("integrals", "rad s", "integral of that error, as the loop has it, else 0"),
-        ("voltages", "V", "voltage that it has asked for; 1e30 where the motor is let go"),
+        ("integrals", "rad s", "integral of the error of a position loop, as the loop has it, else 0"),
+        ("voltages", "V", "voltage that a position loop has asked for; 1e30 where the motor is let go"),
     )
     ages = Quantity(("time",), age, "s", "time since the last sample of the position loops")
     return {LOOP_VARIABLES[0]: ages} | {

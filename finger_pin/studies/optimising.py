@@ -84,8 +84,9 @@ def optimise(
 ) -> xr.Dataset:
     """Search for nondominated designs, such as by ``fp.optimise("fig6", ["controller.gain=0.5:4"], constraints=[])``.
 
-    A design without force closure, or whose run fails, does not count; it is recorded with its reason. With an
-    ``output`` every finished run is on disk at once, and the same search again continues where it ended.
+    A design whose tendons its controller and its springs cannot keep taut, or whose run fails, does not count; it is
+    recorded with its reason. With an ``output`` every finished run is on disk at once, and the same search again
+    continues where it ended.
 
     Args:
         scenario: The scenario to be varied, its name, or the path of a file.

@@ -15,6 +15,7 @@ from scipy.stats import qmc
 
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
+from finger_pin.version import installing
 
 # How far out a design is that cannot be run at all: farther than any that breaks a bound within reason.
 HOPELESS = 1e6
@@ -46,7 +47,7 @@ class Search:
             import optuna
             from optuna.samplers import NSGAIISampler, nsgaii
         except ImportError:
-            raise InputError("optimise", "needs Optuna: python -m pip install 'optuna>=5'") from None
+            raise InputError("optimise", f"needs Optuna: {installing('optimise')}") from None
         with warnings.catch_warnings(action="ignore", category=optuna.exceptions.ExperimentalWarning):
             sampler = NSGAIISampler(
                 population_size=population,

@@ -2,7 +2,7 @@
 
 The planar finger at rest, held by three tendons: from the tension of one to the angle of a joint. At rest friction is a
 stiff spring; of a finger that slides only viscous friction is left. Runs with small tensions over time stand beside the
-curve. Needs pip install control. Run it: python scripts/examples/bode.py [FOLDER FOR THE PICTURE]
+curve. Needs the extra examples. Run it: python scripts/examples/bode.py [FOLDER FOR THE PICTURE]
 """
 
 import sys

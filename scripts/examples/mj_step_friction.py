@@ -1,7 +1,7 @@
 """How do I make the tendons of a MuJoCo model rub, inside mj_step?
 
 A servo pulls the flexor of a MuJoCo finger slowly in and lets it out again, with and without friction in its canal.
-Needs pip install 'finger-pin[mujoco]'. Run it: python scripts/examples/mj_step_friction.py [FOLDER FOR THE PICTURE]
+Needs the extra mujoco. Run it: python scripts/examples/mj_step_friction.py [FOLDER FOR THE PICTURE]
 """
 
 import sys

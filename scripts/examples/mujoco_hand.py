@@ -1,7 +1,7 @@
 """I have a MuJoCo model of a hand: how does it move if its tendons rub?
 
 Reads a finger that one cord bends against springs, moves it in MuJoCo and here, without friction and with it. Needs
-pip install 'finger-pin[mujoco]'. Run it: python scripts/examples/mujoco_hand.py [FOLDER FOR THE PICTURE]
+the extra mujoco. Run it: python scripts/examples/mujoco_hand.py [FOLDER FOR THE PICTURE]
 """
 
 import sys

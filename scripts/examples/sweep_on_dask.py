@@ -1,8 +1,8 @@
 """How do I spread a study over the workers of a cluster?
 
 How well a finger tracks, over the gain of its controller and the friction of its tendons, in the two processes of a
-local Dask cluster; Client("tcp://HOST:8786") in place of LocalCluster reaches a real one. Needs pip install
-'finger-pin[dask]'. Run it: python scripts/examples/sweep_on_dask.py [FOLDER FOR THE PICTURE]
+local Dask cluster; Client("tcp://HOST:8786") in place of LocalCluster reaches a real one. Needs the
+extra dask. Run it: python scripts/examples/sweep_on_dask.py [FOLDER FOR THE PICTURE]
 """
 
 import sys

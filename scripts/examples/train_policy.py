@@ -2,7 +2,7 @@
 
 A linear policy for the task Reach-v0, from the way to the goal and the speeds of the joints to four tensions, found by
 the cross-entropy method: of 48 policies, each tried on the same goals, the best ten say where to look next. For larger
-ones there is scripts/train.py. Needs pip install 'finger-pin[gymnasium]'. Run it:
+ones there is scripts/train.py. Needs the extra gymnasium. Run it:
 python scripts/examples/train_policy.py [FOLDER FOR THE PICTURE]
 """
 

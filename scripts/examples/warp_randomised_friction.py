@@ -4,7 +4,7 @@ A lever on a spring follows steps of its goal, pulled by a tendon in a canal, in
 coefficients of their own. Four weights make the tension: of the goal, of the goal by whether it is above or below the
 last, of the measured error and of the speed. The cross-entropy method finds them: of 32 sets, each tried in eight
 worlds, the best eight say where to look next; once in worlds that rub alike, once with coefficients drawn anew in every
-round. Needs pip install 'finger-pin[warp]'. Run it:
+round. Needs the extra warp. Run it:
 python scripts/examples/warp_randomised_friction.py [FOLDER FOR THE PICTURE]
 """
 

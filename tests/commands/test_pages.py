@@ -27,7 +27,8 @@ from finger_pin.commands import application
 from finger_pin.description import loading, reading
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted(ROOT.glob("[fst]*/**/README.md"))]
+PAGES = [ROOT / "README.md", ROOT / "finger_pin" / "QUESTIONS.md", *sorted(ROOT.glob("[fst]*/**/README.md"))]
+LINKED = [*PAGES, *sorted(set(ROOT.glob("[fst]*/**/*.md")) - set(PAGES))]
 DURATION = 0.02
 SHORTER = {
     r"--duration \S+": f"--duration {DURATION}",
@@ -196,7 +197,7 @@ def test_every_snippet_of_a_page_runs_alone_or_says_that_it_continues_those_abov
         above |= defined
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", LINKED, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_link_of_a_page_leads_to_a_file(page):
     for target in re.findall(r"\]\(([^)#:]+)(?:#[\w-]+)?\)", page.read_text("utf-8")):
         assert (page.parent / target).exists(), target

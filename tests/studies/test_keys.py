@@ -117,7 +117,7 @@ def test_what_a_key_holds_has_unit_and_name():
     assert describe(RADIUS)["units"] == "m"
     assert describe("finger.tendon_friction.viscous")["units"] == "N s/m"
     assert describe("finger.joints.distal.link.length")["units"] == "m"
-    assert describe("reference.joints.medial.frequency") == {"units": "Hz", "long_name": "Of the sinusoid"}
+    assert describe("reference.joints.medial.frequency") == {"units": "Hz", "long_name": "Frequency of the sinusoid"}
     assert describe("environment.fingertip_force[1]")["units"] == "N"
     assert np.char.startswith(describe("controller.gain")["long_name"], "K_P")
 

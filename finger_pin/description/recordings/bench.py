@@ -37,7 +37,9 @@ class Column(Description):
         strict=True,
         description="Such as mm, deg, gf; that in brackets in the header, else SI, if it is left out.",
     )
-    scale: Annotated[float, real(-1e12, 1e12)] = quantity(1.0, unit="1", source="calibration", doc="Factor.")
+    scale: Annotated[float, real(-1e12, 1e12)] = quantity(
+        1.0, unit="1", source="calibration", doc="Factor on what the column has, in SI."
+    )
     offset: Annotated[float, real(-1e12, 1e12)] = quantity(0.0, unit="SI", source="calibration", doc="Added, in SI.")
     supply: str | None = Field(
         None,

@@ -1,11 +1,12 @@
 """Our friction in MuJoCo Warp: `add_friction` gives it to thousands of worlds that `mujoco_warp.step` steps at once."""
 
 from finger_pin.exceptions import InputError
+from finger_pin.version import installing
 
 try:
     import mujoco_warp as _mujoco_warp  # noqa: F401
 except ImportError:
-    raise InputError("mujoco_warp", "is not installed: pip install 'finger-pin[warp]'") from None
+    raise InputError("mujoco_warp", f"is not installed: {installing('warp')}") from None
 
 from finger_pin.mujoco.warp.friction import Friction, add_friction
 from finger_pin.mujoco.warp.names import add_branches

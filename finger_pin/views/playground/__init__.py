@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.exceptions import FingerPinError
+from finger_pin.version import installing
 
 if TYPE_CHECKING:
     from finger_pin.views.playground.playing import Playground
@@ -52,7 +53,7 @@ def play(
         FingerPinError: If viser is not installed.
     """
     if find_spec("viser") is None:
-        raise FingerPinError("the playground needs viser: python -m pip install 'finger-pin[play]'")
+        raise FingerPinError(f"the playground needs viser: {installing('play')}")
     from finger_pin.views.playground.playing import serve
     from finger_pin.views.playground.session import Session
 
