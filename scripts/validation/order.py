@@ -66,6 +66,8 @@ def smooth_motion() -> Smooth:
     for joint in table["finger"]["joints"].values():
         for name in ("mass", "transverse_inertia", "axial_inertia"):
             joint["link"][name] *= 1e3
+        # Inertias are given: a wider section changes nothing but the density, which is that of a metal then.
+        joint["link"]["width"] *= 8.0
     table["finger"]["gravity"] = (0.0, 0.0, -0.5)
     table["finger"]["passive_tendon"] = {"stiffness": 500.0, "mass": 1.0}
     table["controller"]["passive_tension"] = 0.05
