@@ -67,7 +67,7 @@ def main(given: list[str] | None = None) -> int:
     print(f"{'seed':>6}{'s':>8}{'steps':>9}{'residual':>11}{'estimate':>11}")
     runs = []
     # What compiles is no part of a run.
-    fp.simulate("fig6")
+    fp.simulate("reversals")
     with ProcessPoolExecutor(arguments.processes) as pool:
         for run in pool.map(partial(run_seed, limit=arguments.limit), seeds):
             runs.append(run)

@@ -31,6 +31,7 @@ FAMILIES = {
     "symmetry": "symmetry",
     "stiffness": "stiffness",
     "energy": "energy",
+    "printed-figures": "printed_figures",
 }
 
 

@@ -21,7 +21,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope="session")
 def ub():
-    return fp.load_finger("ub")
+    return fp.load_finger("ub_stand_in")
 
 
 @pytest.fixture(scope="session")
@@ -66,18 +66,18 @@ def fig6_progress():
 
 @pytest.fixture(scope="session")
 def fig6_runs(fig6_progress):
-    """The first 0.1 s of fig6 by every method at the default tolerances."""
+    """The first 0.1 s of reversals by every method at the default tolerances."""
     scenarios = {each: {"simulation.duration": 0.1, "simulation.method": each} for each in METHODS}
     return {
-        method: fp.simulate(fp.load_scenario("fig6", changed), progress=fig6_progress[method].append)
+        method: fp.simulate(fp.load_scenario("reversals", changed), progress=fig6_progress[method].append)
         for method, changed in scenarios.items()
     }
 
 
 @pytest.fixture(scope="session")
-def fig6():
+def reversals():
     """The main job, all of it."""
-    return fp.simulate(fp.load_scenario("fig6"))
+    return fp.simulate(fp.load_scenario("reversals"))
 
 
 @pytest.fixture

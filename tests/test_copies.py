@@ -66,7 +66,7 @@ def stepped(simulator):
 
 
 def together():
-    made = [simulator("fig6") for _ in range(2)]
+    made = [simulator("reversals") for _ in range(2)]
     fp.step_many(made, [PULLS[0]] * 2, 1e-3)
     return made
 
@@ -87,7 +87,7 @@ def run_again(prepared):
     return [*low["joint_position"].ravel(), *high["tendon_tension"].ravel(), *prepared.start]
 
 
-def environment(scenario="fig6", make=Environment, **task):
+def environment(scenario="reversals", make=Environment, **task):
     made = make(scenario=fp.load_scenario(scenario, FIG6), reward=angle, draw=goal, duration=0.06, **task)
     made.reset(seed=3)
     made.step(made.action_space.low + 1.0)
@@ -110,16 +110,19 @@ ACTION = {"observation": {"joint_position": Sensor(noise=0.01), "tendon_tension"
 VECTOR = partial(VectorEnvironment, 2)
 # Of everything public: what makes one that is under way, and what then asks it for numbers.
 OBJECTS = {
-    "scenario": (partial(fp.load_scenario, "fig6", FIG6), lambda it: fp.simulate(it).joint_position.values.ravel()),
+    "scenario": (
+        partial(fp.load_scenario, "reversals", FIG6),
+        lambda it: fp.simulate(it).joint_position.values.ravel(),
+    ),
     "finger": (partial(finger, "press"), rates),
     "hand": (lambda: fp.Hand(fp.load_scenario("hand").finger), rates),
-    "simulator": (partial(simulator, "fig6"), stepped),
+    "simulator": (partial(simulator, "reversals"), stepped),
     "simulator of motors": (partial(simulator, "servo"), stepped),
     "simulator with objects": (partial(simulator, "press"), stepped),
     "simulators stepped together": (together, stepped_together),
-    "prepared": (partial(prepared, "fig6", "finger.tendon_friction.coulomb", 0.1), run_again),
+    "prepared": (partial(prepared, "reversals", "finger.tendon_friction.coulomb", 0.1), run_again),
     "prepared servo": (partial(prepared, "servo", "finger.tendon_friction.coulomb", 0.1), run_again),
-    "result": (lambda: fp.simulate(fp.load_scenario("fig6", FIG6)), lambda it: it.joint_position.values.ravel()),
+    "result": (lambda: fp.simulate(fp.load_scenario("reversals", FIG6)), lambda it: it.joint_position.values.ravel()),
     "environment": (partial(environment, **ACTION), acted),
     "environment, numbers drawn": (partial(environment, randomise=DRAWN, **ACTION), acted),
     "environment, motors": (partial(environment, "servo_position", action="motor_position"), acted),

@@ -48,7 +48,9 @@ DOORS = {
     "optimise": optimised,
     "propose": proposed,
     "self_locking_margin": lambda given: fp.analysis.self_locking_margin(given, samples=5).margin,
-    "linearise": lambda given: fp.linearise(given, fp.Finger("ub").rest_state(POSTURE), [1.0, 1.0, 4.0, 3.0]).A.values,
+    "linearise": lambda given: (
+        fp.linearise(given, fp.Finger("ub_stand_in").rest_state(POSTURE), [1.0, 1.0, 4.0, 3.0]).A.values
+    ),
     "build_controller": lambda given: fp.control.build_controller(given).gain,
     "Run": lambda given: fp.studies.METRICS["tension_peak"].measure(fp.studies.Run(given)),
     "Environment": learned,
@@ -75,7 +77,7 @@ FINGERS = {
     "steady_state": lambda given: fp.analysis.steady_state(given, np.ones((1, 4)), np.array([0.01])).tension,
     "tension_limits": lambda given: np.array(fp.analysis.tension_limits(given)),
     "radii": lambda given: [each.range.low for each in fp.studies.radii(given)],
-    "simulate": lambda given: peak(fp.simulate(fp.load_scenario("fig6", SHORT), finger=given)),
+    "simulate": lambda given: peak(fp.simulate(fp.load_scenario("reversals", SHORT), finger=given)),
     "posture_page": lambda given: page_of(given),
 }
 
@@ -83,7 +85,7 @@ FINGERS = {
 def page_of(given):
     from finger_pin.views.viewer.animation import posture_page
 
-    return posture_page(given, fp.analysis.force_polytope("ub", POSTURE, 20.0))
+    return posture_page(given, fp.analysis.force_polytope("ub_stand_in", POSTURE, 20.0))
 
 
 def peak(result):
@@ -104,20 +106,20 @@ def same(one, other):
 def files(tmp_path_factory):
     """A scenario and a finger, each in a file."""
     folder = tmp_path_factory.mktemp("doors")
-    (folder / "short.toml").write_text('extends = "fig6"\n[simulation]\nduration = 0.005\n')
-    (folder / "ub.toml").write_text(fp.to_toml(fp.load_finger("ub")))
+    (folder / "short.toml").write_text('extends = "reversals"\n[simulation]\nduration = 0.005\n')
+    (folder / "ub.toml").write_text(fp.to_toml(fp.load_finger("ub_stand_in")))
     return folder / "short.toml", folder / "ub.toml"
 
 
 @pytest.mark.parametrize("door", DOORS.values(), ids=DOORS.keys())
 def test_a_scenario_and_the_path_of_its_file_do_the_same(door, files):
-    same(door(fp.load_scenario("fig6", SHORT)), door(str(files[0])))
+    same(door(fp.load_scenario("reversals", SHORT)), door(str(files[0])))
 
 
 @pytest.mark.parametrize("door", FINGERS.values(), ids=FINGERS.keys())
 def test_a_finger_its_description_its_name_and_the_path_of_its_file_do_the_same(door, files):
-    expected = door(fp.Finger("ub"))
-    for given in (fp.load_finger("ub"), "ub", files[1], str(files[1])):
+    expected = door(fp.Finger("ub_stand_in"))
+    for given in (fp.load_finger("ub_stand_in"), "ub_stand_in", files[1], str(files[1])):
         same(door(given), expected)
 
 
@@ -137,10 +139,10 @@ def test_a_hand_is_taken_where_a_finger_is(hand):
 
 def test_of_a_scenario_its_finger_or_hand_is_taken(tmp_path):
     own = tmp_path / "thick.toml"
-    own.write_text('extends = "fig6"\n[finger]\nbase = "ub"\njoints.distal.link.length = 0.025')
-    assert fp.Finger(own).description == fp.load_finger("ub", {"finger.joints.distal.link.length": 0.025})
+    own.write_text('extends = "reversals"\n[finger]\nbase = "ub_stand_in"\njoints.distal.link.length = 0.025')
+    assert fp.Finger(own).description == fp.load_finger("ub_stand_in", {"finger.joints.distal.link.length": 0.025})
     assert fp.Simulator("hand").finger.description == fp.load_hand("ub_hand")
-    own.write_text('[finger]\nbase = "ub"\njoints.distal.link.lenght = 0.025')
+    own.write_text('[finger]\nbase = "ub_stand_in"\njoints.distal.link.lenght = 0.025')
     with pytest.raises(fp.InputError, match=r"^finger\.joints\.distal\.link\.lenght: unknown key"):
         fp.Finger(own)
 
@@ -151,26 +153,26 @@ def test_a_misspelt_hand_is_told_the_nearest_of_fingers_and_hands():
 
 
 def test_files_of_other_programs_are_written_of_a_name(files):
-    assert fp.to_urdf("ub") == fp.to_urdf(files[1]) == fp.to_urdf(fp.load_finger("ub"))
+    assert fp.to_urdf("ub_stand_in") == fp.to_urdf(files[1]) == fp.to_urdf(fp.load_finger("ub_stand_in"))
     assert fp.to_mjcf("ub_hand") == fp.to_mjcf(fp.load_hand("ub_hand"))
 
 
 @pytest.fixture(scope="module")
 def heavy():
-    return fp.Finger(fp.load_finger("ub", {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3}))
+    return fp.Finger(fp.load_finger("ub_stand_in", {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3}))
 
 
 @pytest.mark.parametrize("door", WITH_FINGER.values(), ids=WITH_FINGER.keys())
 def test_a_finger_of_ones_own_replaces_the_scenarios(door, heavy):
-    scenario = fp.load_scenario("fig6", SHORT)
+    scenario = fp.load_scenario("reversals", SHORT)
     expected = peak(fp.simulate(scenario, finger=heavy))
     assert expected != peak(fp.simulate(scenario))
     assert door(scenario, heavy) == door(scenario, heavy.description) == expected
 
 
 def test_what_would_be_learned_is_that_of_a_finger_of_ones_own(heavy):
-    scenario = fp.load_scenario("fig6", SHORT)
-    described = fp.load_scenario("fig6", SHORT | {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3})
+    scenario = fp.load_scenario("reversals", SHORT)
+    described = fp.load_scenario("reversals", SHORT | {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3})
     assert proposed(scenario, finger=heavy) == pytest.approx(proposed(described), rel=0.05)
     assert proposed(scenario, finger=heavy) != proposed(scenario)
 
@@ -180,8 +182,8 @@ def test_an_environment_of_a_finger_of_ones_own_is_that_of_one_described_so(heav
     from finger_pin.learning import Choice
 
     task = {"randomise": {COULOMB: Choice([drawn])}} if drawn else {}
-    scenario = fp.load_scenario("fig6", SHORT)
-    described = fp.load_scenario("fig6", SHORT | {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3})
+    scenario = fp.load_scenario("reversals", SHORT)
+    described = fp.load_scenario("reversals", SHORT | {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3})
     expected = learned(described, **task)
     assert (expected != learned(scenario, **task)).any()
     for given in (heavy, heavy.description):
@@ -202,12 +204,12 @@ def test_rows_of_ones_own_stay_where_numbers_of_an_environment_are_drawn():
         slopes,
         lambda row, p, force, rate, signals: (p[0] * row.length**2 / 2.0,),
     )
-    arm = np.eye(1, fp.Finger("ub").mechanism.coordinates, 2)
+    arm = np.eye(1, fp.Finger("ub_stand_in").mechanism.coordinates, 2)
     rows = [fp.Rows("spring", law, ("medial",), [[0.1]], arm)]
-    scenario = fp.load_scenario("fig6")
-    found = learned(scenario, finger=fp.Finger("ub", rows=rows), randomise={COULOMB: Choice([0.1])})
+    scenario = fp.load_scenario("reversals")
+    found = learned(scenario, finger=fp.Finger("ub_stand_in", rows=rows), randomise={COULOMB: Choice([0.1])})
     settings = scenario.simulation
-    changed = fp.Finger(fp.load_finger("ub", {COULOMB: 0.1}), rows=rows)
+    changed = fp.Finger(fp.load_finger("ub_stand_in", {COULOMB: 0.1}), rows=rows)
     sim = fp.Simulator(changed, method=settings.method, rtol=settings.rtol, atol_scale=settings.atol_scale)
     sim.reset(fp.prepare(scenario).start)
     for each in found:
@@ -215,7 +217,7 @@ def test_rows_of_ones_own_stay_where_numbers_of_an_environment_are_drawn():
 
 
 def test_convergence_is_that_of_a_finger_of_ones_own(heavy):
-    scenario = fp.load_scenario("fig6", SHORT)
+    scenario = fp.load_scenario("reversals", SHORT)
     assert fp.check_convergence(scenario, fp.simulate(scenario, finger=heavy), finger=heavy).converged
 
 
@@ -224,9 +226,9 @@ def test_a_sweep_over_keys_of_a_finger_changes_one_of_ones_own(tmp_path, heavy):
 
     def swept(finger, output):
         points = {COULOMB: [0.1, 0.3]}
-        return fp.sweep("fig6", points, metrics=["losses"], overrides=SHORT, finger=finger, output=output).losses
+        return fp.sweep("reversals", points, metrics=["losses"], overrides=SHORT, finger=finger, output=output).losses
 
-    scenario = fp.load_scenario("fig6", SHORT)
+    scenario = fp.load_scenario("reversals", SHORT)
     own, expected = swept(heavy, tmp_path), fp.simulate(scenario, finger=heavy)
     assert float(own[1]) == sum(float(each[-1]) for each in entries(expected, "lost").values())
     assert float(own[0]) not in (float(own[1]), float(swept(None, None)[0]))
@@ -235,8 +237,8 @@ def test_a_sweep_over_keys_of_a_finger_changes_one_of_ones_own(tmp_path, heavy):
 
 
 def test_values_at_keys_of_a_finger_change_one_of_ones_own():
-    plain = fp.prepare("fig6", ["finger.tendon_friction.coulomb"])
-    own = fp.prepare("fig6", ["finger.tendon_friction.coulomb"], finger=fp.Finger("ub"))
+    plain = fp.prepare("reversals", ["finger.tendon_friction.coulomb"])
+    own = fp.prepare("reversals", ["finger.tendon_friction.coulomb"], finger=fp.Finger("ub_stand_in"))
     for values in (None, [0.2]):
         np.testing.assert_array_equal(own.run(values)["tendon_tension"], plain.run(values)["tendon_tension"])
 
@@ -279,7 +281,7 @@ def test_numbers_of_objects_change_those_around_a_finger_of_ones_own(door):
 
 def test_numbers_of_objects_that_a_finger_of_ones_own_has_not_are_refused():
     with pytest.raises(fp.InputError, match=r"environment\.objects"):
-        fp.prepare("press", [STIFFNESS], finger=fp.Finger("ub")).run([1e5])
+        fp.prepare("press", [STIFFNESS], finger=fp.Finger("ub_stand_in")).run([1e5])
 
 
 def test_numbers_of_a_hand_are_refused_where_another_one_was_given():
@@ -290,8 +292,8 @@ def test_numbers_of_a_hand_are_refused_where_another_one_was_given():
 
 
 def test_a_scenario_stands_for_its_finger_as_its_name_does():
-    scenario = fp.load_scenario("fig6", {"finger.tendon_friction.coulomb": 0.3})
+    scenario = fp.load_scenario("reversals", {"finger.tendon_friction.coulomb": 0.3})
     for finger in (fp.Finger(scenario), fp.Simulator(scenario).finger, as_finger(scenario)):
-        assert finger.description == scenario.finger != fp.load_finger("ub")
+        assert finger.description == scenario.finger != fp.load_finger("ub_stand_in")
     assert description_of(scenario) == scenario.finger
     assert description_of(fp.load_scenario("hand")) == fp.load_hand("ub_hand")

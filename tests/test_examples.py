@@ -135,7 +135,7 @@ def test_a_sweep_on_dask_is_that_of_threads(example):
     pytest.importorskip("distributed")
     names = example("sweep_on_dask")
     short = {"simulation.duration": 1.0}
-    expected = fp.sweep("fig6", names["OVER"], metrics=["tracking_rms", "tension_peak"], overrides=short)
+    expected = fp.sweep("reversals", names["OVER"], metrics=["tracking_rms", "tension_peak"], overrides=short)
     assert names["study"].identical(expected)
 
 
@@ -144,7 +144,7 @@ def test_a_killed_sweep_goes_on_and_is_that_of_one_that_was_not(example):
     done = len(names["kept"])
     assert 5 <= done < len(names["GAINS"]) and names["told"][0] == done
     assert names["records"]()[:done] == names["kept"]
-    expected = fp.sweep("fig6", {"controller.gain": names["GAINS"]}, metrics=["tracking_rms"])
+    expected = fp.sweep("reversals", {"controller.gain": names["GAINS"]}, metrics=["tracking_rms"])
     np.testing.assert_array_equal(names["study"].tracking_rms, expected.tracking_rms)
 
 

@@ -10,7 +10,7 @@ import scipy.optimize
 import finger_pin as fp
 from finger_pin.references.reference import ReferenceSignals
 
-#: Reversals of the references of fig6 after its start, by joint, s.
+#: Reversals of the references of reversals after its start, by joint, s.
 REVERSALS = {
     "abduction": (0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5),
     "proximal": (2.0, 4.0, 6.0),
@@ -40,14 +40,14 @@ def posture(abduction, tension):
 
 def run(reference, duration, **settings):
     defaults = {"simulation.duration": duration, "simulation.method": "BDF", "simulation.rtol": 1e-5}
-    scenario = fp.load_scenario("fig6", defaults | settings)
+    scenario = fp.load_scenario("reversals", defaults | settings)
     return fp.simulate(scenario, reference=reference)
 
 
 @pytest.fixture(scope="module")
-def settled(fig6):
+def settled(reversals):
     """After the first second."""
-    return fig6.sel(time=slice(1.0, None))
+    return reversals.sel(time=slice(1.0, None))
 
 
 def test_tendon_friction_depends_on_the_posture(finger):
@@ -137,14 +137,14 @@ def test_with_friction_the_passive_tension_still_follows_the_plan(settled):
     assert np.corrcoef(tension, planned)[0, 1] > 0.7
 
 
-def test_the_passive_tendon_is_never_slack(fig6):
-    assert float(fig6.tendon_tension.sel(tendon="T5").min()) > 0.9
-    assert float(fig6.passive_tension_proximal.min()) > 0.9
+def test_the_passive_tendon_is_never_slack(reversals):
+    assert float(reversals.tendon_tension.sel(tendon="T5").min()) > 0.9
+    assert float(reversals.passive_tension_proximal.min()) > 0.9
 
 
-def test_all_tendons_stay_taut(fig6):
-    assert float(fig6.tendon_tension.min()) > 0.5
-    assert float(abs(fig6.power_slack).max()) == 0.0
+def test_all_tendons_stay_taut(reversals):
+    assert float(reversals.tendon_tension.min()) > 0.5
+    assert float(abs(reversals.power_slack).max()) == 0.0
 
 
 def test_tracking_errors_are_those_of_the_model_page(settled):
@@ -167,11 +167,11 @@ def test_no_stroke_limiter_is_touched_after_the_start(settled):
 
 
 @pytest.mark.parametrize("joint", REVERSALS)
-def test_joints_stick_when_their_reference_turns_back(fig6, joint):
+def test_joints_stick_when_their_reference_turns_back(reversals, joint):
     """For 80 ms after each reversal the joint hardly follows, and its friction stays below break-away, M^c R."""
     followed = []
     for turn in REVERSALS[joint]:
-        window = fig6.sel(joint=joint, time=slice(turn - 1e-6, turn + 0.08 + 1e-6))
+        window = reversals.sel(joint=joint, time=slice(turn - 1e-6, turn + 0.08 + 1e-6))
         followed.append(np.ptp(window.joint_position.values) / np.ptp(window.joint_reference.values))
         assert float((abs(window.joint_stiction) / (3.5e-4 * window.joint_reaction)).max()) < 0.96
     assert np.median(followed) < 0.35
@@ -179,26 +179,26 @@ def test_joints_stick_when_their_reference_turns_back(fig6, joint):
 
 
 @pytest.mark.parametrize("joint", REVERSALS)
-def test_friction_has_turned_round_within_a_fifth_of_a_second_of_a_reversal(fig6, joint):
+def test_friction_has_turned_round_within_a_fifth_of_a_second_of_a_reversal(reversals, joint):
     for turn in REVERSALS[joint]:
         before, after = (
-            fig6.joint_stiction.sel(joint=joint, time=slice(turn + a, turn + b)).mean()
+            reversals.joint_stiction.sel(joint=joint, time=slice(turn + a, turn + b)).mean()
             for a, b in ((-0.1, 0.0), (0.15, 0.2))
         )
         assert float(before) * float(after) < 0.0
 
 
-def test_sliding_joints_are_held_back_by_the_coulomb_level(fig6):
+def test_sliding_joints_are_held_back_by_the_coulomb_level(reversals):
     """While joint 3 sweeps back at over 1 rad/s, ten times omega, its stiction is M^d R against the motion."""
-    joint = fig6.sel(joint="medial", time=slice(1.25, 1.75))
+    joint = reversals.sel(joint="medial", time=slice(1.25, 1.75))
     np.testing.assert_array_equal(joint.joint_velocity < -0.6, True)
     ratio = joint.joint_stiction / joint.joint_reaction
     np.testing.assert_allclose(ratio, -2.5e-4, rtol=0.02)
 
 
-def test_drawn_tendons_lose_and_released_tendons_keep_tension(fig6):
+def test_drawn_tendons_lose_and_released_tendons_keep_tension(reversals):
     """Friction opposes the sliding: f below f^a where a tendon has been drawn in steadily, above where let out."""
-    back, forth = fig6.sel(tendon="T3", time=slice(1.3, 1.7)), fig6.sel(tendon="T3", time=slice(2.4, 2.7))
+    back, forth = reversals.sel(tendon="T3", time=slice(1.3, 1.7)), reversals.sel(tendon="T3", time=slice(2.4, 2.7))
     assert float(back.tendon_velocity.max()) < 0.0 < float(forth.tendon_velocity.min())
     assert float((back.tendon_tension - back.tendon_command).min()) > 0.0
     assert float((forth.tendon_tension - forth.tendon_command).max()) < 0.0

@@ -51,7 +51,7 @@ _Output = Annotated[
 
 
 def optimise(
-    scenario: ScenarioName = "fig6",
+    scenario: ScenarioName = "reversals",
     over: _Over = [],  # noqa: B006
     minimise: Annotated[list[str], typer.Option(metavar="NAME", help="Metric to be made small; repeatable.")] = [],  # noqa: B006
     maximise: Annotated[list[str], typer.Option(metavar="NAME", help="Metric to be made large; repeatable.")] = [],  # noqa: B006
@@ -75,11 +75,11 @@ def optimise(
     cannot keep their tendons taut do not count. The same command again continues where an earlier one ended, however it
     ended. For example:
 
-    optimise fig6 --over controller.gain=0.5:4 --minimise tracking_rms --minimise losses --no-constraints
+    optimise reversals --over controller.gain=0.5:4 --minimise tracking_rms --minimise losses --no-constraints
 
-    optimise fig6 --minimise tension_peak --constraint "tracking_rms<=0.006" --constraint "self_locking_margin>=2"
+    optimise reversals --minimise tension_peak --constraint "tracking_rms<=0.006" --constraint "self_locking_margin>=2"
 
-    simulate results/optimise-fig6/front/01.toml
+    simulate results/optimise-reversals/front/01.toml
     """
     if no_constraints and constraint:
         raise wrong("--no-constraints", "contradicts --constraint")

@@ -16,7 +16,7 @@ SHARES = (0.5, 0.8, 0.9, 1.1, 1.4)
 
 
 def self_locking(
-    scenario: ScenarioName = "fig6", output: Output = Path("results/self_locking"), format: Format = None
+    scenario: ScenarioName = "reversals", output: Output = Path("results/self_locking"), format: Format = None
 ) -> None:
     """Report the joint friction at which a finger locks, draw its map, and show runs on both sides of it.
 

@@ -19,6 +19,7 @@ from finger_pin.description.reading import (
     Table,
     as_name,
     as_table,
+    bench_file,
     is_path,
     kind_of,
     merge,
@@ -177,7 +178,9 @@ def load_bench(
         allowed = f"no such bench; there are {', '.join(list_benches())}, or the path of a .toml file{near}"
         raise InputError("bench", allowed, name)
     with _depth_limited("scenario"):
-        table, folder = ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(str(name), Path())
+        table, folder = (
+            ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(bench_file(str(name)), Path())
+        )
         wanted = merge(as_table(table.pop("identify", None)), dict(identify or {}))
         if not wanted:
             raise InputError("identify", "is missing: which parameters are to be found, and from which recordings")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from finger_pin.description.validation import (
     IN_RADIANS,
@@ -144,13 +144,19 @@ class Joint(Description):
         return value
 
 
+def _one_if_true(value: object) -> object:
+    return float(value) if isinstance(value, bool) else value
+
+
 class Crossing(Description):
     """The crossing of a tendon over a joint: winding radius (3) and the bending of its path (15)."""
 
     radius: Annotated[float, real(-0.5, 0.5, hint=_MILLIMETRES)] = quantity(
         ..., unit="m", source="(3)", doc="r, signed: positive where tension turns the joint positively."
     )
-    bends: bool = Field(False, strict=True, description="Whether the joint's rotation bends the path (15), which rubs.")
+    bends: Annotated[float, real(0.0, 10.0), BeforeValidator(_one_if_true)] = quantity(
+        0.0, unit="1", source="(15)", doc="Turn of the path, which rubs, over the joint's rotation; true for 1."
+    )
     curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
         0.0, unit="rad", source="(15)", doc="Curvature of the path here at theta = 0, beside the tendon's."
     )

@@ -19,7 +19,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, find_field, validate
 from finger_pin.exceptions import InputError
 
-_INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6})\]")
+_INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6}(,\d{1,6})*)\]")
 
 
 class ParametrisedScenario:
@@ -31,8 +31,8 @@ class ParametrisedScenario:
 
     Attributes:
         scenario: The scenario itself.
-        keys: Dotted keys, as of `load_scenario`; ``[2]`` at the end of one stands for one number of a list, a star for
-            every name.
+        keys: Dotted keys, as of `load_scenario`; ``[2]`` at the end of one stands for one number of a list, ``[0,1]``
+            for two that are equal, a star for every name, ``{T1,T2}`` for some names.
         values: Their present values; None where there is nothing.
     """
 
@@ -95,10 +95,7 @@ class ParametrisedScenario:
         for places, (_, index), value in zip(self._places, self._names, given, strict=True):
             for *path, last in places:
                 inner = _at(table, path)
-                if index is None:
-                    inner[last] = value
-                else:
-                    inner[last] = [*inner[last][:index], value, *inner[last][index + 1 :]]
+                inner[last] = value if index is None else _with_numbers(inner[last], index, value)
         return validate(Scenario, table, ())
 
     def _overrides(self, values: Sequence[Any]) -> dict[str, Any]:
@@ -108,8 +105,8 @@ class ParametrisedScenario:
                 found[name] = value
             else:
                 for path in places:
-                    whole = list(found.get(".".join(path), _found(self.scenario, path)))
-                    found[".".join(path)] = [*whole[:index], value, *whole[index + 1 :]]
+                    whole = found.get(".".join(path), _found(self.scenario, path))
+                    found[".".join(path)] = _with_numbers(whole, index, value)
         return found
 
     def _anew(self, overrides: Mapping[str, Any]) -> Scenario:
@@ -127,8 +124,8 @@ class ParametrisedScenario:
         value = _found(self.scenario, places[0]) if places else None
         if index is None or value is None:
             return value
-        if isinstance(value, tuple | Series) and index < len(value):
-            return value[index]
+        if isinstance(value, tuple | Series) and max(index) < len(value):
+            return value[index[0]]
         allowed = "there is no such list of numbers"
         if isinstance(value, int | float):
             allowed = f"{name} is one number for all; give it a list first, or leave out the index"
@@ -137,24 +134,24 @@ class ParametrisedScenario:
         raise InputError(self.keys[key], allowed)
 
 
-def split(key: str) -> tuple[str, int | None]:
-    """Return the name of a key, and its index or None.
+def split(key: str) -> tuple[str, tuple[int, ...] | None]:
+    """Return the name of a key, and its indices or None.
 
     Raises:
         InputError: If it has brackets elsewhere than at its end.
     """
     found = _INDEXED.fullmatch(key)
     if found:
-        return found["name"], int(found["index"])
+        return found["name"], tuple(map(int, found["index"].split(",")))
     if "[" in key or "]" in key:
-        raise InputError(key, "an index is a whole number in brackets at the end, such as controller.gain[2]")
+        raise InputError(key, "an index is whole numbers in brackets at the end, such as controller.gain[2] or [0,1]")
     return key, None
 
 
 def _places(path: Sequence[str], owner: Any, table: Table, above: tuple[str, ...] = ()) -> Iterator[list[str]]:
     """Spell out the tables on the way to a key, and return all entries that it stands for."""
     part, *rest = path
-    names = [*table] if part == "*" else [part]
+    names = [*table] if part == "*" else part.strip("{}").split(",") if part.startswith("{") else [part]
     for name in names:
         if not rest:
             yield [name]
@@ -179,6 +176,11 @@ def _spelled(value: Description | Mapping[str, Any]) -> Table:
         else:
             table[key] = _spelled(each) if isinstance(each, dict) else each
     return table
+
+
+def _with_numbers(numbers: Sequence[Any], index: Sequence[int], value: Any) -> list[Any]:
+    """Return a list of numbers with a value at some indices."""
+    return [value if k in index else number for k, number in enumerate(numbers)]
 
 
 def _at(table: Table, path: Sequence[str]) -> Table:

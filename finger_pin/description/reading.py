@@ -27,7 +27,7 @@ _SIGNAL_FILES = (
     ("environment", "fingertip_force_file", "fingertip_force_signal", "N"),
 )
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
-_KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
+_KINDS_APART = {"step", "ramp", "points", "cosine", "samples", "tensions"}
 
 
 def shipped(kind: str) -> dict[str, str]:
@@ -85,10 +85,19 @@ def kind_of(name: str, folder: Path = Path()) -> str:
     return "hand" if "fingers" in table else "finger" if {"joints", "tendons"} & table.keys() else "scenario"
 
 
+def bench_file(name: str) -> str:
+    """Return the path of the file of a bench that ships, or a name as it is."""
+    shipping = not is_path(name) and name in _shipped_texts("benches")
+    return str(resources.files("finger_pin.description").joinpath(f"benches/{name}.toml")) if shipping else name
+
+
 def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tuple[Table, Path]:
-    """Return the table of a scenario on top of the ones that it extends, and the folder that it lies in."""
-    if not is_path(name) and name in shipped("benches"):
-        name = str(resources.files("finger_pin.description").joinpath(f"benches/{name}.toml"))
+    """Return the table of a scenario on top of the ones that it extends, and the folder that it lies in.
+
+    A bench is a scenario too; where a scenario has the same name, that one is meant.
+    """
+    if name not in _shipped_texts("scenarios"):
+        name = bench_file(name)
     table, path = _read("scenario", name, folder)
     identity = path.resolve()
     if identity in seen:

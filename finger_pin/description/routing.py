@@ -38,7 +38,7 @@ class Routing:
         actuated: Number a of actuated tendons.
         coupling: H_c, shape (t, n), m; l = H_c theta, equation (3).
         strand_coupling: H_c2, shape (s, n), m, equation (10).
-        curvature_matrix: Phi, shape (t, n), zeros and ones, equation (15).
+        curvature_matrix: Phi, shape (t, n), turn of the path over rotation of the joint, equation (15).
         curvature_offset: phi_off, shape (t,), rad.
         loads: Shape (n, s), one where a strand loads a joint, equation (17).
         fingers: Of every finger the indices of its joints and of its tendons; of one finger all.
@@ -69,7 +69,7 @@ class Routing:
             rubbing = _rubbing(description, tendon)
             for order, (joint, crossing) in enumerate(tendon.crossings.items()):
                 radii[column[joint], order] = crossing.radius
-                bends[column[joint], order] = float(crossing.bends and joint in rubbing)
+                bends[column[joint], order] = crossing.bends if joint in rubbing else 0.0
                 crossed[column[joint], order] = 1.0
             if tendon.along is not None and description.tree is not None:
                 # Its arms depend on the posture; which joints it crosses does not.

@@ -32,6 +32,7 @@ _NEEDED: dict[str, tuple[str, ...]] = {
     "step": ("time", "height"),
     "ramp": ("time", "duration", "height"),
     "points": ("times", "values"),
+    "cosine": ("times", "values"),
     "samples": ("times", "values"),
 }
 _ANGLE = real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)
@@ -46,11 +47,12 @@ class SignalSettings(Description):
     """offset + amplitude sin(2 pi frequency t + phase) + the function of ``kind``.
 
     A step adds ``height`` from ``time`` on; a ramp reaches it after ``duration``. Points are joined by motions of least
-    jerk that rest at every point (Flash and Hogan, J. Neuroscience 5(7), 1985); samples by monotone cubics (Fritsch and
-    Butland, SIAM J. Scientific Computing 5(2), 1984). Neither overshoots, and both are constant before and after.
+    jerk that rest at every point (Flash and Hogan, J. Neuroscience 5(7), 1985), of kind "cosine" by half periods of a
+    cosine; samples by monotone cubics (Fritsch and Butland, SIAM J. Scientific Computing 5(2), 1984). None overshoots,
+    and all are constant before and after.
     """
 
-    kind: Annotated[Literal["sine", "step", "ramp", "points", "samples"], choice(*_NEEDED)] = quantity(
+    kind: Annotated[Literal["sine", "step", "ramp", "points", "cosine", "samples"], choice(*_NEEDED)] = quantity(
         "sine", unit="1", source="chosen", doc="Function that is added to the sinusoid: none, or one of these."
     )
     frequency: Annotated[float, real(0.0, 1e4)] = quantity(

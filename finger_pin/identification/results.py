@@ -13,7 +13,7 @@ import tomli_w
 import xarray as xr
 
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
-from finger_pin.description.parametrised_scenario import ParametrisedScenario, split
+from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.recordings.bench import OF_RECORDINGS
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
@@ -200,10 +200,12 @@ def write_results(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem
 def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> str:
     """Return the text of a scenario with the numbers found and their intervals.
 
-    It extends the bench; where no file says all of it, as it was given as a Scenario or with overrides, it is whole.
+    It extends the bench; where no file says all of it, as it was given as a Scenario or with overrides, or where a key
+    stands for more or less than one entry, it is whole.
     """
     recordings = ", ".join(dict.fromkeys(signal.recording for signal in problem.signals))
-    extended = not isinstance(bench, Scenario) and load_scenario(bench) == problem.scenario
+    single = all(owner(key) is not None or not {*"*{["} & {*key} for key in problem.keys[: problem.asked])
+    extended = single and not isinstance(bench, Scenario) and load_scenario(bench) == problem.scenario
     lines = ["# What an identification has found; intervals at 95 %."]
     if extended:
         lines += [tomli_w.dumps({"extends": _from_folder(str(bench), folder)}).strip(), ""]
@@ -213,15 +215,13 @@ def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, probl
         *(result[each].values.tolist() for each in ("estimate", "lower", "upper", "units")),
         strict=True,
     ):
-        plain, index = split(key)
         ends = f"{_end(low)} to {_end(high)}{'' if unit == '1' else f' {unit}'}"
         if owner(key) is None:
             numbers[key] = value
         if not extended or key not in numbers:
             lines.append(f"# {key} = {value:.6g}, {ends}, from {owner(key) or recordings}")
             continue
-        where = "" if index is None else f"number [{index}], "
-        lines.append(f"{plain} = {_toml(problem, key, value)} # {where}{ends}, from {recordings}")
+        lines.append(f"{key} = {value!r} # {ends}, from {recordings}")
     if not extended:
         lines += [
             "",
@@ -246,13 +246,3 @@ def _from_folder(bench: str, folder: Path) -> str:
 
 def _end(value: float) -> str:
     return "not known" if math.isnan(value) else "open" if math.isinf(value) else f"{value:.4g}"
-
-
-def _toml(problem: Problem, key: str, value: float) -> str:
-    plain, index = split(key)
-    if index is None:
-        return repr(value)
-    held: Any = problem.scenario.model_dump(mode="python")
-    for part in plain.split("."):
-        held = held[part]
-    return str([value if k == index else each for k, each in enumerate(held)])

@@ -38,13 +38,13 @@ def _scenario(name: str, overrides: tuple[tuple[str, Any], ...] = ()) -> Scenari
 
 @cache
 def _paper_finger() -> Finger:
-    return Finger("ub")
+    return Finger("ub_stand_in")
 
 
 def fingertip_goal(random: np.random.Generator) -> dict[str, Array]:
     """Return the fingertip position at a posture that the passive tendon allows, each joint within its middle 80 %."""
     finger = _paper_finger()
-    limiter, coupling = finger.stroke_limiter, _scenario("fig6").coupling(finger.routing)
+    limiter, coupling = finger.stroke_limiter, _scenario("reversals").coupling(finger.routing)
     margin = 0.1 * (limiter.upper - limiter.lower)
     free = random.uniform(limiter.lower + margin, limiter.upper - margin)
     return {"goal": finger.rigid_body.tip_position(coupling.matrix @ free + coupling.offset)}
@@ -104,7 +104,7 @@ def _observed(*names: str, **functions: Function) -> dict[str, Sensor | Function
 
 def _reach() -> dict[str, Any]:
     return {
-        "scenario": _scenario("fig6", (("title", "the fingertip reaches a point"),)),
+        "scenario": _scenario("reversals", (("title", "the fingertip reaches a point"),)),
         "limits": (0.0, _LIGHT),
         "reward": _reached,
         "observation": _observed("joint_position", "joint_velocity", "fingertip_position", to_goal=to_goal),

@@ -50,7 +50,7 @@ def _stretches(description: FingerDescription, tendon: str, branch: int) -> tupl
     own, tree = description.tendons.get(tendon), description.tree
     if own is not None and own.along is None:
         found = [
-            _Stretch(name, each.bends or offset > 0.0, bool(each.radius), offset, frozenset({name}))
+            _Stretch(name, each.bends > 0.0 or offset > 0.0, bool(each.radius), offset, frozenset({name}))
             for name, each in own.crossings.items()
             for offset in [each.curvature_offset]
         ]

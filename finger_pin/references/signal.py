@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,14 +17,11 @@ from finger_pin.description.caching import cached_property, memoised
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.inputs import harmonic, harmonic_rate, quintic, quintic_curvature, quintic_rate
+from finger_pin.references.polynomials import ORDER, joined, polynomials
 from finger_pin.references.sample_fitting import thinned
 from finger_pin.typing import Array
 
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
-
 Flags = NDArray[np.bool_]
-_ORDER = 6
 # A signal that varies by less, of its size, is constant but for rounding.
 _ROUNDING = 1e-9
 
@@ -64,7 +60,7 @@ class Signal:
     @classmethod
     def _from_settings(cls, settings: Sequence[SignalSettings], tolerance: float) -> Signal:
         harmonics = np.array([[each.offset, each.amplitude, each.frequency, each.phase] for each in settings])
-        return cls(harmonics.reshape(-1, 4), *_joined(_polynomials(settings, tolerance)))
+        return cls(harmonics.reshape(-1, 4), *joined(polynomials(settings, tolerance)))
 
     @classmethod
     def from_samples(
@@ -98,7 +94,7 @@ class Signal:
     @classmethod
     def held(cls, knots: Array, values: Array) -> Signal:
         """Return signals that are held between knots, shape (m + 1,), s, at values of shape (m, k)."""
-        coefficients = np.zeros((_ORDER, *values.shape))
+        coefficients = np.zeros((ORDER, *values.shape))
         coefficients[-1] = values
         return cls(np.zeros((values.shape[1], 4)), knots, coefficients)
 
@@ -108,7 +104,7 @@ class Signal:
         from scipy.interpolate import PPoly
 
         columns = [PPoly(column.T, each.knots) for each in signals for column in each.coefficients.T]
-        return cls(np.concatenate([each.harmonics for each in signals]), *_joined(columns))
+        return cls(np.concatenate([each.harmonics for each in signals]), *joined(columns))
 
     @cached_property
     def is_harmonic(self) -> bool:
@@ -142,7 +138,7 @@ class Signal:
         inside = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
         piece = np.searchsorted(self.knots[1:-1], inside, side="right")
         since, factors = inside - self.knots[piece], self.coefficients[:, piece[..., 0]]
-        powers = np.arange(_ORDER - 1, order - 1, -1)
+        powers = np.arange(ORDER - 1, order - 1, -1)
         terms = [math.perm(int(n), order) * c * since ** (n - order) for n, c in zip(powers, factors, strict=False)]
         moving = (instant >= self.knots[0]) & (instant < self.knots[-1])
         return np.asarray(value + sum(terms) * (moving | (order == 0)))
@@ -193,7 +189,7 @@ class Signal:
             least: Distance from a chord, shape (k,), in the unit of each signal.
         """
         length = np.diff(self.knots)[:, None]
-        order = np.arange(_ORDER - 1, 1, -1)
+        order = np.arange(ORDER - 1, 1, -1)
         bent = np.zeros((len(length), values.shape[1]))
         powers = zip(order, self.coefficients, strict=False)
         pieces = sum((n * (n - 1) * np.abs(c) * length**n for n, c in powers if c.any()), bent) > 8.0 * least
@@ -232,67 +228,3 @@ def _widened(marks: Flags) -> Flags:
     wide[1:] |= marks[:-1]
     wide[:-1] |= marks[1:]
     return wide
-
-
-def _polynomials(settings: Sequence[SignalSettings], tolerance: float) -> list[PPoly | None]:
-    """Return the polynomials that the kinds of signals add to the sinusoids, or None."""
-    found = [None if each.kind == "samples" else _polynomial(each) for each in settings]
-    rest = [index for index, each in enumerate(settings) if each.kind == "samples"]
-    while rest:
-        from scipy.interpolate import PPoly
-
-        # Those with the same times at once.
-        times = settings[rest[0]].times
-        together = [index for index in rest if settings[index].times == times]
-        values = np.transpose([np.asarray(settings[index].values) for index in together])
-        knots, coefficients = thinned(np.asarray(times), values, tolerance)
-        for column, index in enumerate(together):
-            found[index] = PPoly(coefficients[:, :, column], knots)
-        rest = [index for index in rest if index not in together]
-    return found
-
-
-def _polynomial(settings: SignalSettings) -> PPoly | None:
-    """Return the polynomial that a kind without samples adds to the sinusoid, or None."""
-    if settings.times is None and settings.time is None:
-        return None
-    from scipy.interpolate import PPoly
-
-    if settings.times is not None:
-        times, values = np.array(settings.times), np.array(settings.values)
-        length, change = np.diff(times), np.diff(values)
-        nothing = np.zeros_like(change)
-        terms = [6.0 / length**5, -15.0 / length**4, 10.0 / length**3]
-        return PPoly(np.array([*(change * term for term in terms), nothing, nothing, values[:-1]]), times)
-    start, height = settings.time or 0.0, settings.height or 0.0
-    if settings.duration is None:
-        return PPoly(np.array([[0.0, height]]), np.array([start - 1.0, start, start + 1.0]))
-    return PPoly(np.array([[height / settings.duration], [0.0]]), np.array([start, start + settings.duration]))
-
-
-def _joined(columns: Sequence[PPoly | None]) -> tuple[Array, Array]:
-    """Return knots, shape (m,), and coefficients, shape (6, m - 1, k), of polynomials about shared knots."""
-    own = [each.x for each in columns if each is not None]
-    if not own:
-        return np.array([0.0, 1.0]), np.zeros((_ORDER, 1, len(columns)))
-    if all(np.array_equal(each, own[0]) for each in own):
-        together = np.zeros((_ORDER, len(own[0]) - 1, len(columns)))
-        for index, each in enumerate(columns):
-            if each is not None:
-                together[_ORDER - len(each.c) :, :, index] = each.c
-        return own[0], together
-    knots = np.unique(np.concatenate(own))
-    start, middle = knots[:-1], 0.5 * (knots[:-1] + knots[1:])
-    coefficients = np.zeros((_ORDER, len(start), len(columns)))
-    for column, each in enumerate(columns):
-        if each is None:
-            continue
-        powers = np.vstack([np.zeros((_ORDER - len(each.c), len(each.x) - 1)), each.c])[::-1]
-        piece = np.clip(np.searchsorted(each.x, middle) - 1, 0, len(each.x) - 2)
-        # Outside its own knots a signal keeps its value there; inside, its piece is expanded about the shared knot.
-        since = np.clip(start, each.x[0], each.x[-1]) - each.x[piece]
-        inside = (middle > each.x[0]) & (middle < each.x[-1])
-        for power in range(_ORDER):
-            terms = [math.comb(h, power) * powers[h, piece] * since ** (h - power) for h in range(power, _ORDER)]
-            coefficients[_ORDER - 1 - power, :, column] = sum(terms) * (inside | (power == 0))
-    return knots, coefficients

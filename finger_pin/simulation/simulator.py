@@ -34,7 +34,7 @@ _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 class Simulator:
     """A finger that is stepped under tensions held over each step; a palm with a path moves along it.
 
-        sim = Simulator(Finger(load_finger("ub")), position=[0.0, 0.3, 0.3, 0.2])
+        sim = Simulator(Finger(load_finger("ub_stand_in")), position=[0.0, 0.3, 0.3, 0.2])
         for _ in range(1000):
             state = sim.step(tension, 1e-3)
 

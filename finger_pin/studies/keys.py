@@ -141,7 +141,7 @@ def describe(key: str) -> dict[str, str]:
     extra = field.json_schema_extra if field is not None else None
     unit = extra.get("unit", "1") if isinstance(extra, dict) else "1"
     text = (field.description or "").rstrip(".") if field is not None else ""
-    where = "" if index is None else f"[{index}]"
+    where = "" if index is None else str([*index])
     return {"units": str(unit), "long_name": f"{text}{where}" if text else key}
 
 
@@ -162,12 +162,13 @@ def _leaves(held: Any, key: str, numbers: bool) -> Iterator[str]:
 
 
 def _look_up(scenario: Scenario, key: str) -> Any:
-    """Return the entry at a key, or None; a star for all names means the first of them."""
+    """Return the entry at a key, or None; of several that it stands for the first."""
     name, index = split(key)
     held: Any = scenario.model_dump(mode="python")
     for part in name.split("."):
         below = held if isinstance(held, dict) else {}
-        held = next(iter(below.values()), None) if part == "*" else below.get(part)
+        first = part.strip("{}").split(",")[0]
+        held = next(iter(below.values()), None) if part == "*" else below.get(first)
     if index is None:
         return held
-    return held[index] if isinstance(held, list | tuple | Series) and index < len(held) else None
+    return held[index[0]] if isinstance(held, list | tuple | Series) and max(index) < len(held) else None

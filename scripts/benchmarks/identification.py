@@ -41,7 +41,7 @@ def measure(store: Store) -> dict[str, Any]:
 
 def recording(duration: float) -> dict[str, np.ndarray]:
     """Return columns by name: fig6 with its own numbers, and noise."""
-    scenario = fp.load_scenario("fig6", {"simulation.duration": duration, "simulation.sample_rate": _RATE})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": duration, "simulation.sample_rate": _RATE})
     made, rng = fp.prepare(scenario, (), _VARIABLES).run(), np.random.default_rng(0)
     columns = {"t": np.asarray(made.time)}
     for name, noise in SIGNALS.items():
@@ -57,7 +57,7 @@ def _fit(duration: float, starts: int) -> dict[str, Any]:
     seen = {"time": "t", "settle": _SETTLE, "outputs": {name: name for name in SIGNALS}}
     began = time.perf_counter(), time.process_time()
     result = fp.identify(
-        "fig6",
+        "reversals",
         parameters={key: bounds for key, (bounds, _) in PARAMETERS.items()},
         recordings={"motion": seen},
         data={"motion": columns},
@@ -74,7 +74,7 @@ def _slopes(duration: float, rounds: int) -> dict[str, float]:
     """Return the times of a run with slopes by one, three and six numbers, of one without, s."""
     jobs = {}
     for count in (1, 3, 6):
-        scenario = fp.load_scenario("fig6", {"simulation.duration": duration})
+        scenario = fp.load_scenario("reversals", {"simulation.duration": duration})
         prepared = fp.prepare(scenario, list(PARAMETERS)[:count], _VARIABLES)
         jobs[str(count)] = lambda prepared=prepared: prepared.run(sensitivities=True)
     return processor_time({"run": lambda: prepared.run(), **jobs}, rounds)

@@ -78,7 +78,7 @@ def _study(count: int) -> dict[str, Any]:
 
 
 def _exact(tensions: Array) -> Array:
-    sim = fp.Simulator("ub", _START, rtol=1e-9, atol_scale=1e-9)
+    sim = fp.Simulator("ub_stand_in", _START, rtol=1e-9, atol_scale=1e-9)
     return np.array([sim.step(pull, _PERIOD).position for pull in tensions])
 
 
@@ -118,7 +118,12 @@ def _mujoco_runs() -> dict[str, Callable[[Array], Array]]:
     for friction in (False, True):
         for step in _STEPS:
             text = fp.to_mjcf(
-                fp.load_finger("ub"), posture=_START, timestep=step, massless=True, shapes=False, friction=friction
+                fp.load_finger("ub_stand_in"),
+                posture=_START,
+                timestep=step,
+                massless=True,
+                shapes=False,
+                friction=friction,
             )
             model = mujoco.MjModel.from_xml_string(text)
             name = f"MuJoCo, {'our friction' if friction else 'plain'}, {1e6 * step:g} us"

@@ -27,11 +27,11 @@ def measure(store: Store) -> Any:
 def _study(counts: tuple[int, int], duration: float) -> dict[str, Any]:
     times: dict[str, float] = {}
     # So that nothing is compiled while it is timed.
-    fp.simulate_many([fp.load_scenario("fig6", {"simulation.duration": 0.01})] * 4, workers=max(WORKERS))
+    fp.simulate_many([fp.load_scenario("reversals", {"simulation.duration": 0.01})] * 4, workers=max(WORKERS))
     for count in counts:
         gains = np.linspace(0.8, 1.2, count)
         overrides = [{"controller.gain": float(gain), "simulation.duration": duration} for gain in gains]
-        scenarios = [fp.load_scenario("fig6", each) for each in overrides]
+        scenarios = [fp.load_scenario("reversals", each) for each in overrides]
         for workers in WORKERS:
             elapsed, _ = clocked(
                 lambda scenarios=scenarios, workers=workers: fp.simulate_many(

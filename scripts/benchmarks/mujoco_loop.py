@@ -41,7 +41,7 @@ def measure(store: Store) -> dict[str, Any] | None:
     if importlib.util.find_spec("mujoco") is None:
         return None
     steps = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 1e-5, 5e-6)
-    asked = Comparison("fig6", {}, 0.5 if store.quick else 8.0, 1e-3, ("worst", "rms"), steps)
+    asked = Comparison("reversals", {}, 0.5 if store.quick else 8.0, 1e-3, ("worst", "rms"), steps)
     return store.part("mujoco", lambda: study(asked))
 
 

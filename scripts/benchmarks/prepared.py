@@ -16,7 +16,7 @@ from benchmarks.store import Store, say
 from finger_pin.simulation.setup import Setup
 from finger_pin.typing import Array
 
-SCENARIOS = ("fig6", "stick_slip", "servo", "press", "hand")
+SCENARIOS = ("reversals", "stick_slip", "servo", "press", "hand")
 #: What the prepared runs record.
 RECORDED = ("joint_position", "tendon_tension")
 _ROUNDS, _QUICK_ROUNDS, _SHORT = 7, 2, 0.01
@@ -87,8 +87,8 @@ def _simulator(rounds: int) -> dict[str, Any]:
         # At every step, as those of a policy that explores.
         "jumping": _REST * np.random.default_rng(0).uniform(0.9, 1.1, (len(steps), 4)),
     }
-    sim, errors = fp.Simulator("ub", _START, **settings), {}
-    exact = fp.Simulator("ub", _START, rtol=1e-9, atol_scale=1e-9)
+    sim, errors = fp.Simulator("ub_stand_in", _START, **settings), {}
+    exact = fp.Simulator("ub_stand_in", _START, rtol=1e-9, atol_scale=1e-9)
     jobs: dict[str, Callable[[], Any]] = {}
     for name, tensions in pulls.items():
         apart = []

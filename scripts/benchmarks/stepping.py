@@ -25,7 +25,7 @@ def measure(store: Store) -> Any:
 
 
 def _study(duration: float) -> dict[str, Any]:
-    scenario = settled(fp.load_scenario("fig6"), duration=duration, sample_rate=1.0 / PERIOD)
+    scenario = settled(fp.load_scenario("reversals"), duration=duration, sample_rate=1.0 / PERIOD)
     runs = [_run(scenario) for _ in range(_ROUNDS)]
     exact = fp.simulate(settled(scenario, rtol=1e-9, atol_scale=1e-10), control_period=PERIOD)
     error = runs[0][2] - exact["joint_position"].values

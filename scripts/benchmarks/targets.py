@@ -46,7 +46,7 @@ def targets(stages: Mapping[str, Any]) -> list[Target]:
     """Return all targets whose stages were measured."""
     found: list[Target] = []
     studies = stages.get("work-precision") or {}
-    for name, real_time, ratio in (("fig6", 150.0, 50.0), ("stick_slip", 10.0, 80.0)):
+    for name, real_time, ratio in (("reversals", 150.0, 50.0), ("stick_slip", 10.0, 80.0)):
         if name in studies:
             found += _speed(name, studies[name], real_time, ratio)
     for name in (stages.get("contact") or {}).get("crowded", {}):
@@ -129,7 +129,7 @@ def _identification(study: Mapping[str, Any]) -> Iterator[Target]:
 
 
 def _prepared(study: Mapping[str, Any]) -> Iterator[Target]:
-    fig6, simulator = study["runs"]["fig6"], study["simulator"]
+    fig6, simulator = study["runs"]["reversals"], study["simulator"]
     beside = max(times["short changed"] - times["short steps"] for times in study["runs"].values())
     yield target("prepared run of 10 ms with another number, beside its steps, at most", 1e3 * beside, "<=", 2.0, "ms")
     yield target("simulate of 10 ms", 1e3 * fig6["short simulate"], "<=", 6.0, "ms")

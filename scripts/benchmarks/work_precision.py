@@ -12,17 +12,17 @@ from benchmarks.timing import clocked, cost_at
 from finger_pin.description.scenario import Scenario
 
 #: Error, rad, at which costs are compared, by scenario.
-TARGET = {"fig6": 1e-5, "stick_slip": 1e-4, "press": 1e-5, "pinch": 1e-5}
+TARGET = {"reversals": 1e-5, "stick_slip": 1e-4, "press": 1e-5, "pinch": 1e-5}
 OURS = ("Rodas5P", "Rodas4")
 
 _TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 # Few, since each takes from ten seconds to a minute; the best of them bracket the targets.
 _TEXTBOOK = {
-    "fig6": {"BDF": (1e-5, 1e-6), "LSODA": (1e-4, 1e-5), "Radau": (1e-3, 1e-4)},
+    "reversals": {"BDF": (1e-5, 1e-6), "LSODA": (1e-4, 1e-5), "Radau": (1e-3, 1e-4)},
     "stick_slip": {"BDF": (1e-5, 1e-6), "LSODA": (1e-5,), "Radau": (1e-4, 1e-5)},
 }
 _QUICK_TEXTBOOK = {"BDF": (1e-4, 1e-6), "LSODA": (1e-5,)}
-_QUICK_DURATION = {"fig6": 0.3, "stick_slip": 0.1, "press": 0.3, "pinch": 0.1}
+_QUICK_DURATION = {"reversals": 0.3, "stick_slip": 0.1, "press": 0.3, "pinch": 0.1}
 
 
 def measure(store: Store) -> dict[str, Any]:

@@ -25,7 +25,7 @@ CONTROLLERS = {
 
 errors, peaks = {}, {}
 for name, changed in CONTROLLERS.items():
-    result = fp.simulate(fp.load_scenario("fig6", changed)).sel(time=slice(1.0, None))  # without the start
+    result = fp.simulate(fp.load_scenario("reversals", changed)).sel(time=slice(1.0, None))  # without the start
     errors[name] = np.rad2deg(float((result.tracking_error**2).mean() ** 0.5))
     peaks[name] = float(result.tendon_command.max())
     print(f"{name}: {errors[name]:.3f} deg rms, at most {peaks[name]:.1f} N")

@@ -28,7 +28,7 @@ def records():
 
 shutil.rmtree(STUDY, ignore_errors=True)
 over = f"controller.gain={','.join(map(str, GAINS))}"
-command = [sys.executable, "-m", "finger_pin", "sweep", "fig6", "--over", over, "--metric", "tracking_rms"]
+command = [sys.executable, "-m", "finger_pin", "sweep", "reversals", "--over", over, "--metric", "tracking_rms"]
 process = subprocess.Popen([*command, "--workers", "1", "--quiet", "--output", str(STUDY)])
 while len(records()) < 5 and process.poll() is None:
     time.sleep(0.01)
@@ -38,7 +38,7 @@ kept = records()
 
 told = []
 study = fp.sweep(
-    "fig6",
+    "reversals",
     {"controller.gain": GAINS},
     metrics=["tracking_rms"],
     output=STUDY,

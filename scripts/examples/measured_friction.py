@@ -23,9 +23,9 @@ for name, value in measured.items():
     low, high = (float(found[end].sel(parameter=name)) for end in ("lower", "upper"))
     print(f"{name} = {value:.4f}, 95 % interval {low:.4f} to {high:.4f}")
 
-smooth, rough = fp.simulate("fig6"), fp.simulate(fp.load_scenario("fig6", measured))
+smooth, rough = fp.simulate("reversals"), fp.simulate(fp.load_scenario("reversals", measured))
 peaks = [float(each.tendon_command.max()) for each in (smooth, rough)]
-print(f"With the measured friction fig6 pulls with up to {peaks[1]:.1f} N in place of {peaks[0]:.1f} N.")
+print(f"With the measured friction reversals pulls with up to {peaks[1]:.1f} N in place of {peaks[0]:.1f} N.")
 
 # What the fit says of the bench: the capstan law over a half turn, less the drag.
 coulomb, drag = measured.values()
@@ -40,7 +40,7 @@ bench.plot(readings["force_in_N"], readings["force_out_N"], ".", alpha=0.5, labe
 bench.set(xlabel="force in (N)", ylabel="force out (N)", xlim=(0.0, None), ylim=(0.0, None))
 for result, name in ((smooth, "as the paper has it"), (rough, "as measured")):
     finger.plot(result.time, result.tendon_command.sel(tendon="T3"), label=name)
-finger.set(xlabel="time (s)", ylabel="command of T3 in fig6 (N)")
+finger.set(xlabel="time (s)", ylabel="command of T3 in reversals (N)")
 finger.set_ylim(0.0, 24.0)
 for axes in (bench, finger):
     axes.legend(loc="upper left")

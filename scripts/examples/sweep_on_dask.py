@@ -23,7 +23,7 @@ def main(folder):
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster) as client:
         workers = client.ncores()
         study = fp.sweep(
-            "fig6",
+            "reversals",
             OVER,
             metrics=["tracking_rms", "tension_peak"],
             overrides={"simulation.duration": 1.0},

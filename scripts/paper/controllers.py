@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from paper.comparison import Comparison
 
 WIDTH = 100
-TITLE = "Controllers on fig6, after the first second"
+TITLE = "Controllers on reversals, after the first second"
 CAPTION = "error: rms; by T5: of it, the passive tendon's stretch; peak, mean: commands; mJ: lost by friction; f5: mean"
 DRAWN = ("paper", "all friction", "all friction, f5d 4 N, loop")
 
 
 def controllers(output: Output = Path("results/controllers"), format: Format = None) -> None:
-    """Compare controllers on fig6: tracking, tension and losses, as a table, a CSV file and a figure."""
+    """Compare controllers on reversals: tracking, tension and losses, as a table, a CSV file and a figure."""
     shown = talks(quiet=False)
     from rich.console import Console
 
@@ -36,7 +36,7 @@ def controllers(output: Output = Path("results/controllers"), format: Format = N
     rows: list[Comparison] = []
     drawn: dict[str, xr.Dataset] = {}
     output.mkdir(parents=True, exist_ok=True)
-    coupling = Routing.from_description(load_scenario("fig6").finger).coupling
+    coupling = Routing.from_description(load_scenario("reversals").finger).coupling
     with noted(f"the rows so far are in {output}"):
         for name, result in runs(shown):
             rows.append(compare(name, result, coupling))
@@ -57,7 +57,7 @@ def runs(shown: bool) -> Iterator[tuple[str, xr.Dataset]]:
 
     with count_bar(shown, len(CASES)) as advance:
         for name, overrides in CASES.items():
-            yield name, simulate(load_scenario("fig6", overrides))
+            yield name, simulate(load_scenario("reversals", overrides))
             advance(1)
 
 

@@ -13,14 +13,15 @@ from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.panels import heading, sheet, title
 from finger_pin.views.plots.style import Width, styled, thin
 
-#: The paper's normal force, N. It prints none of the other values: these are of the tendons' order.
+#: The printed figure's: normal force, N; M^c / M^d from 1.1 to 2; omega from 1e-4 to 1, here m/s, as its unit is not
+#: printed; velocities up to 5 mm/s. M^d, and omega above and M^c / M^d below, are not printed.
 NORMAL = 10.0
 KINETIC = 0.10
-RATIOS = (1.0, 1.5, 2.0, 3.0)
+RATIOS = (1.1, 1.4, 1.7, 2.0)
 RATIO = 2.0
-STRIBECK = (0.002, 0.005, 0.010, 0.020)
-STRIBECK_TOP = 0.010
-FASTEST = 0.05
+STRIBECK = (1e-4, 1e-3, 1e-2, 1.0)
+STRIBECK_TOP = 1e-3
+FASTEST = 5e-3
 
 
 @styled
@@ -38,7 +39,7 @@ def plot_friction_law(*, width: Width = None, titles: bool = True) -> Figure:
     _curves(top, ((ratio * KINETIC, STRIBECK_TOP, f"{ratio:g}") for ratio in RATIOS))
     title(top, rf"varying $M^c$:  $M^d$ = {KINETIC:g},  $\omega$ = {1e3 * STRIBECK_TOP:g} mm/s")
     top.legend(title=r"$M^c\,/\,M^d$", loc="upper left", alignment="left")
-    _curves(bottom, ((RATIO * KINETIC, stribeck, f"{1e3 * stribeck:g} mm/s") for stribeck in STRIBECK))
+    _curves(bottom, ((RATIO * KINETIC, stribeck, f"{stribeck:g} m/s") for stribeck in STRIBECK))
     title(bottom, rf"varying $\omega$:  $M^d$ = {KINETIC:g},  $M^c$ = {RATIO * KINETIC:g}")
     bottom.legend(title=r"$\omega$", loc="upper left", alignment="left")
     bottom.set_xlabel("velocity $v$ (mm/s)")
@@ -48,7 +49,7 @@ def plot_friction_law(*, width: Width = None, titles: bool = True) -> Figure:
 
 def _curves(axes: Axes, variants: Iterable[tuple[float, float, str]]) -> None:
     # Denser towards zero, where the curves are steep; the step at zero is the line between the two branches.
-    branch = FASTEST * np.linspace(1e-4, 1.0, 250) ** 2
+    branch = FASTEST * np.geomspace(1e-6, 1.0, 400)
     velocity = np.concatenate([-branch[::-1], branch])
     for index, (static, stribeck, label) in enumerate(variants):
         coefficient = friction_coefficient(velocity, KINETIC, static, stribeck)

@@ -19,7 +19,8 @@ from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, colour, styled, thin
 from finger_pin.views.plots.workspace_surfaces import fingertip_surface, flexion_section
 
-_MILLI = 1e3
+# The printed ticks are centimetres, whatever their labels say.
+_CENTI = 1e2
 _ISOLINES = 7
 
 
@@ -27,7 +28,8 @@ _ISOLINES = 7
 def plot_workspace(finger: FingerLike, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw Fig. 2: the workspace of the fingertip with passive tendons that do not stretch, equation (4).
 
-    Left the surface in space, right the section in the flexion plane with the finger at three poses; mm, base frame.
+    Left the surface in space, right the section in the flexion plane with the finger at three poses; cm, base frame. As
+    in the print, joints that passive tendons drive stand at zero in the section.
 
     Args:
         finger: A finger, its description, its name, or the path of its file.
@@ -36,21 +38,21 @@ def plot_workspace(finger: FingerLike, *, width: Width = None, titles: bool = Tr
     """
     finger = as_finger(finger)
     one_finger(finger.description)
-    surface, section = fingertip_surface(finger), flexion_section(finger)
+    surface, section = fingertip_surface(finger), flexion_section(finger, coupled=False)
     figure, (left, right) = sheet([(5.5, 5.2), (5.5, 5.2)], width, titles)
-    solid = _surface(left, _MILLI * surface, _MILLI * section.poses)
+    solid = _surface(left, _CENTI * surface, _CENTI * section.poses)
     plane = right.subplots()
-    _section(plane, _MILLI * section.patches, _MILLI * section.poses, section.plane)
-    imposed = ", with (4) imposed" if finger.routing.passive else ""
+    _section(plane, _CENTI * section.patches, _CENTI * section.poses, section.plane)
+    imposed, straight = (", with (4) imposed", ", driven joints at 0") if finger.routing.passive else ("", "")
     title(solid, f"(a) where the fingertip can go{imposed}\n{_ranges(surface, range(3))}")
-    title(plane, f"(b) section in the flexion plane{imposed}\n{_ranges(section.patches, section.plane)}")
+    title(plane, f"(b) section in the flexion plane{straight}\n{_ranges(section.patches, section.plane)}")
     return figure
 
 
 def _surface(part: SubFigure, patches: Array, poses: Array) -> Axes3D:
     quads = _quads(patches)
     corners = np.concatenate([quads.reshape(-1, 3), poses[0]])
-    solid = space(part, corners, "mm")
+    solid = space(part, corners, "cm")
     colours = _lit(quads)
     solid.add_collection3d(Poly3DCollection(quads, facecolors=colours, edgecolors=0.88 * colours, linewidths=0.3))
     solid.plot(*poses[0].T, color=colour(BLACK), marker="o", markersize=3.5, linewidth=thin(1.4))
@@ -72,17 +74,17 @@ def _section(axes: Axes, patches: Array, poses: Array, plane: tuple[int, int]) -
         axes.plot(*pose.T, color=colour(look), label=label, marker="o", markersize=4, linewidth=thin(1.6))
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
-    axes.set_xlabel(f"{AXES[plane[0]]} (mm)")
-    axes.set_ylabel(f"{AXES[plane[1]]} (mm)")
+    axes.set_xlabel(f"{AXES[plane[0]]} (cm)")
+    axes.set_ylabel(f"{AXES[plane[1]]} (cm)")
     axes.legend(loc="upper right")
 
 
 def _ranges(patches: Array, axes: Iterable[int]) -> str:
-    """Return the extent of fingertip positions, m, along the given axes, as text in mm."""
+    """Return the extent of fingertip positions, m, along the given axes, as text in cm."""
     texts = []
     for axis in axes:
-        low, high = _MILLI * np.nanmin(patches[..., axis]), _MILLI * np.nanmax(patches[..., axis])
-        texts.append(f"{AXES[axis]}: {low + 0.0:.1f} to {high + 0.0:.1f} mm".replace("-", "\N{MINUS SIGN}"))
+        low, high = _CENTI * np.nanmin(patches[..., axis]), _CENTI * np.nanmax(patches[..., axis])
+        texts.append(f"{AXES[axis]}: {low + 0.0:.1f} to {high + 0.0:.1f} cm".replace("-", "\N{MINUS SIGN}"))
     return ",   ".join(texts)
 
 

@@ -32,7 +32,7 @@ PARTS = {
 
 
 def reaction(
-    scenario: ScenarioName = "fig6",
+    scenario: ScenarioName = "reversals",
     settings: Settings = [],  # noqa: B006
     forces: Annotated[str, typer.Option(metavar="N,N,...", help="At the fingertip; empty for none.")] = "0.5,1,2",
     output: Output = Path("results/reaction"),

@@ -15,6 +15,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import JointReference
 from finger_pin.description.validation import Numbers, expand
 from finger_pin.exceptions import IntegrationError, ScenarioWarning, StudyError
+from finger_pin.references.reference import SignalReference
 from finger_pin.studies.batch import simulate_many
 from finger_pin.typing import Array
 
@@ -167,17 +168,20 @@ def at_speed(scenario: Scenario, factor: float) -> Scenario:
 
 
 def swinging_to_lock(scenario: Scenario) -> Scenario:
-    """Return a scenario whose joints swing once through their amplitudes, in the directions closest to self-locking."""
+    """Return a scenario whose joints swing once through their ranges, in the directions closest to self-locking."""
     margin = self_locking_margin(scenario)
     routing = Routing.from_description(scenario.finger)
+    wanted = SignalReference.from_scenario(scenario, routing).at(scenario.sample_times()).position
+    low, high = wanted.min(axis=0), wanted.max(axis=0)
     joints = {
         name: JointReference(
-            offset=joint.offset,
-            amplitude=-float(margin.directions[routing.joints.index(name)]) * abs(joint.amplitude),
+            offset=0.5 * float(low[index] + high[index]),
+            amplitude=-0.5 * float(margin.directions[index] * (high[index] - low[index])),
             frequency=0.5 / SWING,
             phase=0.5 * np.pi,
         )
-        for name, joint in scenario.reference.joints.items()
+        for name in scenario.reference.joints
+        for index in [routing.joints.index(name)]
     }
     return lasting(scenario.updated(reference={"joints": joints}), SWING, 200)
 

@@ -38,7 +38,7 @@ def _limiters(rng: np.random.Generator) -> fp.Scenario:
         }
     if rng.random() < 0.5:
         overrides["simulation.initial.velocity.proximal"] = float(rng.normal(0.0, 20.0))
-    return fp.load_scenario("fig6", overrides)
+    return fp.load_scenario("reversals", overrides)
 
 
 def _press(rng: np.random.Generator) -> fp.Scenario:
@@ -115,7 +115,7 @@ def _drops(rng: np.random.Generator) -> fp.Scenario:
     return fp.Scenario.model_validate(
         {
             "name": "drops",
-            "finger": fp.load_scenario("fig6").finger,
+            "finger": fp.load_scenario("reversals").finger,
             "environment": {"objects": {"floor": floor, "thing": thing}},
             "simulation": {"duration": 0.4, "sample_rate": 1000.0},
         }

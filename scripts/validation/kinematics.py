@@ -36,7 +36,7 @@ def planar_tip(lengths: Sequence[float], theta: Array) -> Array:
 
 
 FINGERS: dict[str, Callable[[Sequence[float], Array], Array]] = {
-    "ub": equation_1,
+    "ub_stand_in": equation_1,
     "dexmart_index": equation_1,
     "planar": planar_tip,
 }

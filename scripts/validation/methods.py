@@ -17,7 +17,7 @@ from validation.check import Check, Picture, Section, compare
 
 TITLE = "Integrators against each other"
 #: Scenario and how much of it the slowest methods can afford, s.
-WINDOWS = {"fig6": 0.1, "stick_slip": 0.02}
+WINDOWS = {"reversals": 0.1, "stick_slip": 0.02}
 TOLERANCES = (1e-4, 1e-6, 1e-8)
 #: Largest error of a method at the tightest tolerance, rad, and the least factor by which it shrinks on the way.
 LIMIT, GAIN = 2e-8, 20.0

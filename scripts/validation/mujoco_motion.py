@@ -35,11 +35,12 @@ EXPRESSIBLE: dict[str, Any] = {
 }
 # The pad meets the plate of `press` at 1.4 m/s, bounces four times, and pushes; what contact loses is taken away too.
 PRESSING: dict[str, Any] = {
+    "finger": "ub_stand_in",
     "environment.objects.plate.surface": {"friction": 0.0, "damping": 0.0},
     "reference.joints.proximal": {"kind": "points", "times": [0.0, 0.04], "values": [0.15, 0.42]},
     "reference.joints.medial": {"kind": "points", "times": [0.0, 0.04], "values": [0.38, 0.455]},
 }
-SCENES: dict[str, dict[str, Any]] = {"fig6": {}, "stick_slip": {}, "press": PRESSING}
+SCENES: dict[str, dict[str, Any]] = {"reversals": {}, "stick_slip": {}, "press": PRESSING}
 DURATION = 0.15
 STEPS = (1e-5, 5e-6, 2.5e-6)
 

@@ -62,7 +62,7 @@ def smooth_motion() -> Smooth:
 
     Links a thousand times as heavy and a heavy, soft passive tendon leave nothing stiff at the steps taken here.
     """
-    table = load_scenario("fig6").model_dump()
+    table = load_scenario("reversals").model_dump()
     for joint in table["finger"]["joints"].values():
         for name in ("mass", "transverse_inertia", "axial_inertia"):
             joint["link"][name] *= 1e3

@@ -91,7 +91,7 @@ def relative(found: Array, expected: Array) -> float:
 
 def measure() -> Section:
     """Compare every shipped finger and the arm."""
-    fingers = {name: Finger(load_finger(name)) for name in ("ub", "dexmart_index", "planar")}
+    fingers = {name: Finger(load_finger(name)) for name in ("ub_stand_in", "dexmart_index", "planar")}
     checks: list[Check] = []
     for name, finger in {**fingers, "six-joint arm": arm()}.items():
         found = against_pinocchio(finger)

@@ -51,12 +51,12 @@ class Stiffening:
 def run(stiffness: float) -> xr.Dataset:
     """Simulate the first second of `fig6` with a passive tendon of a stiffness, N/m."""
     settings = {"simulation.duration": _DURATION, "simulation.rtol": 1e-8, "simulation.atol_scale": 1e-9}
-    return simulate(load_scenario("fig6", {"finger.passive_tendon.stiffness": stiffness, **settings}))
+    return simulate(load_scenario("reversals", {"finger.passive_tendon.stiffness": stiffness, **settings}))
 
 
 def stiffen() -> Stiffening:
     """Simulate with every stiffness."""
-    routing = Finger(load_scenario("fig6").finger).routing
+    routing = Finger(load_scenario("reversals").finger).routing
     r35, r45 = -routing.coupling[4, 2], routing.coupling[4, 3]
     gaps, motions, stretches = [], [], []
     for stiffness in STIFFNESSES:

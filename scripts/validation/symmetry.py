@@ -28,7 +28,7 @@ class Twins:
 
 def mirrored() -> Twins:
     """Move the paper's finger and its mirror image in y: T1 and T2 swap, joint 1 turns the other way."""
-    finger = Finger(load_finger("ub"))
+    finger = Finger(load_finger("ub_stand_in"))
     left = Simulator(finger, [0.1, 0.4, 0.5, 0.3], rtol=1e-8, atol_scale=1e-8)
     right = Simulator(finger, [-0.1, 0.4, 0.5, 0.3], rtol=1e-8, atol_scale=1e-8)
     rows: list[list[tuple[Array, Array]]] = []

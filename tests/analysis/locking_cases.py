@@ -17,4 +17,4 @@ def steps(coefficient, duration=2.0):
             "frequency": 0.25,
             "phase": 0.5 * np.pi,
         }
-    return fp.load_scenario("fig6", overrides)
+    return fp.load_scenario("reversals", overrides)

@@ -23,7 +23,7 @@ def test_bars_are_the_critical_coefficients(ub):
 @pytest.mark.parametrize("coefficient, panels", [(3.5e-4, 2), (7.6e-4, 1)])
 def test_map_says_in_a_line_what_is_the_same_at_every_posture_and_where_it_is_locked(coefficient, panels):
     overrides = {f"finger.joint_friction.{name}": coefficient for name in ("coulomb", "stiction")}
-    found = self_locking_map(fp.Finger(fp.load_finger("ub", overrides)), samples=3)
+    found = self_locking_map(fp.Finger(fp.load_finger("ub_stand_in", overrides)), samples=3)
     figure = plot_self_locking_map(found)
     said = f"critical coefficient {1e3 * found.coefficient[0, 0]:.3g} mm at every posture"
     assert figure.get_suptitle() == f"{said}; the finger has {1e3 * coefficient:.3g} mm"
@@ -38,8 +38,8 @@ def test_a_map_of_a_finger_that_nothing_locks_says_so(finger):
 
 
 def test_runs_are_drawn_with_their_largest_tension():
-    run = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.05}))
-    top, bottom = plot_runaway({"fig6": run}).axes
+    run = fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.05}))
+    top, bottom = plot_runaway({"reversals": run}).axes
     np.testing.assert_allclose(top.lines[0].get_ydata(), run["tendon_command"].max("tendon"))
     np.testing.assert_allclose(bottom.lines[0].get_ydata(), np.rad2deg(np.abs(run["tracking_error"]).max("joint")))
 
@@ -54,7 +54,7 @@ def test_section_lies_in_the_polytope_and_friction_orders_it(finger):
     assert np.all(np.linalg.norm(hindering, axis=1) <= np.linalg.norm(helping, axis=1))
 
 
-@pytest.mark.parametrize("name, position", [("planar", [0.4, 0.9]), ("ub", [0.0, 0.0, 0.0, 0.0])])
+@pytest.mark.parametrize("name, position", [("planar", [0.4, 0.9]), ("ub_stand_in", [0.0, 0.0, 0.0, 0.0])])
 def test_sets_that_are_flat_in_space_are_drawn_by_their_section(name, position):
     assert plot_force_polytope(fp.Finger(fp.load_finger(name)), position, 10.0).axes[-1].lines
 

@@ -50,7 +50,7 @@ def test_a_finger_that_pushes_has_to_pull_as_much_more_as_drag_takes_and_nothing
 
 
 def test_passive_tendons_lose_drag_between_their_halves():
-    finger = fp.Finger(fp.load_finger("ub", {"finger.tendon_friction.drag": 0.4}))
+    finger = fp.Finger(fp.load_finger("ub_stand_in", {"finger.tendon_friction.drag": 0.4}))
     theta = np.array([0.1, 0.5, 0.6, 0.42])
     found = tension_for_force(finger, theta, [0.3, 0.2, -0.8], friction=Friction.HINDERING)
     sliding = np.tanh(0.5 * finger.tendons.surface * finger.routing.curvature(theta))
@@ -114,7 +114,9 @@ def test_drag_shifts_no_self_locking():
     """Where tensions run away, what no load makes does not count."""
     ub = {f"finger.joint_friction.{name}": 5e-4 for name in ("coulomb", "stiction")}
     found = [
-        fp.analysis.critical_friction(fp.Finger(fp.load_finger("ub", ub | {"finger.tendon_friction.drag": drag})))
+        fp.analysis.critical_friction(
+            fp.Finger(fp.load_finger("ub_stand_in", ub | {"finger.tendon_friction.drag": drag}))
+        )
         for drag in (0.0, 2.0)
     ]
     assert found[0].coefficient == found[1].coefficient < np.inf

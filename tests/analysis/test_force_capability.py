@@ -14,7 +14,7 @@ POSTURE = (0.1, 0.5, 0.6, 0.42)
 
 @pytest.fixture(scope="module")
 def weightless():
-    return fp.Finger(fp.load_finger("ub", {"finger.gravity": [0.0, 0.0, 0.0]}))
+    return fp.Finger(fp.load_finger("ub_stand_in", {"finger.gravity": [0.0, 0.0, 0.0]}))
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ def test_sensitivity_to_radii_is_that_of_differences(ub, finger, friction):
             ends = []
             for sign in (1.0, -1.0):
                 key = f"finger.tendons.{name}.crossings.{joint}.radius"
-                other = fp.Finger(fp.load_finger("ub", {key: crossing.radius + sign * step}))
+                other = fp.Finger(fp.load_finger("ub_stand_in", {key: crossing.radius + sign * step}))
                 ends.append(tension_for_force(other, POSTURE, force, friction=friction).largest)
             slope = (ends[0] - ends[1]) / (2.0 * step)
             assert exact[row, list(ub.joints).index(joint)] == (

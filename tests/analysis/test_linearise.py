@@ -93,7 +93,7 @@ def test_what_cannot_be_linearised_is_refused(drum):
 
 
 def test_a_posture_or_a_state_by_name_stands_for_the_packed_state():
-    finger, angles, pulls = fp.Finger("ub"), [0.0, 0.3, 0.3, 0.2], [1.0, 1.0, 4.4, 3.1]
+    finger, angles, pulls = fp.Finger("ub_stand_in"), [0.0, 0.3, 0.3, 0.2], [1.0, 1.0, 4.4, 3.1]
     x = finger.rest_state(np.array(angles))
     packed = fp.linearise(finger, x, pulls)
     assert fp.linearise(finger, angles, pulls).equals(packed)

@@ -11,7 +11,7 @@ from finger_pin.views.summary import summarize
 STUCK = {f"finger.joint_friction.{name}": 7.6e-4 for name in ("coulomb", "stiction")}
 
 
-@pytest.mark.parametrize("name", ["fig6", "stick_slip"])
+@pytest.mark.parametrize("name", ["reversals", "stick_slip"])
 def test_the_scenarios_that_ship_keep_their_distance_and_say_so(name, recwarn):
     result = fp.simulate(fp.load_scenario(name, {"simulation.duration": 0.02}))
     assert not [each for each in recwarn if each.category is fp.exceptions.SelfLockingWarning]
@@ -34,7 +34,7 @@ def test_a_simulation_close_to_locking_warns_whoever_calls_it_and_its_summary_sa
 
 
 def test_a_controller_of_ones_own_is_not_judged_by_the_papers():
-    stuck = fp.load_scenario("fig6", STUCK | {"simulation.duration": 0.01})
+    stuck = fp.load_scenario("reversals", STUCK | {"simulation.duration": 0.01})
     finger = fp.Finger(stuck.finger)
     own = ProportionalController.from_scenario(stuck, finger.routing)
     assert "self_locking_margin" not in fp.simulate(stuck, controller=own, control_period=1e-3).attrs

@@ -44,7 +44,7 @@ def test_without_stribeck_effect_any_micro_damping_is_passive():
 
 def test_a_simulation_with_more_than_the_bound_warns_once_and_its_summary_says_so():
     """Tendons: rho = 1.5 and b = 1 N s/m allow 2 N s/m."""
-    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.01, "finger.tendon_friction.micro_damping": 2.1})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.01, "finger.tendon_friction.micro_damping": 2.1})
     with pytest.warns(
         MicroDampingWarning, match=r"micro_damping = 2.1 can drive the motion of T1.* up to 2 "
     ) as caught:
@@ -62,10 +62,10 @@ def test_a_simulation_with_more_than_the_bound_warns_once_and_its_summary_says_s
 )
 def test_the_one_that_is_beyond_its_bound_is_named(key, value, name):
     """Joints: M^d = 2.5e-4, M^c = 3.5e-4 m and b = 1e-3 allow 2.5e-3 N m s/rad."""
-    advice = micro_damping_advice(fp.load_finger("ub", {key: value}))
+    advice = micro_damping_advice(fp.load_finger("ub_stand_in", {key: value}))
     assert f"the motion of {name}:" in advice and ";" not in advice
 
 
 def test_the_paper_s_finger_and_one_at_the_bound_say_nothing():
-    assert micro_damping_advice(fp.load_finger("ub")) == ""
-    assert micro_damping_advice(fp.load_finger("ub", {"finger.tendon_friction.micro_damping": 2.0})) == ""
+    assert micro_damping_advice(fp.load_finger("ub_stand_in")) == ""
+    assert micro_damping_advice(fp.load_finger("ub_stand_in", {"finger.tendon_friction.micro_damping": 2.0})) == ""

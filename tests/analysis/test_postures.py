@@ -10,7 +10,7 @@ from finger_pin.analysis import equilibrium, inverse_kinematics
 
 
 def test_the_fingertip_is_put_to_points_of_equation_1_with_the_passive_tendon_slack():
-    random, finger = np.random.default_rng(3), fp.Finger("ub")
+    random, finger = np.random.default_rng(3), fp.Finger("ub_stand_in")
     for _ in range(20):
         t1, t2, t3 = random.uniform([-0.17, 0.05, 0.05], [0.17, 1.5, 1.5])
         found = inverse_kinematics(finger, equation_1([t1, t2, t3, 0.7 * t3]))
@@ -54,12 +54,12 @@ def test_a_finger_rests_where_its_weight_balances_the_tensions_and_stays_there()
 
 
 def test_a_finger_with_a_passive_tendon_rests_and_what_cannot_is_told():
-    finger = fp.Finger("ub")
+    finger = fp.Finger("ub_stand_in")
     found = equilibrium(finger, [1.0, 1.0, 1.2, 0.3], position=[0.0, 0.8, 0.8, 0.5], fingertip_force=[0.0, 0.02, 0.0])
     rate = finger.rhs(0.0, found.state, np.array([1.0, 1.0, 1.2, 0.3]), np.array([0.0, 0.02, 0.0]))
     assert np.abs(rate).max() < 1e-5
     # Where nothing pulls either way it stays where it was.
-    free = fp.Finger(fp.load_finger("ub", {"finger.gravity": [0.0, 0.0, 0.0]}))
+    free = fp.Finger(fp.load_finger("ub_stand_in", {"finger.gravity": [0.0, 0.0, 0.0]}))
     np.testing.assert_allclose(equilibrium(free, np.zeros(4), position=[0.05, 0.5, 0.5, 0.35]).position[0], 0.05)
     # Without any tension it lies on its limiters, which are stiff; one strong flexor leaves its last links loose.
     for tension in np.zeros(4), np.full(4, 0.01), np.array([10.0, 0.0, 0.0, 0.0]):

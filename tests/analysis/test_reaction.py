@@ -55,7 +55,7 @@ def test_the_pin_of_a_swinging_pendulum_bears_weight_centripetal_force_and_tendo
 
 
 @pytest.mark.parametrize("groove", Groove)
-@pytest.mark.parametrize("name", ["ub", "planar", "dexmart_index"])
+@pytest.mark.parametrize("name", ["ub_stand_in", "planar", "dexmart_index"])
 def test_points_and_directions_of_the_cut_tendons_give_the_torque_of_h_c2_at_any_posture(name, groove):
     """Tendons alone: their moment about each axis is -H_c2^T f on either side of the grooves, by virtual work."""
     finger = fp.Finger(fp.load_finger(name, {"finger.gravity": [0.0, 0.0, 0.0]}))
@@ -67,10 +67,10 @@ def test_points_and_directions_of_the_cut_tendons_give_the_torque_of_h_c2_at_any
 
 
 @pytest.mark.parametrize("groove", Groove)
-def test_the_moment_about_the_axis_along_fig6_is_what_friction_and_limiters_take(fig6, finger, groove):
+def test_the_moment_about_the_axis_along_fig6_is_what_friction_and_limiters_take(reversals, finger, groove):
     """(18): of all forces together only the couples of joint friction and stroke limiters are left for the pin."""
     names = ("joint_position", "joint_velocity", "joint_acceleration")
-    part = fig6.isel(time=slice(None, None, 40))
+    part = reversals.isel(time=slice(None, None, 40))
     strands = np.column_stack(
         [part.tendon_tension.values[:, :4], part.passive_tension_proximal.values, part.tendon_tension.values[:, 4]]
     )
@@ -82,7 +82,7 @@ def test_the_moment_about_the_axis_along_fig6_is_what_friction_and_limiters_take
 
 def test_without_tendons_the_pin_changes_the_momentum_of_what_it_carries_and_bears_its_weight():
     """The acceleration of the carried mass centres by differences of positions; the weights from the description."""
-    finger = fp.Finger(fp.load_finger("ub"))
+    finger = fp.Finger(fp.load_finger("ub_stand_in"))
     position, velocity, acceleration, strands = states(finger)
     found = pin_wrench(finger, position, velocity, acceleration, 0.0 * strands, np.zeros(3))
     model, step = finger.rigid_body.model, 1e-4
@@ -132,12 +132,12 @@ def test_without_weight_and_inertia_and_with_tendons_parallel_to_the_links_the_f
 
 
 @pytest.fixture(scope="module")
-def along_fig6(fig6):
-    return joint_reactions(fig6.isel(time=slice(None, None, 10)))
+def along_fig6(reversals):
+    return joint_reactions(reversals.isel(time=slice(None, None, 10)))
 
 
-def test_17_is_recomputed_as_the_simulation_had_it(fig6, along_fig6):
-    np.testing.assert_allclose(along_fig6.paper, fig6.joint_reaction.values[::10], rtol=1e-12)
+def test_17_is_recomputed_as_the_simulation_had_it(reversals, along_fig6):
+    np.testing.assert_allclose(along_fig6.paper, reversals.joint_reaction.values[::10], rtol=1e-12)
 
 
 def test_parts_are_what_they_say_and_no_two_of_them_are_alike(along_fig6):
@@ -154,14 +154,14 @@ def test_on_fig6_17_is_within_four_percent_of_the_full_quasi_static_reaction(alo
 
 
 @pytest.mark.parametrize("missing", ["joint_acceleration", "passive_tension_proximal"])
-def test_a_result_without_what_is_needed_is_told_so(fig6, missing):
+def test_a_result_without_what_is_needed_is_told_so(reversals, missing):
     with pytest.raises(fp.InputError, match=missing):
-        joint_reactions(fig6.isel(time=slice(0, 2)).drop_vars(missing))
+        joint_reactions(reversals.isel(time=slice(0, 2)).drop_vars(missing))
 
 
-def test_a_result_without_its_finger_is_told_so(fig6):
+def test_a_result_without_its_finger_is_told_so(reversals):
     with pytest.raises(fp.InputError, match="finger"):
-        joint_reactions(fig6.isel(time=slice(0, 2)).drop_attrs())
+        joint_reactions(reversals.isel(time=slice(0, 2)).drop_attrs())
 
 
 def test_fingertip_loads_are_both_ways_along_every_axis():
@@ -187,7 +187,7 @@ def test_the_command_writes_a_row_per_joint_and_force_and_a_figure(tmp_path, cap
     with open(tmp_path / "reaction.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 4 * 7
-    run = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.02}))
+    run = fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.02}))
     given = [row for row in rows if row["fingertip force"] == "as it is"]
     means = [float(row["mean (17), N"]) for row in given]
     np.testing.assert_allclose(means, run.joint_reaction.mean("time"), rtol=1e-5)
@@ -199,7 +199,7 @@ def test_the_command_tells_wrong_input_in_one_line_and_writes_nothing(tmp_path, 
     assert run_function(reaction, ["fig7", "--output", str(target)]) == 2
     assert run_function(reaction, ["--set", "controller.gian=2", "--output", str(target)]) == 2
     error = capsys.readouterr().err.splitlines()
-    assert len(error) == 2 and "fig6" in error[0] and "controller.gain" in error[1]
+    assert len(error) == 2 and "reversals" in error[0] and "controller.gain" in error[1]
     assert not target.exists()
 
 

@@ -137,7 +137,7 @@ def test_map_varies_where_joints_bend_the_canal_of_a_passive_tendon(ub, finger):
     assert np.ptp(paper.tension) > 1.0
     crossings = {"medial": {"radius": -0.0035, "bends": True}, "distal": {"radius": 0.005, "bends": True}}
     overrides = {f"finger.tendons.T5.crossings.{joint}": entry for joint, entry in crossings.items()}
-    bent = self_locking_map(fp.Finger(fp.load_finger("ub", overrides)), samples=5)
+    bent = self_locking_map(fp.Finger(fp.load_finger("ub_stand_in", overrides)), samples=5)
     assert np.all(np.diff(bent.coefficient, axis=1) < 0.0)
     assert np.ptp(bent.coefficient, axis=0).max() < 1e-9
 
@@ -162,29 +162,29 @@ def test_the_map_of_a_redundant_finger_has_what_each_posture_has_alone():
 
 
 def test_a_finger_beyond_the_critical_coefficient_can_nowhere_be_moved():
-    stuck = self_locking_map(fp.Finger(fp.load_finger("ub", STUCK)), samples=3)
+    stuck = self_locking_map(fp.Finger(fp.load_finger("ub_stand_in", STUCK)), samples=3)
     assert stuck.coefficient.max() < stuck.actual
     assert np.isinf(stuck.tension).all()
 
 
 def test_margin_is_the_ratio_of_critical_to_actual_stiction_in_the_worst_directions_of_the_reference():
-    margin = self_locking_margin(fp.load_scenario("fig6"))
+    margin = self_locking_margin(fp.load_scenario("reversals"))
     assert margin.margin == pytest.approx(0.7418 / 0.35, rel=1e-3)
     assert self_locking_margin(steps(0.7418e-3)).margin == pytest.approx(1.0, rel=1e-3)
     # Joints that never swing together in these directions are safer.
     apart = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal")}
-    assert self_locking_margin(fp.load_scenario("fig6", apart)).margin > 5.0
+    assert self_locking_margin(fp.load_scenario("reversals", apart)).margin > 5.0
 
 
 def test_margin_misses_no_short_combination_of_directions(ub):
-    scenario = fp.load_scenario("fig6")
+    scenario = fp.load_scenario("reversals")
     dense = min(self_locking_margin(scenario, samples).margin for samples in (7001, 20011))
     assert self_locking_margin(scenario).margin == pytest.approx(dense, rel=1e-9)
 
 
 def test_a_reference_at_rest_does_not_lock(ub):
     still = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}
-    assert self_locking_margin(fp.load_scenario("fig6", still)).margin == np.inf
+    assert self_locking_margin(fp.load_scenario("reversals", still)).margin == np.inf
 
 
 def test_simulated_finger_moves_just_below_the_critical_coefficient_and_locks_just_above_it():
@@ -239,14 +239,14 @@ def test_parameters_at_the_edge_have_a_margin_or_none_but_no_error():
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.simplefilter("ignore", fp.exceptions.SelfLockingWarning)
-            assert quick_margin(fp.load_scenario("fig6", edge)) > 0.0
+            assert quick_margin(fp.load_scenario("reversals", edge)) > 0.0
 
 
 def test_slow_motion_needs_the_tension_that_the_map_says():
     # In the middle of the swing, where weight and inertia matter little.
     result = fp.simulate(steps(5e-4))
     overrides = {f"finger.joint_friction.{name}": 5e-4 for name in ("coulomb", "stiction")}
-    finger = fp.Finger(fp.load_finger("ub", overrides))
+    finger = fp.Finger(fp.load_finger("ub_stand_in", overrides))
     expected = self_locking_map(finger, samples=5).tension
     simulated = float(result["tendon_command"].sel(time=1.0).max())
     assert expected.min() * 0.7 < simulated < expected.max() * 1.1

@@ -17,7 +17,7 @@ def finger(weight, **motor):
     """The paper's finger, T3 and T4 pulled by motors of a gearbox in which the tendons' torque counts so much."""
     table = {**OWN, **motor, "friction": {**GEARS, "external_weight": weight}}
     actuators = {name: {"motor": table, "tendons": [name], "spool_radius": RADIUS} for name in ("T3", "T4")}
-    return fp.load_finger("ub", {"finger.actuators": actuators})
+    return fp.load_finger("ub_stand_in", {"finger.actuators": actuators})
 
 
 def balance(tension, torque, weight, dry, sign):
@@ -48,7 +48,7 @@ def test_the_share_of_a_large_command_is_that_of_gears_without_dry_friction(weig
 def test_gears_that_no_load_turns_hold_any_tension_and_lock_a_tension_drive():
     locked = finger(7.0)
     assert tension_limits(fp.Finger(locked), holding=True)[2:] == (np.inf, np.inf)
-    scenario = fp.load_scenario("fig6", {"finger": locked.model_dump(exclude_none=True)})
+    scenario = fp.load_scenario("reversals", {"finger": locked.model_dump(exclude_none=True)})
     assert self_locking_margin(scenario, samples=50, servos=True).margin == 0.0
     assert self_locking_margin(scenario, samples=50).margin > 1.0
 

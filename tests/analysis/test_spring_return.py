@@ -77,7 +77,7 @@ def test_a_joint_whose_friction_grows_with_the_cord_locks_at_its_radius():
     assert np.isinf(found.winding_in).all() and found.ratio == 0.0 and found.returns
 
 
-@pytest.mark.parametrize(("finger", "says"), [("ub", "must all be actuated"), ("planar", "must be one of")])
+@pytest.mark.parametrize(("finger", "says"), [("ub_stand_in", "must all be actuated"), ("planar", "must be one of")])
 def test_what_no_spring_returns_is_told(finger, says):
     with pytest.raises(fp.InputError, match=says):
         fp.analysis.spring_return(finger)

@@ -33,7 +33,7 @@ def test_steady_sliding_delivers_by_the_capstan_law_at_every_posture(finger):
 
 
 def test_a_canal_that_holds_a_tendon_fast_delivers_nothing_at_rest():
-    coarse = fp.Finger(fp.load_finger("ub", {"finger.tendon_friction.coulomb": 10.0}))
+    coarse = fp.Finger(fp.load_finger("ub_stand_in", {"finger.tendon_friction.coulomb": 10.0}))
     found = transmission_efficiency(coarse, np.full(4, 0.5))
     assert np.all(found.least == 0.0) and np.all(np.isinf(found.greatest))
 
@@ -52,7 +52,7 @@ def test_postures_of_the_workspace_keep_to_the_ranges_and_to_the_passive_tendon(
 def test_without_stribeck_effect_and_viscous_friction_a_motion_slides_by_the_capstan_law(finger):
     calm = {"stribeck_velocity": 1e-6, "viscous": 0.0, "stiction_ratio": 1.0}
     overrides = {f"finger.tendon_friction.{name}": value for name, value in calm.items()}
-    result = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 1.5, **overrides}))
+    result = fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 1.5, **overrides}))
     found = transmission_in_motion(finger, result)
     theta = result["joint_position"].values
     for index in range(5):

@@ -41,7 +41,7 @@ def test_a_misspelt_option_is_told_the_nearest_one(run, tmp_path, name):
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_an_option_without_its_value_and_a_second_name_are_refused(run, tmp_path, name):
     refused(run(name, "--output"), tmp_path, "--output", "requires an argument")
-    refused(run(name, "ub", "fig6"), tmp_path, "unexpected extra argument", "fig6")
+    refused(run(name, "ub_stand_in", "reversals"), tmp_path, "unexpected extra argument", "reversals")
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_a_finger_without_passive_tendon_is_refused_before_anything_is_written(r
 
 def test_one_conclusion_is_written_as_figure_and_table_and_shown(run, tmp_path):
     scenario = tmp_path / "short.toml"
-    scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.5\n')
+    scenario.write_text('extends = "reversals"\n[simulation]\nduration = 0.5\n')
     code, out, lines = run("conclusions", scenario, "--only", "a", "--output", "out")
     assert (code, lines) == (0, [])
     assert {each.name for each in (tmp_path / "out").iterdir()} == {"transmission.png", "conclusions.csv"}
@@ -97,7 +97,7 @@ def test_one_conclusion_is_written_as_figure_and_table_and_shown(run, tmp_path):
 def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_figures(run, tmp_path, monkeypatch):
     monkeypatch.setattr("finger_pin.commands.self_locking.SHARES", (0.5,))
     scenario = tmp_path / "short.toml"
-    scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.1\n')
+    scenario.write_text('extends = "reversals"\n[simulation]\nduration = 0.1\n')
     code, out, lines = run("self_locking", scenario, "--output", "out")
     assert (code, lines) == (0, [])
     loaded = fp.load_scenario(scenario)
@@ -110,6 +110,8 @@ def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_fi
 def test_a_folder_that_cannot_be_made_is_told_in_one_line(run, tmp_path, name, arguments):
     (tmp_path / "file").write_text("")
     scenario = tmp_path / "short.toml"
-    scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.1\n')
-    code, _, lines = run(name, "ub" if name == "force_capability" else scenario, *arguments, "--output", "file/out")
+    scenario.write_text('extends = "reversals"\n[simulation]\nduration = 0.1\n')
+    code, _, lines = run(
+        name, "ub_stand_in" if name == "force_capability" else scenario, *arguments, "--output", "file/out"
+    )
     assert code == 1 and len(lines) == 1 and "cannot be written: file/out" in lines[0]

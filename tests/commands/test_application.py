@@ -83,7 +83,7 @@ def test_without_a_command_all_of_them_are_listed_and_a_misspelt_one_is_told_the
 def test_the_package_runs_as_a_module_and_by_the_name_that_is_installed_and_lists_without_what_draws(tmp_path):
     command = [sys.executable, "-X", "importtime", "-m", "finger_pin", "simulate", "--list"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert "fig6" in done.stdout
+    assert "reversals" in done.stdout
     imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
     assert "pydantic" in imported and not {"matplotlib", "meshcat", "netCDF4"} & imported
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -110,23 +110,23 @@ def test_every_public_name_can_be_had_and_nothing_is_imported_that_is_not_asked_
 @pytest.mark.parametrize(
     ("variants", "name"),
     [
-        ((), "fig6"),
-        (("controller.gain=2",), "fig6-gain-2"),
-        (("controller.gain = [1.1, 0.7]", "duration=1"), "fig6-gain-1.1_0.7-duration-1"),
+        ((), "reversals"),
+        (("controller.gain=2",), "reversals-gain-2"),
+        (("controller.gain = [1.1, 0.7]", "duration=1"), "reversals-gain-1.1_0.7-duration-1"),
         (
             ("finger.tendon_friction.coulomb=0.08", "reference.kind=x"),
-            "fig6-tendon_friction.coulomb-0.08-reference.kind-x",
+            "reversals-tendon_friction.coulomb-0.08-reference.kind-x",
         ),
-        (("controller.gain=0.5:2:7",), "fig6-gain-0.5to2to7"),
+        (("controller.gain=0.5:2:7",), "reversals-gain-0.5to2to7"),
     ],
 )
 def test_a_folder_is_named_so_that_it_can_be_read(variants, name):
-    assert folder_name("fig6", *variants) == name
+    assert folder_name("reversals", *variants) == name
 
 
 def test_what_a_path_cannot_hold_is_told_apart_by_a_digest_and_no_name_is_too_long():
     names = [
-        folder_name("fig6", each) for each in ("finger=a/b", "finger=a\\b", "title=é", "x=" + "1" * 400, "x\udcff")
+        folder_name("reversals", each) for each in ("finger=a/b", "finger=a\\b", "title=é", "x=" + "1" * 400, "x\udcff")
     ]
     assert len({*names}) == len(names)
     assert all(len(each) < 70 and each.isascii() and "/" not in each for each in names)

@@ -25,7 +25,7 @@ def load():
 
 @pytest.fixture(scope="module")
 def brief():
-    return fp.load_scenario("fig6", {"simulation.duration": 0.02})
+    return fp.load_scenario("reversals", {"simulation.duration": 0.02})
 
 
 def test_costs_lie_on_straight_lines_in_log_log_and_are_bounds_beyond_the_ends(load):
@@ -152,16 +152,16 @@ def stages():
     study = {"duration": 8.0, "target": 1e-5, "agreement": {"rms": 1e-10}, "points": points, "at_target": costs}
     row = {"measure": "worst", "integrator": "Euler", "massless": False, "step": 1e-5, "error": 1e-4}
     row |= {"rollout_error": 1e-4, "ours": 0.01, "loop": 0.5, "rollout": 0.1, "loop_over_ours": 50.0}
-    compared = {"version": "3", "scenario": "fig6", "duration": 8.0, "limit": 1e-3}
+    compared = {"version": "3", "scenario": "reversals", "duration": 8.0, "limit": 1e-3}
     compared |= {"ours": {"worst": {"method": "Rodas4", "rtol": 0.1}}, "rows": [row | {"rollout_over_ours": 10.0}]}
     joint = {"states": 5, "wall_time": 0.1, "real_time_factor": 20.0, "steps": 9, "time_per_step": 1e-5}
     spent = ("integration", "run", "simulate", *(f"short {each}" for each in ("steps", "run", "changed", "simulate")))
-    runs = {"fig6": dict.fromkeys((*spent, "load"), 1e-3)}
+    runs = {"reversals": dict.fromkeys((*spent, "load"), 1e-3)}
     simulator = {"times": {"varied slowly": 7e-5}, "errors": {"varied slowly": 9e-4}}
     prepared = {"runs": runs, "simulator": simulator}
     job = {"options": [], "first": 31.0, "first_processor_time": 30.0, "first_memory": 2**20}
     return {
-        "work-precision": {"fig6": study, "stick_slip": study},
+        "work-precision": {"reversals": study, "stick_slip": study},
         "step-interface": {"duration": 8.0, "period": 1e-3, "whole": 0.5, "stepping": 0.2, "real_time_factor": 16.0}
         | {"real_time_factor_stepping": 40.0, "error": 1e-5, "worst": 1e-4},
         "joints": {"duration": 2.0, "rtol": 1e-5, "exponent": 1.5}
@@ -223,8 +223,8 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     verdicts = {
         each["name"]: each["passed"] for each in json.loads((tmp_path / "benchmark.json").read_text())["targets"]
     }
-    assert verdicts["fig6 at 1e-05 rad, integration: real-time factor"] is True
-    assert verdicts["fig6 at 1e-05 rad, integration: over the textbook"] is True
+    assert verdicts["reversals at 1e-05 rad, integration: real-time factor"] is True
+    assert verdicts["reversals at 1e-05 rad, integration: over the textbook"] is True
     assert verdicts["stick_slip at 1e-05 rad, whole simulate(): over the textbook"] is False
     assert verdicts["step interface at 1 kHz, steps"] is True
     assert verdicts["step interface at 1 kHz, with controller"] is False
@@ -235,7 +235,7 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["prepared run of 10 ms with another number, beside its steps, at most"] is True
     assert verdicts["a simulator's step of 20 ms, tensions varied slowly"] is False
     assert verdicts["its error, at most"] is True
-    assert verdicts["six numbers of fig6 identified from three starts"] is True
+    assert verdicts["six numbers of reversals identified from three starts"] is True
     assert verdicts["slopes by 3 numbers, in runs"] is True and verdicts["slopes by 6 numbers, in runs"] is False
     assert verdicts["main job, first run"] is False
     output = capsys.readouterr().out

@@ -19,23 +19,23 @@ def here(tmp_path, monkeypatch):
 def test_a_finger_is_written_as_urdf_mjcf_and_toml(here):
     heavier = ["--set", "finger.joints.distal.link.mass=0.02"]
     for name in ("out/ub.urdf", "ub.xml", "ub.toml"):
-        assert run("export", ["ub", name, *heavier]) == 0
+        assert run("export", ["ub_stand_in", name, *heavier]) == 0
     model = pin.buildModelFromUrdf(str(here / "out" / "ub.urdf"))
-    finger = fp.Finger("ub").rigid_body.model
+    finger = fp.Finger("ub_stand_in").rigid_body.model
     assert pin.computeTotalMass(model) - pin.computeTotalMass(finger) == pytest.approx(
-        0.02 - fp.load_finger("ub").joints["distal"].link.mass
+        0.02 - fp.load_finger("ub_stand_in").joints["distal"].link.mass
     )
     again = fp.load_finger(here / "ub.toml")
-    assert again == fp.load_finger("ub", {"finger.joints.distal.link.mass": 0.02})
+    assert again == fp.load_finger("ub_stand_in", {"finger.joints.distal.link.mass": 0.02})
     assert (here / "ub.xml").read_text() == fp.to_mjcf(again)
     # What was written is read again, and a scenario has its finger written.
-    assert run("export", ["ub.toml", "again.xml"]) == 0 == run("export", ["fig6", "fig6.xml"])
+    assert run("export", ["ub.toml", "again.xml"]) == 0 == run("export", ["reversals", "fig6.xml"])
     assert (here / "again.xml").read_text() == (here / "ub.xml").read_text() != (here / "fig6.xml").read_text()
     assert run("export", ["hand", "hand.xml"]) == 0 and "thumb" in (here / "hand.xml").read_text()
 
 
 def test_the_signals_of_a_result_are_written_as_columns_with_their_units_to_the_last_digit(here):
-    result = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))
+    result = fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.01}))
     fp.save(result, "trajectory.nc")
     assert run("export", ["trajectory.nc"]) == 0
     with open("trajectory.csv", newline="") as file:
@@ -50,10 +50,10 @@ def test_the_signals_of_a_result_are_written_as_columns_with_their_units_to_the_
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["ub", "ub.step"], "must end with"),
-        (["ub", "ub.csv"], "simulate it"),
+        (["ub_stand_in", "ub.step"], "must end with"),
+        (["ub_stand_in", "ub.csv"], "simulate it"),
         (["hand", "hand.urdf"], "take one of its fingers"),
-        (["fig7", "fig6.xml"], "fig6"),
+        (["fig7", "fig6.xml"], "reversals"),
     ],
 )
 def test_what_cannot_be_written_is_told_in_one_line_and_nothing_is(here, capsys, arguments, says):

@@ -59,7 +59,7 @@ def test_a_run_killed_at_any_moment_leaves_whole_results(started, tmp_path, monk
 
 def test_ctrl_c_in_a_real_run_ends_it_with_a_trajectory(started, tmp_path):
     # At rest a thousand seconds are over in no time.
-    (tmp_path / "s.toml").write_text('extends = "fig6"\n', encoding="utf-8")
+    (tmp_path / "s.toml").write_text('extends = "reversals"\n', encoding="utf-8")
     process = started("--duration", "1000", "--set", "simulation.sample_rate=100")
     time.sleep(0.7)
     process.send_signal(signal.SIGINT)

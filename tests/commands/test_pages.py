@@ -40,8 +40,8 @@ SHORTER = {
     r"(intervals\.py) \d+": r"\1 2",
     r"(validate\.py)( --only \S+)?$": r"\1 --only kinematics",
     r"force_capability\.py$": "force_capability.py ub --posture 0,30,30,20 --limit 15 --force 0,0,1 --view",
-    r"conclusions\.py$": "conclusions.py fig6 --only a",
-    r"reaction\.py$": "reaction.py fig6 --forces 1",
+    r"conclusions\.py$": "conclusions.py reversals --only a",
+    r"reaction\.py$": "reaction.py reversals --forces 1",
     # What it finds has a test of its own.
     r"(identify\.py) (winding|servo_pendulum|postures|spool_finger).*": r"\1 --list any",
     # Its stages have tests of their own, and it measures for minutes.

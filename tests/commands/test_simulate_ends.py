@@ -49,7 +49,7 @@ def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_t
     run, here, quick
 ):
     sets = [part for key, value in TOO_STIFF.items() for part in ("--set", f"{key}={value}")]
-    code, out, lines = run("fig6", "--output", "out", "--duration", "0.1", *sets)
+    code, out, lines = run("reversals", "--output", "out", "--duration", "0.1", *sets)
     assert (code, len(lines)) == (3, 1)
     said = re.fullmatch(
         r"simulate.py: the integration stopped at t = ([\d.e-]+) s: .* largest in passive_velocity\[T5\]; .*"

@@ -10,10 +10,10 @@ from wrong_inputs import FILES, OTHER_OVERRIDES, PLANAR
 
 @pytest.mark.parametrize(("text", "entry", "says"), OTHER_OVERRIDES, ids=[text[:50] for text, _, _ in OTHER_OVERRIDES])
 def test_a_wrong_value_ends_with_one_line_and_leaves_everything_as_it_was(run, here, text, entry, says):
-    (here / "results" / "fig6").mkdir(parents=True)
-    (here / "results" / "fig6" / "trajectory.nc").write_text("earlier")
+    (here / "results" / "reversals").mkdir(parents=True)
+    (here / "results" / "reversals" / "trajectory.nc").write_text("earlier")
     before = contents(here)
-    answer = run("fig6", "--set", text)
+    answer = run("reversals", "--set", text)
     refused(answer, entry)
     assert any(each in answer[2][0] for each in ((says,) if isinstance(says, str) else says))
     assert contents(here) == before
@@ -37,7 +37,7 @@ def test_a_wrong_file_ends_with_one_line_and_writes_nothing(run, here, case):
         (["--out", "x"], "--out: no such option"),
         (["-x"], "-x: no such option"),
         (["--bogus=1\n2"], "--bogus"),
-        (["fig6", "fig6"], "unexpected extra argument(s) (fig6)"),
+        (["reversals", "reversals"], "unexpected extra argument(s) (reversals)"),
         (["--set"], "'--set' requires an argument"),
         (["--duration"], "'--duration' requires an argument"),
         (["--output"], "'--output' requires an argument"),

@@ -84,7 +84,7 @@ def test_figures_come_in_the_format_that_was_asked_for(run, here):
 
 
 def test_a_finger_that_locks_itself_is_told_in_one_line_of_the_summary_and_nowhere_else(run, quick):
-    stuck = ("fig6", "--duration", "0.01")
+    stuck = ("reversals", "--duration", "0.01")
     for name in ("coulomb", "stiction"):
         stuck += ("--set", f"finger.joint_friction.{name}=5e-3")
     code, out, lines = run(*stuck)
@@ -92,7 +92,7 @@ def test_a_finger_that_locks_itself_is_told_in_one_line_of_the_summary_and_nowhe
     (told,) = [line for line in out.splitlines() if line.startswith("Warning:")]
     assert "times what locks the finger: tensions run away" in told and len(told) <= 80
     assert run(*stuck, "--quiet") == (0, "", [])
-    assert "Warning" not in run("fig6", "--duration", "0.01")[1]
+    assert "Warning" not in run("reversals", "--duration", "0.01")[1]
 
 
 def test_quiet_prints_nothing(run, quick):
@@ -114,7 +114,7 @@ def test_set_names_a_finger_by_name_or_path():
         ("~/f.toml", "~/f.toml"),
         ("/a/f.toml", "/a/f.toml"),
         ("'quoted'", "quoted"),
-        ("{base = 'ub'}", {"base": "ub"}),
+        ("{base = 'ub'}", {"base": "ub_stand_in"}),
         ("[1,\n2]", [1, 2]),
     ):
         assert overrides([f"finger={text}"]) == {"finger": value}
@@ -131,7 +131,7 @@ def test_duration_and_method_are_short_for_set_and_win_over_it(run, here, quick)
 def test_list_names_scenarios_fingers_and_methods(run, here):
     code, out, lines = run("--list")
     assert (code, lines) == (0, [])
-    for name in ("fig6", "stick_slip", "ub", "planar", "dexmart_index", "Radau"):
+    for name in ("reversals", "stick_slip", "ub_stand_in", "planar", "dexmart_index", "Radau"):
         assert re.search(rf"^  {name}\b", out, re.MULTILINE)
     assert set(contents(here)) == {"s.toml"}
 

@@ -19,7 +19,7 @@ OF_OS = (
     "sched_setaffinity setsid statvfs uname wait wait3 wait4"
 )
 OF_SIGNAL = "SIGALRM SIGCHLD SIGHUP SIGKILL SIGPIPE SIGQUIT SIGUSR1 alarm pthread_kill pthread_sigmask setitimer"
-SWEEP = ["sweep", "fig6", "--over", "controller.gain=1,2", "--set", "simulation.duration=0.02", "--workers", "2"]
+SWEEP = ["sweep", "reversals", "--over", "controller.gain=1,2", "--set", "simulation.duration=0.02", "--workers", "2"]
 
 
 def test_all_modules_are_imported_and_a_run_its_page_and_a_sweep_are_published(tmp_path):
@@ -67,7 +67,7 @@ def main():
         if not missing and not module.name.endswith("__main__"):
             importlib.import_module(module.name)
     run = importlib.import_module("finger_pin.commands.application").run
-    short = ["simulate", "fig6", "--duration", "0.02"]
+    short = ["simulate", "reversals", "--duration", "0.02"]
     return max(run(None, arguments) for arguments in ([*short, "--no-figures"], short, SWEEP))
 
 

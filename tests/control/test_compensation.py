@@ -33,11 +33,11 @@ SHARP = {
 }
 
 
-def fig6(*overrides):
+def reversals(*overrides):
     merged = {}
     for each in overrides:
         merged |= each
-    return fp.load_scenario("fig6", merged)
+    return fp.load_scenario("reversals", merged)
 
 
 def postures(count, seed):
@@ -60,7 +60,7 @@ def still(position):
 def test_gravity_compensation_holds_a_frictionless_finger_exactly_at_its_reference():
     """At rest on the reference nothing accelerates; without the compensation it falls with - M^-1 G."""
     for settings in ({}, {"controller.gravity_compensation": False}):
-        scenario = fig6(CONSISTENT, FRICTIONLESS, settings)
+        scenario = reversals(CONSISTENT, FRICTIONLESS, settings)
         finger = fp.Finger(scenario.finger)
         controller = fp.control.build_controller(scenario, finger)
         for position in postures(5, 1)[0]:
@@ -79,7 +79,7 @@ def test_a_frictionless_finger_settles_on_its_reference_without_a_steady_error()
     viscous = {"finger.joint_friction.viscous": 0.01, "simulation.duration": 1.2, "simulation.sample_rate": 100.0}
     still_reference = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}
     offset = {"reference.joints.medial.offset": 0.7, "controller.sampling.period": 2e-3}
-    scenario = fig6(CONSISTENT, FRICTIONLESS, viscous, still_reference, offset)
+    scenario = reversals(CONSISTENT, FRICTIONLESS, viscous, still_reference, offset)
 
     class Late:
         controller = fp.control.build_controller(scenario)
@@ -95,7 +95,7 @@ def test_a_frictionless_finger_settles_on_its_reference_without_a_steady_error()
 
 
 def test_damping_is_a_torque_against_the_error_of_velocity():
-    scenario = fig6({"controller.damping": [0.1, 0.2, 0.3, 0.4], "controller.gain": 2.0})
+    scenario = reversals({"controller.damping": [0.1, 0.2, 0.3, 0.4], "controller.gain": 2.0})
     controller = fp.control.build_controller(scenario)
     reference = ReferenceSignals(np.array([0.1, 0.5, 0.5, 0.3]), np.array([1.0, 0.0, -1.0, 0.5]))
     signals = controller.command(0.0, reference, np.array([0.0, 0.5, 0.6, 0.3]), np.array([0.5, 0.5, -1.0, 1.5]))
@@ -103,11 +103,11 @@ def test_damping_is_a_torque_against_the_error_of_velocity():
 
 
 def test_without_any_addition_it_is_the_paper_s_controller_and_with_all_shares_zero_it_says_the_same():
-    scenario = fig6()
+    scenario = reversals()
     paper = fp.control.build_controller(scenario)
     assert type(paper) is ProportionalController
     shares = {"controller.tendon_friction_feedforward.share": 0.0, "controller.joint_friction_compensation.share": 0.0}
-    nothing = fp.control.build_controller(fig6(shares))
+    nothing = fp.control.build_controller(reversals(shares))
     position, velocity = postures(20, 2)
     reference = ReferenceSignals(position + 0.03, velocity)
     given, expected = (each.command(0.0, reference, position, velocity) for each in (nothing, paper))
@@ -119,7 +119,7 @@ def test_without_any_addition_it_is_the_paper_s_controller_and_with_all_shares_z
 def test_tendon_feedforward_without_stribeck_and_viscous_parts_is_the_capstan_law_upside_down(sign):
     """f^a = f exp(mu_e phi) when pulling, f exp(-mu_e phi) when releasing; phi of T1 is 1.0 + |theta1|."""
     plain = {"finger.tendon_friction.stiction_ratio": 1.0, "finger.tendon_friction.viscous": 0.0}
-    controller = fp.control.build_controller(fig6(FEEDFORWARD, SHARP, plain))
+    controller = fp.control.build_controller(reversals(FEEDFORWARD, SHARP, plain))
     position = np.array([0.1, 0.5, 0.6, 0.4])
     velocity = sign * np.array([0.0, 1.0, 0.0, 0.0])
     planned = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
@@ -134,7 +134,7 @@ def test_tendon_feedforward_without_stribeck_and_viscous_parts_is_the_capstan_la
 
 def test_a_steadily_sliding_tendon_delivers_exactly_what_was_planned():
     """The finger's own law (9), integrated at constant velocity until its bristles have settled, is the judge."""
-    scenario = fig6(FEEDFORWARD, SHARP)
+    scenario = reversals(FEEDFORWARD, SHARP)
     finger = fp.Finger(scenario.finger)
     feedforward = fp.control.build_controller(scenario, finger).tendons
     planned = np.array([1.0, 2.5, 3.0, 4.0, 5.0])
@@ -168,7 +168,7 @@ def settled_states(finger, position, velocity, command, halves):
 
 def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction():
     """On the reference at the desired velocity, with every bristle settled: theta'' = - M^-1 C theta', and p5'' = 0."""
-    scenario = fig6(CONSISTENT, FEEDFORWARD, JOINTS, SHARP)
+    scenario = reversals(CONSISTENT, FEEDFORWARD, JOINTS, SHARP)
     finger = fp.Finger(scenario.finger)
     controller = fp.control.build_controller(scenario, finger)
     position, velocity = postures(3, 4)
@@ -187,9 +187,9 @@ def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction(
 
 
 def test_believed_coefficients_are_compensated_instead_of_the_finger_s():
-    actual = fp.control.build_controller(fig6(FEEDFORWARD, JOINTS))
+    actual = fp.control.build_controller(reversals(FEEDFORWARD, JOINTS))
     believed = fp.control.build_controller(
-        fig6(
+        reversals(
             {"controller.tendon_friction_feedforward.coulomb": 0.2},
             {"controller.joint_friction_compensation.coulomb": [1e-4, 2e-4, 3e-4, 4e-4]},
         )
@@ -208,7 +208,9 @@ def test_a_drag_of_the_joints_is_compensated_in_the_direction_of_the_desired_mot
     drag = {"finger.joint_friction.drag": 4e-3}
     wanted = ReferenceSignals(position, velocity)
     torques = [
-        fp.control.build_controller(fig6(FRICTIONLESS, JOINTS, SHARP, more)).command(0.0, wanted, position, velocity)
+        fp.control.build_controller(reversals(FRICTIONLESS, JOINTS, SHARP, more)).command(
+            0.0, wanted, position, velocity
+        )
         for more in ({}, drag)
     ]
     np.testing.assert_allclose(torques[1].torque - torques[0].torque, 4e-3 * np.sign(velocity), rtol=1e-6)
@@ -216,10 +218,10 @@ def test_a_drag_of_the_joints_is_compensated_in_the_direction_of_the_desired_mot
 
 def test_the_loop_of_friction_and_tension_closes_up_to_the_critical_coefficient():
     """At 97 % of it, tensions of many times those without friction still satisfy their balance, by (17) by hand."""
-    critical = fp.analysis.critical_friction(fp.load_finger("ub")).coefficient
+    critical = fp.analysis.critical_friction(fp.load_finger("ub_stand_in")).coefficient
     coefficient = 0.97 * critical
     key = "controller.joint_friction_compensation"
-    scenario = fig6(
+    scenario = reversals(
         {f"{key}.coulomb": coefficient, f"{key}.stiction": coefficient, f"{key}.viscous": 0.0},
         {f"{key}.reversal_speed": 1e-4},
     )
@@ -242,7 +244,9 @@ def test_compensating_more_joint_friction_than_locks_the_finger_is_refused(entry
     value = {"stiction": 8e-4, "share": 2.0}[entry]
     with pytest.raises(InputError, match="self-locking") as caught:
         fp.control.build_controller(
-            fig6({f"controller.joint_friction_compensation.{entry}": value, "finger.joint_friction.stiction": 4e-4})
+            reversals(
+                {f"controller.joint_friction_compensation.{entry}": value, "finger.joint_friction.stiction": 4e-4}
+            )
         )
     assert caught.value.entry == "controller.joint_friction_compensation"
     assert "\n" not in str(caught.value)
@@ -270,11 +274,13 @@ def test_commands_of_a_batch_are_those_of_each_row_for_other_fingers_too(finger,
 
 def test_a_continuous_compensated_controller_is_what_a_finely_sampled_one_converges_to():
     overrides = {"simulation.duration": 0.05, "finger.joint_friction.viscous": 0.02}
-    continuous = fp.simulate(fig6(CONSISTENT, FEEDFORWARD, JOINTS, overrides))
+    continuous = fp.simulate(reversals(CONSISTENT, FEEDFORWARD, JOINTS, overrides))
     assert continuous.attrs["method"] == "Radau"
     gaps = []
     for period in (1e-3, 2.5e-4):
-        sampled = fp.simulate(fig6(CONSISTENT, FEEDFORWARD, JOINTS, overrides, {"controller.sampling.period": period}))
+        sampled = fp.simulate(
+            reversals(CONSISTENT, FEEDFORWARD, JOINTS, overrides, {"controller.sampling.period": period})
+        )
         assert sampled.attrs["method"] == "Rodas5P"
         gaps.append(float(abs(sampled.joint_position - continuous.joint_position).max()))
     assert gaps[0] < 1e-4
@@ -282,5 +288,5 @@ def test_a_continuous_compensated_controller_is_what_a_finely_sampled_one_conver
 
 
 def test_the_closed_loop_uses_the_scenario_s_whole_controller():
-    loop = ClosedLoop.from_scenario(fig6(FEEDFORWARD))
+    loop = ClosedLoop.from_scenario(reversals(FEEDFORWARD))
     assert isinstance(loop.controller, fp.control.CompensatedController) and loop.controller.tendons is not None

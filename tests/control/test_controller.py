@@ -13,7 +13,7 @@ from finger_pin.references.reference import ReferenceSignals
 
 @pytest.fixture(scope="module")
 def controller(routing):
-    return ProportionalController.from_scenario(fp.load_scenario("fig6"), routing)
+    return ProportionalController.from_scenario(fp.load_scenario("reversals"), routing)
 
 
 def command(controller, error, position=None):
@@ -37,7 +37,7 @@ def internal_by_hand():
 
 
 def test_torque_is_the_gain_times_the_error():
-    scenario = fp.load_scenario("fig6", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
+    scenario = fp.load_scenario("reversals", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
     controller = ProportionalController.from_scenario(scenario, fp.Finger(scenario.finger).routing)
     signals = command(controller, np.array([0.1, 0.1, -0.2, 0.3]), position=np.array([0.5, 0.2, 0.3, 0.1]))
     np.testing.assert_allclose(signals.torque, [0.1, 0.2, -0.6, 1.2], rtol=1e-12)

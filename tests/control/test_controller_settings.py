@@ -40,7 +40,7 @@ WRONG = [
 @pytest.mark.parametrize(("key", "value", "entry", "said"), WRONG, ids=[f"{each[0]}={each[1]}" for each in WRONG])
 def test_a_wrong_entry_is_named_in_one_line(key, value, entry, said):
     with pytest.raises(InputError) as caught:
-        fp.load_scenario("fig6", {f"controller.{key}": value})
+        fp.load_scenario("reversals", {f"controller.{key}": value})
     assert caught.value.entry == f"controller.{entry}"
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -54,17 +54,17 @@ def test_a_loop_around_a_passive_tendon_needs_one(tmp_path):
 
 
 def test_an_empty_table_asks_for_a_part_with_its_defaults():
-    scenario = fp.load_scenario("fig6", {"controller.tendon_friction_feedforward": {}})
+    scenario = fp.load_scenario("reversals", {"controller.tendon_friction_feedforward": {}})
     controller = fp.control.build_controller(scenario)
     assert controller.tendons is not None and controller.tendons.share == 1.0 and controller.joints is None
 
 
 def test_what_is_not_asked_for_is_not_in_the_controller_nor_in_the_written_scenario():
-    scenario = fp.load_scenario("fig6")
+    scenario = fp.load_scenario("reversals")
     written = tomllib.loads(fp.to_toml(scenario))["controller"]
     assert not [key for key in written if isinstance(written[key], dict)]
     assert scenario.controller.is_paper and ControllerSettings().is_paper
-    assert fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.002})).attrs["method"] == "Rodas5P"
+    assert fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.002})).attrs["method"] == "Rodas5P"
 
 
 @pytest.mark.parametrize(
@@ -72,5 +72,5 @@ def test_what_is_not_asked_for_is_not_in_the_controller_nor_in_the_written_scena
 )
 def test_every_part_alone_makes_another_controller_than_the_paper_s(key):
     value = {"gravity_compensation": True, "distribution": {"maximum_tension": 9.0}}
-    scenario = fp.load_scenario("fig6", {f"controller.{key}": value.get(key, {})})
+    scenario = fp.load_scenario("reversals", {f"controller.{key}": value.get(key, {})})
     assert isinstance(fp.control.build_controller(scenario), fp.control.CompensatedController)

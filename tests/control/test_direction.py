@@ -29,7 +29,7 @@ def test_commands_do_not_chatter_at_a_reversal_whatever_the_measured_velocity_sa
     A law on the measured velocity would switch at every one of its 2000 changes of sign.
     """
     controller = fp.control.build_controller(
-        fp.load_scenario("fig6", FEEDFORWARD | {"controller.minimum_tension": [0.0, 0.0, 0.0, 0.0, WISH]})
+        fp.load_scenario("reversals", FEEDFORWARD | {"controller.minimum_tension": [0.0, 0.0, 0.0, 0.0, WISH]})
     )
     position = np.array([0.0, 0.5, 0.5, 0.3])
     sweep = np.linspace(-0.5, 0.5, 2001)[:, None] * np.array([0.0, 1.0, 0.0, 0.0])

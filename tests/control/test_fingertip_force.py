@@ -20,7 +20,7 @@ def loop(*overrides):
     merged = dict(SMOOTH)
     for each in overrides:
         merged |= each
-    return ClosedLoop.from_scenario(fp.load_scenario("fig6", merged))
+    return ClosedLoop.from_scenario(fp.load_scenario("reversals", merged))
 
 
 def test_what_pushes_back_as_hard_as_wanted_leaves_the_joints_of_a_frictionless_finger_alone(tmp_path):
@@ -89,4 +89,4 @@ def test_tension_limits_are_kept_and_what_they_cost_is_said():
 )
 def test_a_wrong_wish_is_one_clear_line(overrides, message):
     with pytest.raises(fp.InputError, match=message):
-        fp.load_scenario("fig6", overrides)
+        fp.load_scenario("reversals", overrides)

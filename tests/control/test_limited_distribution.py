@@ -108,11 +108,11 @@ def test_a_simulation_keeps_to_the_limits_and_records_what_is_missing():
         "simulation.duration": 0.1,
         "reference.joints.proximal.frequency": 3.0,
     }
-    result = fp.simulate(fp.load_scenario("fig6", overrides))
+    result = fp.simulate(fp.load_scenario("reversals", overrides))
     assert float(result.tendon_command.max()) <= limit
     torque_deficit = result.torque_shortfall
     assert torque_deficit.dims == ("time", "joint") and torque_deficit.attrs["units"] == "N m"
     assert float(abs(torque_deficit).max()) > 1e-3
-    planned = result.tendon_command.values @ fp.Finger(fp.load_finger("ub")).coupling
+    planned = result.tendon_command.values @ fp.Finger(fp.load_finger("ub_stand_in")).coupling
     np.testing.assert_allclose(planned, (result.joint_torque_command - torque_deficit).values, atol=1e-8)
-    assert "torque_shortfall" not in fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))
+    assert "torque_shortfall" not in fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.01}))

@@ -17,7 +17,7 @@ PULLS = {
 
 
 def pulled(**entries):
-    return fp.load_scenario("fig6", SHORT | {"controller": {"kind": "tensions", "tensions": PULLS}} | entries)
+    return fp.load_scenario("reversals", SHORT | {"controller": {"kind": "tensions", "tensions": PULLS}} | entries)
 
 
 def test_commands_are_the_signals_and_a_tendon_without_one_is_held_at_its_minimum():
@@ -33,7 +33,7 @@ def test_signals_and_their_samples_make_the_same_motion():
     times = np.linspace(0.0, 0.02, 3)
     scenario = pulled(**{"controller.tensions.T2": {"offset": 3.0}})
     samples = np.transpose([2.0 + 0 * times, 3.0 + 0 * times, 5.0 + times / 0.02, 1.0 + 0 * times])
-    given = fp.simulate(fp.load_scenario("fig6", SHORT), controller=(times, samples))
+    given = fp.simulate(fp.load_scenario("reversals", SHORT), controller=(times, samples))
     np.testing.assert_allclose(given.joint_position, fp.simulate(scenario).joint_position, atol=1e-6)
 
 
@@ -53,7 +53,9 @@ def test_a_motion_takes_the_steps_that_it_needs_however_many_samples_it_is_given
         times = np.linspace(0.0, 0.1, count)
         pulse = np.interp(times, [0.05, 0.0505, 0.051], [0.0, 1.0, 0.0])
         tension = np.column_stack([1.0 + pulse, 2.0 + np.sin(20.0 * times), 5.0 + 0 * times, 1.0 + 0 * times])
-        found.append(fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.1}), controller=(times, tension)))
+        found.append(
+            fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.1}), controller=(times, tension))
+        )
     few, many = found
     assert many.attrs["solver_steps"] < 1.5 * few.attrs["solver_steps"]
     np.testing.assert_allclose(many.joint_position, few.joint_position, atol=2e-5)
@@ -62,13 +64,13 @@ def test_a_motion_takes_the_steps_that_it_needs_however_many_samples_it_is_given
 
 def test_a_negative_sample_of_tension_is_refused():
     with pytest.raises(InputError, match="a tendon only pulls"):
-        fp.simulate(fp.load_scenario("fig6"), controller=([0.0, 1.0], [[1.0, 1.0, 1.0, -1e-3]] * 2))
+        fp.simulate(fp.load_scenario("reversals"), controller=([0.0, 1.0], [[1.0, 1.0, 1.0, -1e-3]] * 2))
 
 
 def test_the_force_at_the_fingertip_is_the_constant_and_what_varies():
     signal = {"z": {"kind": "ramp", "time": 0.0, "duration": 0.02, "height": -0.4}, "x": {"offset": 0.1}}
     entries = {"environment.fingertip_force": [0.0, 0.2, 0.1], "environment.fingertip_force_signal": signal}
-    scenario = fp.load_scenario("fig6", SHORT | entries)
+    scenario = fp.load_scenario("reversals", SHORT | entries)
     result = fp.simulate(scenario)
     time = result.time.values
     np.testing.assert_allclose(
@@ -83,22 +85,22 @@ def test_the_force_at_the_fingertip_is_the_constant_and_what_varies():
 
 def test_a_force_by_samples_replaces_that_of_the_scenario():
     forces = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.1]])
-    given = fp.simulate(fp.load_scenario("fig6", SHORT), fingertip_force=([0.0, 1.0], forces))
-    told = fp.simulate(fp.load_scenario("fig6", SHORT | {"environment.fingertip_force": [0.0, 0.0, 0.1]}))
+    given = fp.simulate(fp.load_scenario("reversals", SHORT), fingertip_force=([0.0, 1.0], forces))
+    told = fp.simulate(fp.load_scenario("reversals", SHORT | {"environment.fingertip_force": [0.0, 0.0, 0.1]}))
     np.testing.assert_allclose(given.joint_position, told.joint_position, atol=1e-7)
 
 
 def test_a_reference_by_samples_is_followed_and_followers_are_filled_in():
     times = np.linspace(0.0, 0.02, 21)
     theta = np.column_stack([0.1 * times, 0.3 + times, 0.5 - times])
-    result = fp.simulate(fp.load_scenario("fig6", SHORT), reference=(times, theta))
+    result = fp.simulate(fp.load_scenario("reversals", SHORT), reference=(times, theta))
     np.testing.assert_allclose(result.joint_reference[:, :3], theta, atol=1e-12)
     np.testing.assert_allclose(result.joint_reference[:, 3], (3.5e-3 * theta[:, 2] - 1.0 / 5e4) / 5e-3, atol=1e-12)
 
 
 def test_a_column_for_a_follower_is_refused_with_the_names_that_are_wanted():
     with pytest.raises(InputError, match="one column for each of abduction, proximal, medial"):
-        fp.simulate(fp.load_scenario("fig6"), reference=([0.0, 1.0], np.zeros((2, 4))))
+        fp.simulate(fp.load_scenario("reversals"), reference=([0.0, 1.0], np.zeros((2, 4))))
 
 
 def test_the_clock_of_all_signals_starts_where_the_scenario_says():
@@ -118,7 +120,7 @@ def test_open_loop_tensions_need_no_force_closure():
 def test_a_varying_force_beside_a_sampled_controller_varies_between_its_samples_too():
     force = {"offset": 0.1, "amplitude": 0.2, "frequency": 40.0}
     settings = {"environment.fingertip_force_signal.z": force, "controller.sampling.period": 5e-3}
-    result = fp.simulate(fp.load_scenario("fig6", STILL | settings))
+    result = fp.simulate(fp.load_scenario("reversals", STILL | settings))
     expected = 0.1 + 0.2 * np.sin(2.0 * np.pi * 40.0 * result.time)
     np.testing.assert_allclose(result.fingertip_force.sel(axis="z"), expected, atol=1e-12)
     turned_over = float(abs(result.energy_exchanged_actuators).max() + abs(result.energy_exchanged_fingertip).max())

@@ -19,7 +19,7 @@ PULL = np.array([1.0, 1.0, 4.0, 3.0, 3.0])
 
 
 def scenario(**entries):
-    return fp.load_scenario("fig6", {"simulation.duration": 0.02} | entries)
+    return fp.load_scenario("reversals", {"simulation.duration": 0.02} | entries)
 
 
 @dataclass

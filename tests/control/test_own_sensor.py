@@ -48,7 +48,9 @@ class Listening:
 def run(controller, **sampling):
     overrides = {f"controller.sampling.{key}": value for key, value in sampling.items()}
     settings = {"simulation.duration": 0.012, "simulation.sample_rate": 4000.0}
-    return fp.simulate(fp.load_scenario("fig6", overrides | settings), controller=controller, control_period=PERIOD)
+    return fp.simulate(
+        fp.load_scenario("reversals", overrides | settings), controller=controller, control_period=PERIOD
+    )
 
 
 @pytest.fixture(scope="module")
@@ -89,4 +91,4 @@ def test_sensors_that_cannot_be_recorded_are_refused_before_anything_is_computed
     with pytest.raises(fp.InputError, match=r"controller.sensors = .clock.: there is another one of this name"):
         run(Listening(Clock(), Clock()))
     with pytest.raises(fp.InputError, match=r"control_period: is missing: a controller that reads sensors is sampled"):
-        fp.simulate("fig6", controller=Listening(Clock()))
+        fp.simulate("reversals", controller=Listening(Clock()))

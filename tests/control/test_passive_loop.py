@@ -13,7 +13,9 @@ LOOP = {"controller.passive_tension_loop.integral": 10.0, "controller.sampling.p
 def loop(**settings):
     overrides = {f"controller.passive_tension_loop.{key}": value for key, value in settings.items()}
     return fp.control.build_controller(
-        fp.load_scenario("fig6", {"controller.passive_tension": 5.0, "controller.sampling.period": 0.01} | overrides)
+        fp.load_scenario(
+            "reversals", {"controller.passive_tension": 5.0, "controller.sampling.period": 0.01} | overrides
+        )
     )
 
 
@@ -63,7 +65,7 @@ def test_the_wish_and_its_correction_are_what_is_planned_for_the_passive_tendon(
 
 
 def test_the_minimum_of_the_other_tendons_is_kept_where_the_wish_is_less():
-    controller = fp.control.build_controller(fp.load_scenario("fig6", LOOP | {"controller.passive_tension": 0.5}))
+    controller = fp.control.build_controller(fp.load_scenario("reversals", LOOP | {"controller.passive_tension": 0.5}))
     for _ in range(100):
         controller.sense(measured(3.0), 0.1)
     assert planned(controller).min() == pytest.approx(1.0, rel=1e-12)
@@ -74,7 +76,7 @@ def test_it_brings_the_delivered_tension_to_the_wish_where_friction_and_other_mi
     motion = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}
     common = motion | {"controller.passive_tension": 5.0, "simulation.duration": 1.5, "simulation.sample_rate": 100.0}
     held = {
-        name: fp.simulate(fp.load_scenario("fig6", common | settings)).tendon_tension.sel(tendon="T5")
+        name: fp.simulate(fp.load_scenario("reversals", common | settings)).tendon_tension.sel(tendon="T5")
         for name, settings in (("with", LOOP), ("without", {"controller.sampling.period": 1e-3}))
     }
     assert float(held["with"][-1]) == pytest.approx(5.0, rel=0.01)
@@ -83,7 +85,7 @@ def test_it_brings_the_delivered_tension_to_the_wish_where_friction_and_other_mi
 
 def test_it_serves_a_loop_of_one_s_own():
     """The example of the README, as it is told there: the simulator's tensions go in, the controller's come out."""
-    scenario = fp.load_scenario("fig6", LOOP | {"controller.passive_tension": 4.0})
+    scenario = fp.load_scenario("reversals", LOOP | {"controller.passive_tension": 4.0})
     finger = fp.Finger(scenario.finger)
     reference = ReferenceSignals(np.array([0.0, 0.5, 0.6, (3.5e-3 * 0.6 - 4.0 / 5e4) / 5e-3]), np.zeros(4))
     controller = fp.control.build_controller(scenario, finger)
@@ -100,9 +102,9 @@ def test_it_serves_a_loop_of_one_s_own():
 
 def test_it_needs_samples():
     with pytest.raises(InputError) as caught:
-        fp.load_scenario("fig6", {"controller.passive_tension_loop.integral": 1.0})
+        fp.load_scenario("reversals", {"controller.passive_tension_loop.integral": 1.0})
     assert caught.value.entry == "controller.passive_tension_loop" and "sampling.period" in str(caught.value)
-    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.01})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.01})
     with pytest.raises(InputError) as caught:
         fp.simulate(scenario, controller=loop(integral=1.0))
     assert caught.value.entry == "control_period"

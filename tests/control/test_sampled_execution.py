@@ -33,7 +33,7 @@ class Listening:
 def run(controller=None, duration=0.012, rate=4000.0, **sampling):
     overrides = {f"controller.sampling.{key}": value for key, value in sampling.items()}
     settings = {"simulation.duration": duration, "simulation.sample_rate": rate}
-    return fp.simulate(fp.load_scenario("fig6", overrides | settings), controller=controller)
+    return fp.simulate(fp.load_scenario("reversals", overrides | settings), controller=controller)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.5e-3, 1e-3, 2.5e-3, 3e-3, 0.3e-3, 1.7e-3])
@@ -128,7 +128,7 @@ def test_the_recorded_scenario_repeats_a_noisy_run_bit_by_bit(tmp_path):
     }
     runs = {}
     for seed in (1, 2):
-        scenario = fp.load_scenario("fig6", overrides | {"controller.sampling.seed": seed})
+        scenario = fp.load_scenario("reversals", overrides | {"controller.sampling.seed": seed})
         runs[seed] = fp.simulate(scenario)
         path = tmp_path / f"seed{seed}.toml"
         path.write_text(runs[seed].attrs["scenario"])
@@ -141,7 +141,9 @@ def test_the_recorded_scenario_repeats_a_noisy_run_bit_by_bit(tmp_path):
 
 def test_the_period_of_an_argument_wins_over_the_scenario_s_and_keeps_its_sensors():
     controller = Listening()
-    scenario = fp.load_scenario("fig6", {"controller.sampling.encoder_resolution": 1e-3, "simulation.duration": 0.01})
+    scenario = fp.load_scenario(
+        "reversals", {"controller.sampling.encoder_resolution": 1e-3, "simulation.duration": 0.01}
+    )
     fp.simulate(scenario, controller=controller, control_period=2e-3)
     np.testing.assert_allclose(controller.times, np.arange(5) * 2e-3)
     position = np.array(controller.position) * 1e3
@@ -150,13 +152,13 @@ def test_the_period_of_an_argument_wins_over_the_scenario_s_and_keeps_its_sensor
 
 def test_the_paper_s_controller_sampled_by_the_scenario_is_what_the_argument_makes_of_it():
     by_scenario = run(None, duration=0.05, rate=1000.0, period=1e-3)
-    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.05})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.05})
     by_argument = fp.simulate(scenario, control_period=1e-3)
     np.testing.assert_array_equal(by_scenario.joint_position, by_argument.joint_position)
 
 
 def test_sampling_needs_a_method_that_can():
-    scenario = fp.load_scenario("fig6", {"controller.sampling.period": 1e-3, "simulation.method": "BDF"})
+    scenario = fp.load_scenario("reversals", {"controller.sampling.period": 1e-3, "simulation.method": "BDF"})
     with pytest.raises(InputError) as caught:
         fp.simulate(scenario)
     assert caught.value.entry == "simulation.method"

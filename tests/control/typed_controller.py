@@ -18,6 +18,6 @@ class Pull:
 
 def pulled(duration: float) -> list[float]:
     """Return the commands of the third tendon, N."""
-    scenario = fp.load_scenario("fig6", {"simulation.duration": duration})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": duration})
     result = fp.simulate(scenario, controller=Pull(), control_period=1e-3)
     return [float(each) for each in result.tendon_command.sel(tendon="T3").values]

@@ -32,7 +32,7 @@ def bodies():
         if name in hand_joints:
             hand.names[index] = name.replace(".0", "")
     return {
-        **{name: fp.Finger(fp.load_finger(name)) for name in ("ub", "planar", "dexmart_index")},
+        **{name: fp.Finger(fp.load_finger(name)) for name in ("ub_stand_in", "planar", "dexmart_index")},
         "tree": on_model(tree, list(tree.names)[1:], "tip", (1.0, -2.0, -9.0)),
         "hand": on_model(hand, [name.replace(".0", "") for name in hand_joints], "link_3.0_tip", (0.0, 0.0, -9.81)),
     }
@@ -41,7 +41,7 @@ def bodies():
 @pytest.fixture(scope="session")
 def scenarios():
     return {
-        "fig6": fp.load_scenario("fig6"),
+        "reversals": fp.load_scenario("reversals"),
         "stick_slip": fp.load_scenario("stick_slip"),
         "two_passive": two_passive(),
         "none_passive": none_passive(),
@@ -56,6 +56,6 @@ def cases(scenarios):
     loops = {name: ClosedLoop.from_scenario(scenario) for name, scenario in scenarios.items()}
     loops["servos"] = replace(loops["servos"], drives=Unpowered())
     loops["carried"] = ClosedLoop.from_scenario(carried())
-    loops["meeting_axes"] = without_abduction_link(loops["fig6"])
+    loops["meeting_axes"] = without_abduction_link(loops["reversals"])
     pushed = {f"{name}_pushed": replace(loop, fingertip_force=FORCE) for name, loop in loops.items()}
     return {name: Case.of(loop) for name, loop in (loops | pushed).items()}

@@ -18,11 +18,11 @@ from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
 from finger_pin.mechanism.state import State
 
-BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
+BODIES = ("ub_stand_in", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(
     name + push
     for push in ("", "_pushed")
-    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "servos", "carried")
+    for name in ("reversals", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "servos", "carried")
 )
 FORCE = np.array([0.3, -0.2, 0.4])
 
@@ -72,8 +72,8 @@ def on_model(model, joints, tip, gravity):
 
 
 def two_passive():
-    """`fig6` with a second passive tendon, between the proximal and the medial joint."""
-    table = fp.load_scenario("fig6").model_dump()
+    """`reversals` with a second passive tendon, between the proximal and the medial joint."""
+    table = fp.load_scenario("reversals").model_dump()
     table["finger"]["tendons"]["T6"] = {
         "kind": "passive",
         "curvature_offset": 0.3,
@@ -109,7 +109,7 @@ def lugre():
 
 
 def servos():
-    """`fig6` with damping, two tendons on one spool in position drive, one in tension drive, and one ideal source."""
+    """`reversals` with damping, two tendons on one spool by position, one by tension, one ideal source."""
     # Soft tendons: differences of the friction of stiff ones would have to be finer than rounding allows.
     both = {"tendons": ["T4", "T1"], "spool_radius": [0.006, 0.004], "drive": "position", "pretension": [2.0, 3.0]}
     one = {"tendons": ["T3"], "spool_radius": 0.005, "friction_compensation": 0.7}
@@ -117,7 +117,7 @@ def servos():
         "both": {"motor": "STS3215", "tendon_rigidity": 500.0, **both},
         "one": {"motor": "XL330-M288", "tendon_rigidity": 500.0, **one},
     }
-    return fp.load_scenario("fig6", {"controller.damping": [0.02, 0.01, 0.0, 0.03], "finger.actuators": actuators})
+    return fp.load_scenario("reversals", {"controller.damping": [0.02, 0.01, 0.0, 0.03], "finger.actuators": actuators})
 
 
 class Unpowered:

@@ -243,7 +243,7 @@ def test_the_textbook_and_the_compiled_integrators_read_the_same_tables():
             np.testing.assert_allclose(each, after, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["fig6", "servo", "press"])
+@pytest.mark.parametrize("name", ["reversals", "servo", "press"])
 def test_a_finger_whose_parameters_were_changed_evaluates_alike_in_both(name):
     """Half of the finger's numbers, drawn anew around what they were, as prepared runs change them."""
     rng, scenario = np.random.default_rng(3), fp.load_scenario(name)

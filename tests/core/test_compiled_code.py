@@ -235,7 +235,7 @@ def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
     """With servos, whose laws read loads as NumPy's `load` is called, with objects, and several fingers."""
     code = (
         "import finger_pin as fp\n"
-        "for name in ('fig6', 'servo', 'press', 'hand'):\n"
+        "for name in ('reversals', 'servo', 'press', 'hand'):\n"
         "    fp.simulate(fp.load_scenario(name, {'simulation.duration': 0.002}))"
     )
     exec(code)

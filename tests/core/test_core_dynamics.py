@@ -119,7 +119,7 @@ def test_a_fingertip_force_on_any_body_is_pinocchio_s(bodies, name):
 
 
 def test_the_fingertip_force_is_that_of_the_call_and_leaves_no_trace(cases):
-    case, rng = cases["fig6"], np.random.default_rng(6)
+    case, rng = cases["reversals"], np.random.default_rng(6)
     finger, x = case.loop.finger, case.states(rng, 6)
     command, forces = rng.uniform(0.0, 5.0, (6, 4)), rng.normal(size=(6, 3))
     forces[2] = 0.0
@@ -133,8 +133,8 @@ def test_the_fingertip_force_is_that_of_the_call_and_leaves_no_trace(cases):
 
 
 def test_a_state_or_command_of_the_wrong_size_is_refused_before_compiled_code_sees_it(cases):
-    finger = cases["fig6"].loop.finger
-    compiled, x = CompiledFinger(finger), cases["fig6"].loop.initial_state()
+    finger = cases["reversals"].loop.finger
+    compiled, x = CompiledFinger(finger), cases["reversals"].loop.initial_state()
     for state, command in ((x[:-1], np.ones(4)), (np.append(x, 0.0), np.ones(4)), (x, np.ones(3)), (x, np.ones(5))):
         with pytest.raises(ValueError):
             compiled.evaluate(state, command)
@@ -143,8 +143,8 @@ def test_a_state_or_command_of_the_wrong_size_is_refused_before_compiled_code_se
 
 def test_lists_integers_frozen_and_strided_arrays_are_taken_as_the_numbers_that_they_hold(cases):
     """Compiled code reads one kind of array alone, and would misread another."""
-    finger = cases["fig6"].loop.finger
-    x = cases["fig6"].loop.initial_state()
+    finger = cases["reversals"].loop.finger
+    x = cases["reversals"].loop.initial_state()
     frozen = np.tile(x, (3, 1))
     frozen.flags.writeable = False
     compiled = CompiledFinger(finger)

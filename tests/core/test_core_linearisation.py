@@ -181,7 +181,7 @@ def test_the_derivative_in_time_is_that_of_differences(examined):
 
 
 def test_a_system_that_cannot_be_factorised_is_reported(cases):
-    case = cases["fig6"]
+    case = cases["reversals"]
     x = case.loop.initial_state()
     assert case.solve(0.0, x, 1e3)[2]
     for entry in (4, 9, 12):

@@ -79,7 +79,7 @@ def test_a_rejected_step_leaves_no_trace(cases, method, touching):
 
 def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_names_the_culprit(cases, method):
     """An absolute tolerance that no rounding can meet, for one number of the state alone."""
-    case = cases["fig6"]
+    case = cases["reversals"]
     for culprit in (6, 9):
         part = case.part(method, rtol=0.0)
         part.atol[:] = 1.0
@@ -106,7 +106,7 @@ def test_a_state_whose_error_is_no_number_is_named_before_any_that_is_only_large
 
 def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_names_the_culprit(cases, method):
     """An absolute tolerance that rounding meets only in steps far below a nanosecond."""
-    case = cases["fig6"]
+    case = cases["reversals"]
     part = case.part(method, rtol=0.0)
     part.atol[:] = 1.0
     part.atol[9] = 1e-22
@@ -119,7 +119,7 @@ def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_name
 
 def test_a_rate_that_is_not_finite_is_a_failure_that_keeps_the_state_and_names_the_culprit(scenarios, method):
     """A mass at the edge of floating point makes the passive tendon's acceleration infinite, and nothing else."""
-    table = scenarios["fig6"].model_dump()
+    table = scenarios["reversals"].model_dump()
     table["finger"]["passive_tendon"]["mass"] = 1e-320
     case = Case.of(ClosedLoop.from_scenario(fp.Scenario.model_validate(table)))
     x = case.loop.initial_state()
@@ -164,7 +164,7 @@ def test_steps_do_not_depend_on_the_size_of_the_record_nor_on_the_run(cases, met
 
 
 def test_an_advance_ends_exactly_where_it_is_told(cases, method):
-    part = cases["fig6"].part(method)
+    part = cases["reversals"].part(method)
     for end in (1e-9, 1e-3, 1e-3 + 1e-15, 0.1, 1.0 / 3.0):
         part.advance(end)
         assert part.time == end
@@ -173,7 +173,7 @@ def test_an_advance_ends_exactly_where_it_is_told(cases, method):
 @pytest.mark.parametrize("held", [False, True], ids=["continuous", "held"])
 def test_an_advance_by_next_to_nothing_costs_one_step(cases, method, held):
     """And the step size that was found before is not forgotten."""
-    case, taken = cases["fig6"], []
+    case, taken = cases["reversals"], []
     if held:
         case = case.held()
         case.control.tension[:] = [2.0, 2.0, 6.0, 4.0]

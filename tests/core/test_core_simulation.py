@@ -39,14 +39,14 @@ def open_share(result):
 @pytest.fixture(scope="module")
 def exact(scenarios):
     """Motions at the tightest tolerance, by the method of lower order."""
-    durations = {"fig6": 1.0, "stick_slip": 0.3, "none_passive": 1.0, "lugre": 0.3}
+    durations = {"reversals": 1.0, "stick_slip": 0.3, "none_passive": 1.0, "lugre": 0.3}
     return {
         name: run(scenarios[name], tolerance=1e-11, duration=duration, method="Rodas4")
         for name, duration in durations.items()
     }
 
 
-@pytest.mark.parametrize("name", ["fig6", "stick_slip", "none_passive", "lugre"])
+@pytest.mark.parametrize("name", ["reversals", "stick_slip", "none_passive", "lugre"])
 @pytest.mark.parametrize("method", METHODS)
 def test_compiled_methods_approach_one_motion_as_tolerances_shrink(scenarios, exact, name, method):
     """Through kinks, stiction and reversals: over two hundredths of the tolerance, ten times smaller for each."""
@@ -67,7 +67,7 @@ def test_scipy_s_radau_on_the_readable_model_gives_the_same_motion(scenarios, ex
 # A linearised flow makes too much of errors where joints stick and slip.
 @pytest.mark.filterwarnings("ignore::finger_pin.exceptions.AccuracyWarning")
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", ["fig6", "stick_slip", "none_passive", "two_passive"])
+@pytest.mark.parametrize("name", ["reversals", "stick_slip", "none_passive", "two_passive"])
 def test_the_energy_account_of_a_whole_simulation_closes_and_the_better_the_tighter(scenarios, name, method):
     """At the default tolerance to a millionth of what the actuators supply; durations are the scenarios' own."""
     duration = {"none_passive": 3.0, "two_passive": 2.0}.get(name)
@@ -81,8 +81,8 @@ def test_the_energy_account_of_a_whole_simulation_closes_and_the_better_the_tigh
 
 @pytest.fixture(scope="module")
 def damped(scenarios):
-    """`fig6` with joints so viscous that a small delay of the control has a small effect."""
-    table = scenarios["fig6"].model_dump()
+    """`reversals` with joints so viscous that a small delay of the control has a small effect."""
+    table = scenarios["reversals"].model_dump()
     table["finger"]["joint_friction"]["viscous"] = 0.02
     return fp.Scenario.model_validate(table)
 
@@ -102,7 +102,7 @@ def test_sampled_control_converges_to_the_continuous_one_with_first_order_in_the
 def test_the_energy_account_closes_under_sampled_control_and_the_better_the_tighter(scenarios, method, period):
     """The work of a step counts the tensions that were held in it, not those that begin at its end."""
     shares = [
-        open_share(run(scenarios["fig6"], tolerance=tolerance, duration=0.3, method=method, control_period=period))
+        open_share(run(scenarios["reversals"], tolerance=tolerance, duration=0.3, method=method, control_period=period))
         for tolerance in (1e-5, 1e-7)
     ]
     assert shares[0] < 1e-4
@@ -111,7 +111,7 @@ def test_the_energy_account_closes_under_sampled_control_and_the_better_the_tigh
 
 def test_recorded_tensions_are_held_within_a_period_and_step_at_its_multiples(scenarios):
     """3 ms over samples of 0.5 ms: six of each, and each is the law (19)-(22) at the sample that begins the period."""
-    scenario, period = scenarios["fig6"], 6
+    scenario, period = scenarios["reversals"], 6
     result = run(scenario, duration=0.0215, rate=2000.0, control_period=3e-3)
     commands = result.tendon_command.values[:, :4]
     assert len(commands) == 44
@@ -147,20 +147,20 @@ class Mine:
 
 @pytest.fixture(scope="module")
 def coupling(scenarios):
-    return fp.Finger(scenarios["fig6"].finger).coupling
+    return fp.Finger(scenarios["reversals"].finger).coupling
 
 
 def test_a_continuous_controller_in_python_is_integrated_by_scipy_and_gives_the_same_motion(scenarios, exact, coupling):
-    result = run(scenarios["fig6"], tolerance=1e-8, duration=0.03, controller=Mine(coupling))
+    result = run(scenarios["reversals"], tolerance=1e-8, duration=0.03, controller=Mine(coupling))
     assert result.attrs["method"] == "Radau"
-    assert run(scenarios["fig6"], duration=0.01).attrs["method"] == "Rodas5P"
-    assert gap(result, exact["fig6"]) < 1e-4
+    assert run(scenarios["reversals"], duration=0.01).attrs["method"] == "Rodas5P"
+    assert gap(result, exact["reversals"]) < 1e-4
 
 
 def test_a_sampled_controller_in_python_gives_the_motion_of_the_built_in_one(scenarios, coupling):
     settings = {"tolerance": 1e-10, "duration": 0.1, "control_period": 2e-3}
-    built_in = run(scenarios["fig6"], **settings)
-    result = run(scenarios["fig6"], controller=Mine(coupling), **settings)
+    built_in = run(scenarios["reversals"], **settings)
+    result = run(scenarios["reversals"], controller=Mine(coupling), **settings)
     assert result.attrs["method"] == "Rodas5P"
     assert gap(result, built_in) < 1e-6
 
@@ -170,9 +170,9 @@ def test_a_sampled_controller_that_breaks_ends_the_simulation_there_and_keeps_wh
     scenarios, coupling, method
 ):
     settings = {"duration": 0.05, "control_period": 2e-3, "method": method}
-    whole = run(scenarios["fig6"], controller=Mine(coupling), **settings)
+    whole = run(scenarios["reversals"], controller=Mine(coupling), **settings)
     with pytest.raises(IntegrationError) as caught:
-        run(scenarios["fig6"], controller=Mine(coupling, broken_after=0.0199), **settings)
+        run(scenarios["reversals"], controller=Mine(coupling, broken_after=0.0199), **settings)
     error = caught.value
     assert error.time == pytest.approx(0.02, rel=1e-12)
     assert "controller = nan: tensions must be finite" in error.reason and "that of T1" in error.reason
@@ -193,13 +193,13 @@ def test_a_stop_keeps_what_was_computed(scenarios, period):
     settings = {"duration": 1.0, "control_period": period}
     seen = []
     with pytest.raises(Interrupted) as caught:
-        run(scenarios["fig6"], progress=seen.append, stop=lambda: seen[-1] > 0.3, **settings)
+        run(scenarios["reversals"], progress=seen.append, stop=lambda: seen[-1] > 0.3, **settings)
     kept = caught.value.result
     assert 0.3 < caught.value.time < 0.95
     assert seen[-1] == caught.value.time == kept.attrs["end_time"]
     assert np.all(np.diff(seen) > 0.0)
     same = slice(0, len(kept.time) - 1)
-    whole = run(scenarios["fig6"], **settings).isel(time=same)
+    whole = run(scenarios["reversals"], **settings).isel(time=same)
     for name in kept.data_vars:
         rounding = 1e-15 if name.startswith("energy_") else 0.0
         np.testing.assert_allclose(kept[name].isel(time=same), whole[name], rtol=0.0, atol=rounding, err_msg=name)
@@ -229,12 +229,12 @@ def test_a_failure_of_the_core_tells_time_reason_and_advice_and_keeps_what_was_c
 
     monkeypatch.setattr(IslandIntegrator, "advance", failing)
     with pytest.raises(IntegrationError) as caught:
-        run(scenarios["fig6"], duration=1.0)
+        run(scenarios["reversals"], duration=1.0)
     monkeypatch.undo()
     error = caught.value
     assert 0.2 < error.time < 0.9
     assert error.reason.endswith("the error is largest in passive_velocity[T5]")
     assert error.advice in str(error) and f"t = {error.time:.6g} s" in str(error)
-    whole = run(scenarios["fig6"], duration=1.0).isel(time=slice(0, len(error.result.time)))
+    whole = run(scenarios["reversals"], duration=1.0).isel(time=slice(0, len(error.result.time)))
     for name in [each for each in whole if each.startswith("energy_exchanged_")] + ["joint_position"]:
         np.testing.assert_array_equal(error.result[name], whole[name])

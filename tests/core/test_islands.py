@@ -26,7 +26,7 @@ from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
 
 TIMES, TOLERANCE = np.linspace(0.0, 0.05, 26), 1e-6
-NAMES = ("fig6", "stick_slip", "none_passive", "two_passive", "lugre")
+NAMES = ("reversals", "stick_slip", "none_passive", "two_passive", "lugre")
 
 
 class Joined:

@@ -10,7 +10,7 @@ TOLERANCE = 1e-5
 
 
 def test_steps_that_end_at_reversals_move_in_between_as_exactly_as_at_their_ends():
-    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.4})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.4})
 
     def motion(tolerance):
         settings = {"rtol": tolerance, "atol_scale": tolerance}
@@ -25,7 +25,7 @@ def test_steps_that_end_at_reversals_move_in_between_as_exactly_as_at_their_ends
 
 def test_no_step_over_a_reversal_of_friction_errs_by_more_than_three_tolerances():
     """Each is compared with a run from its start at tight tolerances; unseen, reversals make ten of them."""
-    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.4})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.4})
     setup = Setup.of(scenario)
 
     def part(tolerance):

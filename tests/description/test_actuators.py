@@ -69,7 +69,7 @@ WRONG = {
 def test_a_wrong_actuator_is_an_error_of_one_line_that_names_the_entry(case):
     actuators, entry, says = WRONG[case]
     with pytest.raises(InputError) as caught:
-        load_finger("ub", {"finger.actuators": actuators})
+        load_finger("ub_stand_in", {"finger.actuators": actuators})
     message = str(caught.value)
     assert message.startswith(f"finger.actuators.{entry}") and says in message
     assert "\n" not in message
@@ -123,7 +123,7 @@ def test_a_position_drive_that_cannot_be_simulated_says_why(entry, value, says):
 def test_every_motor_ships_with_a_title_and_can_pull():
     assert set(list_motors()) == {"STS3215", "XC330-M288", "XL330-M288"} and all(list_motors().values())
     for name in list_motors():
-        motor = load_finger("ub", {"finger.actuators": {"M": {**SPOOL, "motor": name}}}).actuators["M"].motor
+        motor = load_finger("ub_stand_in", {"finger.actuators": {"M": {**SPOOL, "motor": name}}}).actuators["M"].motor
         assert all(number > 0.0 for number in motor.constants)
 
 

@@ -22,13 +22,13 @@ def test_every_shipped_finger_loads(name):
 
 
 def test_listings_have_a_line_about_each():
-    assert {"ub", "planar", "dexmart_index"} <= set(list_fingers())
-    assert {"fig6", "stick_slip"} <= set(list_scenarios())
+    assert {"ub_stand_in", "planar", "dexmart_index"} <= set(list_fingers())
+    assert {"reversals", "stick_slip"} <= set(list_scenarios())
     assert all({**list_fingers(), **list_scenarios()}.values())
 
 
 def test_fig6_is_the_papers_finger_with_the_published_friction_coefficient():
-    finger = load_scenario("fig6").finger
+    finger = load_scenario("reversals").finger
     assert tuple(finger.joints) == ("abduction", "proximal", "medial", "distal")
     assert tuple(finger.tendons) == ("T1", "T2", "T3", "T4", "T5")
     assert finger.passive_names == ("T5",)
@@ -55,7 +55,7 @@ def test_the_resolved_text_gives_the_same_trajectory_to_the_last_bit(tmp_path):
 
 
 def test_the_resolved_text_stands_alone(tmp_path):
-    scenario = load_scenario("fig6", {"finger.base": "dexmart_index"})
+    scenario = load_scenario("reversals", {"finger.base": "dexmart_index"})
     table = tomllib.loads(to_toml(scenario))
     assert table["finger"]["joints"]["proximal"]["link"]["length"] == 0.038
     assert "base" not in table["finger"]
@@ -73,7 +73,7 @@ def test_overrides_win_over_the_file(tmp_path):
 @pytest.mark.parametrize("overrides", [["controller.gain"], "controller.gain=2", 2.0])
 def test_overrides_that_are_no_mapping_are_refused(overrides):
     with pytest.raises(fp.InputError, match=r"overrides = .*: must be values by dotted key"):
-        fp.load_scenario("fig6", overrides)
+        fp.load_scenario("reversals", overrides)
 
 
 def test_a_joint_that_the_file_leaves_at_rest_may_be_moved_by_an_override(tmp_path):
@@ -86,7 +86,7 @@ def test_an_override_may_replace_the_finger_and_change_the_new_one_in_either_ord
     expected = load_finger("dexmart_index").joints["medial"].link.length
     for keys in (("finger.gravity", "finger"), ("finger", "finger.gravity")):
         values = {"finger": "dexmart_index", "finger.gravity": [1.0, 2.0, 3.0]}
-        scenario = load_scenario("fig6", {key: values[key] for key in keys})
+        scenario = load_scenario("reversals", {key: values[key] for key in keys})
         assert scenario.finger.joints["medial"].link.length == expected
         assert scenario.finger.gravity == (1.0, 2.0, 3.0)
 
@@ -96,31 +96,34 @@ def test_an_override_of_a_hand_s_fingers_says_what_the_same_lines_in_a_file_say(
     for lines, overrides in (
         ('thumb = "dexmart_index"', {"hand.fingers": {"thumb": "dexmart_index"}}),
         (
-            'thumb = "ub"\nindex = {scale = 1.2}',
-            {"hand.fingers": {"thumb": "ub"}, "hand.fingers.index": {"scale": 1.2}},
+            'thumb = "ub_stand_in"\nindex = {scale = 1.2}',
+            {"hand.fingers": {"thumb": "ub_stand_in"}, "hand.fingers.index": {"scale": 1.2}},
         ),
         (
-            'thumb = {finger = {base = "ub"}, scale = 2.0}',
-            {"hand.fingers.thumb": {"finger": {"base": "ub"}, "scale": 2}},
+            'thumb = {finger = {base = "ub_stand_in"}, scale = 2.0}',
+            {"hand.fingers.thumb": {"finger": {"base": "ub_stand_in"}, "scale": 2}},
         ),
     ):
         path.write_text(f'extends = "hand"\nname = "hand"\n[hand.fingers]\n{lines}\n')
         assert load_scenario("hand", overrides) == load_scenario(path)
-    for name, key in (("fig6", "hand.fingers.thumb.finger"), ("hand", "finger.gravity")):
+    for name, key in (("reversals", "hand.fingers.thumb.finger"), ("hand", "finger.gravity")):
         with pytest.raises(InputError, match=f"{key}: there is (one finger|a hand)"):
-            load_scenario(name, {key: "ub"})
+            load_scenario(name, {key: "ub_stand_in"})
 
 
 def test_overrides_are_not_changed_by_loading():
-    overrides = {"finger": {"base": "ub", "joint_friction": {"viscous": 0.01}}, "finger.joint_friction.stiffness": 7.0}
-    load_scenario("fig6", overrides)
-    assert overrides["finger"] == {"base": "ub", "joint_friction": {"viscous": 0.01}}
+    overrides = {
+        "finger": {"base": "ub_stand_in", "joint_friction": {"viscous": 0.01}},
+        "finger.joint_friction.stiffness": 7.0,
+    }
+    load_scenario("reversals", overrides)
+    assert overrides["finger"] == {"base": "ub_stand_in", "joint_friction": {"viscous": 0.01}}
     assert len(overrides) == 2
 
 
 def test_one_number_or_one_per_item_are_both_accepted_and_order_is_that_of_the_finger():
     scenario = load_scenario(
-        "fig6", {"controller.gain": [1, 2, 3, 4], "finger.tendon_friction.coulomb": [0.1, 0.2, 0.3, 0.4, 0.5]}
+        "reversals", {"controller.gain": [1, 2, 3, 4], "finger.tendon_friction.coulomb": [0.1, 0.2, 0.3, 0.4, 0.5]}
     )
     assert scenario.controller.gain == (1.0, 2.0, 3.0, 4.0)
     assert scenario.finger.tendon_friction.coulomb == (0.1, 0.2, 0.3, 0.4, 0.5)
@@ -128,8 +131,8 @@ def test_one_number_or_one_per_item_are_both_accepted_and_order_is_that_of_the_f
 
 
 def test_a_scenario_extends_another_and_keeps_its_own_name(tmp_path):
-    (tmp_path / "softer one.toml").write_text('extends = "fig6"\n[controller]\ngain = 0.5\n')
-    scenario, base = load_scenario(tmp_path / "softer one.toml"), load_scenario("fig6")
+    (tmp_path / "softer one.toml").write_text('extends = "reversals"\n[controller]\ngain = 0.5\n')
+    scenario, base = load_scenario(tmp_path / "softer one.toml"), load_scenario("reversals")
     assert scenario.controller.gain == 0.5
     assert scenario.name == "softer_one"
     assert scenario.updated(controller=base.controller, name=base.name) == base
@@ -137,7 +140,7 @@ def test_a_scenario_extends_another_and_keeps_its_own_name(tmp_path):
 
 def test_extends_reaches_across_folders_and_generations(tmp_path):
     (tmp_path / "inner").mkdir()
-    (tmp_path / "s.toml").write_text('extends = "fig6"\n[simulation]\nduration = 1.0\nrtol = 1e-5\n')
+    (tmp_path / "s.toml").write_text('extends = "reversals"\n[simulation]\nduration = 1.0\nrtol = 1e-5\n')
     (tmp_path / "inner" / "s.toml").write_text('extends = "../s.toml"\n[simulation]\nduration = 2.0\n')
     scenario = load_scenario(tmp_path / "inner" / "s.toml")
     assert (scenario.simulation.duration, scenario.simulation.rtol) == (2.0, 1e-5)
@@ -161,24 +164,24 @@ def test_files_of_the_same_name_in_nested_folders_are_no_circle(tmp_path):
     folder.mkdir(parents=True)
     (folder / "s.toml").write_text('extends = "../s.toml"\n')
     (tmp_path / "a" / "s.toml").write_text('extends = "../s.toml"\n')
-    (tmp_path / "s.toml").write_text('extends = "fig6"\n[controller]\ngain = 0.25\n')
+    (tmp_path / "s.toml").write_text('extends = "reversals"\n[controller]\ngain = 0.25\n')
     assert load_scenario(folder / "s.toml").controller.gain == 0.25
 
 
 def test_a_finger_is_changed_on_top_of_a_base(tmp_path):
     (tmp_path / "s.toml").write_text(
-        'extends = "fig6"\n[finger]\nbase = "ub"\n[finger.joints.distal.link]\nlength = 0.025\n'
+        'extends = "reversals"\n[finger]\nbase = "ub_stand_in"\n[finger.joints.distal.link]\nlength = 0.025\n'
     )
-    finger, base = load_scenario(tmp_path / "s.toml").finger, load_finger("ub")
+    finger, base = load_scenario(tmp_path / "s.toml").finger, load_finger("ub_stand_in")
     assert finger.joints["distal"].link.length == 0.025
     assert finger.joints["distal"].link.mass == base.joints["distal"].link.mass
     assert finger.joints["medial"] == base.joints["medial"]
-    assert finger.name == "ub"
+    assert finger.name == "ub_stand_in"
 
 
 def test_entries_of_finger_without_a_base_change_the_finger_of_the_parent(tmp_path):
-    (tmp_path / "s.toml").write_text('extends = "fig6"\n[finger.tendon_friction]\ncoulomb = 0.2\n')
-    finger, base = load_scenario(tmp_path / "s.toml").finger, load_finger("ub")
+    (tmp_path / "s.toml").write_text('extends = "reversals"\n[finger.tendon_friction]\ncoulomb = 0.2\n')
+    finger, base = load_scenario(tmp_path / "s.toml").finger, load_finger("ub_stand_in")
     assert finger.tendon_friction.coulomb == 0.2
     assert finger.tendon_friction.stiffness == base.tendon_friction.stiffness
     assert finger.joints == base.joints
@@ -225,7 +228,9 @@ def test_a_scenario_without_a_name_is_called_after_its_file_in_plain_letters(ste
 
 
 def test_descriptions_are_printed_in_a_line():
-    printed = [str(each) for each in (fp.load_scenario("fig6"), fp.load_scenario("hand"), fp.load_finger("ub"))]
-    assert printed[0] == "<Scenario fig6: 8 s of <FingerDescription ub: 4 joints, 5 tendons>>"
+    printed = [
+        str(each) for each in (fp.load_scenario("reversals"), fp.load_scenario("hand"), fp.load_finger("ub_stand_in"))
+    ]
+    assert printed[0] == "<Scenario reversals: 8 s of <FingerDescription ub_stand_in: 4 joints, 5 tendons>>"
     assert "fingers thumb, index, middle, ring, little" in printed[1]
-    assert max(map(len, printed)) < 120 and f"[{printed[2]}]" == repr([fp.load_finger("ub")])
+    assert max(map(len, printed)) < 120 and f"[{printed[2]}]" == repr([fp.load_finger("ub_stand_in")])

@@ -166,7 +166,7 @@ def test_redundant_tendons_that_all_pull_one_way_are_no_force_closure(network):
 
 def test_a_scenario_whose_finger_lacks_force_closure_is_refused():
     with pytest.raises(InputError, match="T1, T2 cannot be kept taut") as caught:
-        fp.load_scenario("fig6", {"finger.tendons.T4.crossings.proximal.radius": 0.0053})
+        fp.load_scenario("reversals", {"finger.tendons.T4.crossings.proximal.radius": 0.0053})
     assert caught.value.entry == "finger.tendons"
 
 

@@ -19,17 +19,17 @@ def write(folder, name, text):
 
 def test_columns_of_a_file_beside_the_scenario_become_samples_of_their_joints(tmp_path):
     write(tmp_path, "motion.csv", MOTION)
-    path = write(tmp_path, "mine.toml", 'extends = "fig6"\n[reference]\nfile = "motion.csv"\n')
+    path = write(tmp_path, "mine.toml", 'extends = "reversals"\n[reference]\nfile = "motion.csv"\n')
     joints = fp.load_scenario(path).reference.joints
     assert joints["medial"].kind == "samples" and joints["medial"].times == (0.0, 0.5, 1.0)
     assert joints["medial"].values == (0.2, 0.3, 0.4) and joints["medial"].offset == 0.0
-    assert joints["proximal"] == fp.load_scenario("fig6").reference.joints["proximal"]
+    assert joints["proximal"] == fp.load_scenario("reversals").reference.joints["proximal"]
 
 
 def test_a_path_in_an_override_is_relative_to_the_working_directory(tmp_path, monkeypatch):
     write(tmp_path, "motion.csv", MOTION)
     monkeypatch.chdir(tmp_path)
-    assert fp.load_scenario("fig6", {"reference.file": "motion.csv"}).reference.joints["medial"].kind == "samples"
+    assert fp.load_scenario("reversals", {"reference.file": "motion.csv"}).reference.joints["medial"].kind == "samples"
 
 
 def test_the_written_scenario_needs_no_other_file(tmp_path):
@@ -37,7 +37,7 @@ def test_the_written_scenario_needs_no_other_file(tmp_path):
     pulls = write(tmp_path, "pulls.csv", "time,T1,T3\n0,1,4\n2,2,5\n")
     force = write(tmp_path, "force.csv", "time,z\n0,0\n2,-0.5\n")
     scenario = fp.load_scenario(
-        "fig6",
+        "reversals",
         {
             "reference.file": str(motion),
             "controller": {"kind": "tensions", "file": str(pulls)},
@@ -53,7 +53,9 @@ def test_the_written_scenario_needs_no_other_file(tmp_path):
 
 def test_a_signal_of_another_kind_replaces_the_one_that_is_extended_and_keeps_nothing_of_it(tmp_path):
     path = write(
-        tmp_path, "mine.toml", 'extends = "fig6"\n[reference.joints.medial]\nkind = "step"\ntime = 1.0\nheight = 0.2\n'
+        tmp_path,
+        "mine.toml",
+        'extends = "reversals"\n[reference.joints.medial]\nkind = "step"\ntime = 1.0\nheight = 0.2\n',
     )
     medial = fp.load_scenario(path).reference.joints["medial"]
     assert (medial.amplitude, medial.offset, medial.height) == (0.0, 0.0, 0.2)
@@ -62,12 +64,12 @@ def test_a_signal_of_another_kind_replaces_the_one_that_is_extended_and_keeps_no
 def test_the_kind_may_be_overridden_before_or_after_what_belongs_to_it():
     key = "reference.joints.medial"
     overrides = {f"{key}.time": 1.0, f"{key}.height": 0.2, f"{key}.kind": "step", f"{key}.offset": 0.1}
-    medial = fp.load_scenario("fig6", overrides).reference.joints["medial"]
+    medial = fp.load_scenario("reversals", overrides).reference.joints["medial"]
     assert (medial.kind, medial.amplitude, medial.offset, medial.height) == ("step", 0.0, 0.1, 0.2)
 
 
 def test_what_is_not_asked_for_is_not_written():
-    written = tomllib.loads(fp.to_toml(fp.load_scenario("fig6")))
+    written = tomllib.loads(fp.to_toml(fp.load_scenario("reversals")))
     assert "tensions" not in written["controller"] and set(written["environment"]) == {"fingertip_force"}
     assert set(written["reference"]["joints"]["medial"]) == {"kind", "offset", "amplitude", "frequency", "phase"}
 
@@ -98,7 +100,7 @@ WRONG = [
 @pytest.mark.parametrize(("overrides", "entry", "said"), WRONG, ids=[each[1] for each in WRONG])
 def test_a_wrong_entry_is_named_in_one_line(overrides, entry, said):
     with pytest.raises(InputError) as caught:
-        fp.load_scenario("fig6", overrides)
+        fp.load_scenario("reversals", overrides)
     assert caught.value.entry == entry
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
@@ -114,7 +116,7 @@ PULLS = [
 @pytest.mark.parametrize(("table", "entry", "said"), PULLS, ids=[each[1] for each in PULLS])
 def test_tensions_that_cannot_be_are_named_in_one_line(table, entry, said):
     with pytest.raises(InputError) as caught:
-        fp.load_scenario("fig6", {"controller": {"kind": "tensions"} | table})
+        fp.load_scenario("reversals", {"controller": {"kind": "tensions"} | table})
     assert caught.value.entry == entry and said in str(caught.value)
 
 
@@ -141,7 +143,7 @@ COLUMNS = [
 def test_what_is_wrong_in_a_file_of_columns_is_named_in_one_line(tmp_path, text, said):
     path = write(tmp_path, "motion.csv", text)
     with pytest.raises(InputError) as caught:
-        fp.load_scenario("fig6", {"reference.file": str(path)})
+        fp.load_scenario("reversals", {"reference.file": str(path)})
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -152,14 +154,14 @@ def test_many_samples_are_read_alike_at_once_and_row_by_row_and_written_bit_for_
     # What is quoted is read row by row.
     for header in ("time,medial", 'time,"medial"'):
         path = write(tmp_path, "motion.csv", "\n".join([header, *rows]))
-        loaded.append(fp.load_scenario("fig6", {"reference.file": str(path)}))
+        loaded.append(fp.load_scenario("reversals", {"reference.file": str(path)}))
     medial = loaded[0].reference.joints["medial"]
     assert loaded[0] == loaded[1] and medial.times == tuple(times) and medial.values == tuple(angles)
     text = fp.to_toml(loaded[0])
     assert fp.load_scenario(write(tmp_path, "again.toml", text)) == loaded[0] and len(text) < 250_000
     # Both signals of another file, and their times once, in 4 letters for 3 of 8 bytes each.
     both = "\n".join(["time,medial,proximal", *(f"{row},0.25" for row in rows)])
-    given = fp.load_scenario("fig6", {"reference.file": str(write(tmp_path, "both.csv", both))})
+    given = fp.load_scenario("reversals", {"reference.file": str(write(tmp_path, "both.csv", both))})
     doubles = 3 * 8 * len(times) * 4 / 3
     assert doubles < len(fp.to_toml(given)) < doubles + 10_000
     assert fp.load_scenario(write(tmp_path, "both.toml", fp.to_toml(given))) == given
@@ -170,7 +172,7 @@ def test_many_samples_are_read_alike_at_once_and_row_by_row_and_written_bit_for_
 
 def test_a_missing_file_of_columns_is_named():
     with pytest.raises(InputError, match=r"reference.file .*nowhere.csv: there is no such file"):
-        fp.load_scenario("fig6", {"reference.file": "nowhere.csv"})
+        fp.load_scenario("reversals", {"reference.file": "nowhere.csv"})
 
 
 SPELT = [
@@ -183,7 +185,9 @@ SPELT = [
 
 @pytest.mark.parametrize("text", SPELT, ids=["semicolons", "decimal commas", "units", "units in names"])
 def test_a_motion_is_read_from_the_files_that_recordings_are_read_from(tmp_path, text):
-    joints = fp.load_scenario("fig6", {"reference.file": str(write(tmp_path, "motion.csv", text))}).reference.joints
+    joints = fp.load_scenario(
+        "reversals", {"reference.file": str(write(tmp_path, "motion.csv", text))}
+    ).reference.joints
     assert joints["medial"].times == joints["proximal"].times == pytest.approx((0.0, 0.5, 1.0), abs=1e-15)
     assert joints["proximal"].values == pytest.approx((0.1, 0.3, 0.7), abs=1e-15)
     assert joints["medial"].values == pytest.approx((0.1, 0.2, 0.4), abs=1e-15)
@@ -194,13 +198,13 @@ def test_a_table_tells_the_times_names_units_and_delays_of_a_files_columns(tmp_p
     path = write(
         tmp_path,
         "mine.toml",
-        'extends = "fig6"\n[reference.file]\npath = "rig.csv"\ntime = { column = "clock", unit = "ms" }\n'
+        'extends = "reversals"\n[reference.file]\npath = "rig.csv"\ntime = { column = "clock", unit = "ms" }\n'
         'columns = { medial = { column = "q2", unit = "deg", delay = 0.1 } }\n',
     )
     joints = fp.load_scenario(path).reference.joints
     assert joints["medial"].values == pytest.approx(np.pi * np.array([0.1, 0.2, 0.3]))
     assert joints["medial"].times == pytest.approx((-0.1, 0.4, 0.9))
-    assert joints["proximal"] == fp.load_scenario("fig6").reference.joints["proximal"]
+    assert joints["proximal"] == fp.load_scenario("reversals").reference.joints["proximal"]
     for change, said in [
         (("clock", "clack"), 'reference.file.time = "clack": no such column'),
         (("delay", "dely"), "did you mean reference.file.columns.medial.delay?"),
@@ -215,4 +219,4 @@ def test_a_table_tells_the_times_names_units_and_delays_of_a_files_columns(tmp_p
 
 def test_slow_motions_are_taken_where_the_unit_says_so(tmp_path):
     motion = write(tmp_path, "motion.csv", "t (s),medial\n0,0.1\n500,0.2\n1000,0.3\n")
-    assert fp.load_scenario("fig6", {"reference.file": str(motion)}).reference.joints["medial"].times[-1] == 1000.0
+    assert fp.load_scenario("reversals", {"reference.file": str(motion)}).reference.joints["medial"].times[-1] == 1000.0

@@ -168,8 +168,8 @@ def test_without_springs_force_closure_is_asked_for_as_before(flexors):
 
 def test_the_paper_s_controller_holds_the_springs_where_it_is_told_to(tmp_path):
     sprung = {"finger.joints.medial.spring": {"stiffness": 0.05, "rest": -0.2}}
-    plain = fp.control.build_controller(fp.load_scenario("fig6", sprung))
-    told = fp.control.build_controller(fp.load_scenario("fig6", sprung | {"controller.spring_compensation": True}))
+    plain = fp.control.build_controller(fp.load_scenario("reversals", sprung))
+    told = fp.control.build_controller(fp.load_scenario("reversals", sprung | {"controller.spring_compensation": True}))
     position = np.array([0.0, 0.3, 0.6, 0.4])
     torques = []
     for controller in (plain, told):
@@ -226,7 +226,7 @@ def test_in_a_hand_only_the_finger_that_needs_it_is_in_open_loop(flexor, tmp_pat
 name = "two"
 [hand.fingers]
 one.finger = "flexor.toml"
-two.finger = "ub"
+two.finger = "ub_stand_in"
 [controller]
 minimum_tension = 2.0
 [simulation]

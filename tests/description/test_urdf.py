@@ -24,13 +24,13 @@ def finger(request):
 @pytest.mark.parametrize(
     "name, overrides, closed_form",
     [
-        ("ub", {}, equation_1),
-        ("ub", OTHER_LENGTHS, equation_1),
+        ("ub_stand_in", {}, equation_1),
+        ("ub_stand_in", OTHER_LENGTHS, equation_1),
         ("dexmart_index", {}, equation_1),
         ("planar", {}, planar_tip),
         ("planar", {"finger.joints.distal.link.length": 0.019}, planar_tip),
     ],
-    ids=["ub", "other lengths", "dexmart_index", "planar", "planar, other length"],
+    ids=["ub_stand_in", "other lengths", "dexmart_index", "planar", "planar, other length"],
 )
 def test_pinocchio_and_yourdfpy_place_the_fingertip_where_equation_1_does(name, overrides, closed_form):
     finger = load_finger(name, overrides)
@@ -47,7 +47,7 @@ def test_pinocchio_and_yourdfpy_place_the_fingertip_where_equation_1_does(name, 
 
 
 def test_the_straight_finger_reaches_the_sum_of_table_1():
-    tip = build_rigid_body(load_finger("ub")).tip_position(np.zeros(4))
+    tip = build_rigid_body(load_finger("ub_stand_in")).tip_position(np.zeros(4))
     np.testing.assert_allclose(tip, [0.0202 + 0.045 + 0.0299 + 0.0218, 0.0, 0.0], rtol=0, atol=1e-15)
 
 
@@ -76,7 +76,7 @@ def test_joint_offsets_place_the_fingertip_where_the_denavit_hartenberg_table_do
     offsets = {
         f"finger.joints.{name}.link.offset": d for name, d in zip(JOINTS, (4e-3, -7e-3, 2e-3, 9e-3), strict=True)
     }
-    finger = load_finger("ub", offsets | {"finger.joints.medial.link.twist": 0.6})
+    finger = load_finger("ub_stand_in", offsets | {"finger.joints.medial.link.twist": 0.6})
     body, robot = build_rigid_body(finger), read_by_yourdfpy(to_urdf(finger))
     for q in np.random.default_rng(6).uniform(-2.0, 2.0, (10, 4)):
         frame = np.eye(4)
@@ -88,7 +88,7 @@ def test_joint_offsets_place_the_fingertip_where_the_denavit_hartenberg_table_do
 
 
 def test_a_link_with_an_offset_has_its_mass_and_its_shape_there():
-    finger = load_finger("ub", {"finger.joints.medial.link.offset": 7e-3})
+    finger = load_finger("ub_stand_in", {"finger.joints.medial.link.offset": 7e-3})
     urdf = to_urdf(finger)
     model, robot = build_rigid_body(finger).model, read_by_yourdfpy(urdf)
     np.testing.assert_allclose(model.inertias[3].lever, [0.5 * 0.0299, 0.0, 7e-3], rtol=1e-12)
@@ -119,13 +119,13 @@ def test_masses_centres_and_inertias_survive_the_round_trip_in_yourdfpy(finger):
 
 def test_the_published_masses_and_inertias_are_those_of_the_shipped_finger():
     rows = [(0.0050, 2.8e-7, 2.0e-7), (0.0101, 1.9e-6, 3.6e-7), (0.0060, 5.4e-7, 1.9e-7), (0.0038, 2.0e-7, 9.3e-8)]
-    for inertia, row in zip(list(build_rigid_body(load_finger("ub")).model.inertias)[1:], rows, strict=True):
+    for inertia, row in zip(list(build_rigid_body(load_finger("ub_stand_in")).model.inertias)[1:], rows, strict=True):
         tensor = inertia.inertia
         np.testing.assert_allclose((inertia.mass, tensor[1, 1], tensor[0, 0]), row, rtol=1e-14)
 
 
 def test_the_dexmart_links_have_the_density_of_the_first_finger():
-    scaled, original = (links_of(load_finger(name)) for name in ("dexmart_index", "ub"))
+    scaled, original = (links_of(load_finger(name)) for name in ("dexmart_index", "ub_stand_in"))
     for one, other in zip(scaled, original, strict=True):
         assert one.width == other.width
         assert one.mass / one.length == pytest.approx(other.mass / other.length, rel=0.002)
@@ -141,13 +141,13 @@ def test_joint_limits_are_the_ranges_of_the_description(finger):
 
 
 def test_the_paper_s_finger_abducts_by_ten_degrees_and_flexes_by_ninety():
-    model = build_rigid_body(load_finger("ub")).model
+    model = build_rigid_body(load_finger("ub_stand_in")).model
     np.testing.assert_allclose(np.degrees(model.lowerPositionLimit), [-10, 0, 0, 0], rtol=1e-14)
     np.testing.assert_allclose(np.degrees(model.upperPositionLimit), [10, 90, 90, 90], rtol=1e-14)
 
 
 def test_effort_limits_are_the_torques_of_a_hundred_newtons_on_each_tendon_of_the_stronger_side():
-    model = build_rigid_body(load_finger("ub")).model
+    model = build_rigid_body(load_finger("ub_stand_in")).model
     by_hand = [100 * 0.008, 100 * (0.008 + 0.008), 100 * (0.0053 + 0.0035), 100 * 0.0053]
     np.testing.assert_allclose(model.upperEffortLimit, by_hand, rtol=1e-14)
     np.testing.assert_allclose(model.upperVelocityLimit, 20.0)

@@ -110,7 +110,7 @@ def pulley_radius(urdf, joint):
 
 
 def test_a_pulley_has_the_largest_winding_radius_of_its_joint():
-    urdf = to_urdf(load_finger("ub"))
+    urdf = to_urdf(load_finger("ub_stand_in"))
     largest = [pulley_radius(urdf, name) for name in ("abduction", "proximal", "medial", "distal")]
     assert largest == [0.008, 0.008, 0.0063, 0.0053]
 
@@ -118,4 +118,4 @@ def test_a_pulley_has_the_largest_winding_radius_of_its_joint():
 def test_a_pulley_never_sticks_out_of_the_finger_nor_vanishes_in_it():
     for given, drawn in ((0.1, 0.5 * 0.014), (1e-5, 0.3 * 0.014)):
         radii = {f"finger.tendons.{tendon}.crossings.distal.radius": given for tendon in ("T4", "T5")}
-        assert pulley_radius(to_urdf(load_finger("ub", radii)), "distal") == pytest.approx(drawn)
+        assert pulley_radius(to_urdf(load_finger("ub_stand_in", radii)), "distal") == pytest.approx(drawn)

@@ -16,7 +16,7 @@ def load_overridden(text):
         parsed = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         parsed = value
-    return load_scenario("fig6", {key: parsed})
+    return load_scenario("reversals", {key: parsed})
 
 
 @pytest.mark.parametrize(("text", "entry", "says"), OVERRIDES, ids=[text[:60] for text, _, _ in OVERRIDES])
@@ -54,7 +54,7 @@ def test_a_wrong_file_is_an_error_of_one_line_that_names_the_entry(case, tmp_pat
         ("stickslip", "did you mean stick_slip?"),
         ("absent.toml", "no such file"),
         ("no/such/folder/s.toml", "no such file"),
-        ("../fig6", "no such file"),
+        ("../reversals", "no such file"),
         ("/", "cannot be read"),
         (".", "no such scenario"),
         ("~nobody_of_this_name/s.toml", "no such file"),
@@ -84,15 +84,15 @@ def test_a_file_that_may_not_be_read_is_an_error_that_names_it(tmp_path, monkeyp
 
 
 def test_of_a_misspelt_key_and_the_entry_that_it_leaves_missing_the_misspelt_key_is_named():
-    finger = tomllib.loads(to_toml(load_finger("ub")))
+    finger = tomllib.loads(to_toml(load_finger("ub_stand_in")))
     finger["joints"]["medial"]["link"]["lenght"] = finger["joints"]["medial"]["link"].pop("length")
     with pytest.raises(InputError, match=r"did you mean finger\.joints\.medial\.link\.length"):
-        load_scenario("fig6", {"finger": finger})
+        load_scenario("reversals", {"finger": finger})
 
 
 def test_an_input_error_carries_entry_value_and_what_is_allowed():
     with pytest.raises(InputError) as caught:
-        load_scenario("fig6", {"controller.gain": -2.0})
+        load_scenario("reversals", {"controller.gain": -2.0})
     assert caught.value.entry == "controller.gain"
     assert caught.value.value == -2.0
     assert "at least 0" in caught.value.allowed
@@ -107,5 +107,5 @@ def test_values_in_messages_are_written_as_in_toml():
         (False, "false"),
     ):
         with pytest.raises(InputError) as caught:
-            load_scenario("fig6", {"finger.gravity": value})
+            load_scenario("reversals", {"finger.gravity": value})
         assert str(caught.value).startswith(f"finger.gravity = {text}: ")

@@ -11,11 +11,11 @@ JOINTS = ("abduction", "proximal", "medial", "distal")
 SQUARE = {f"finger.joints.{name}.link.section": "square" for name in JOINTS}
 
 FINGERS = {
-    "ub": ("ub", {}),
+    "ub_stand_in": ("ub_stand_in", {}),
     "dexmart_index": ("dexmart_index", {}),
     "planar": ("planar", {}),
-    "other lengths": ("ub", OTHER_LENGTHS),
-    "square": ("ub", SQUARE),
+    "other lengths": ("ub_stand_in", OTHER_LENGTHS),
+    "square": ("ub_stand_in", SQUARE),
 }
 
 

@@ -18,7 +18,7 @@ mujoco = pytest.importorskip("mujoco")
 
 TWO_PASSIVE = {
     "finger": {
-        "base": "ub",
+        "base": "ub_stand_in",
         "tendons": {
             "T6": {
                 "kind": "passive",
@@ -69,8 +69,8 @@ def random_states(finger, count, slack):
 
 @pytest.mark.parametrize(
     "name, overrides",
-    [("ub", {}), ("dexmart_index", {}), ("planar", {}), ("ub", TWO_PASSIVE)],
-    ids=["ub", "dexmart_index", "planar", "two passive tendons"],
+    [("ub_stand_in", {}), ("dexmart_index", {}), ("planar", {}), ("ub_stand_in", TWO_PASSIVE)],
+    ids=["ub_stand_in", "dexmart_index", "planar", "two passive tendons"],
 )
 def test_mujoco_finds_the_accelerations_of_our_equation_18_at_any_state(name, overrides):
     description = fp.load_finger(name, {**overrides, "finger.stroke_limiter.stiffness": 0.0})
@@ -90,7 +90,7 @@ def test_mujoco_finds_the_accelerations_of_our_equation_18_at_any_state(name, ov
 
 
 def test_without_masses_a_passive_tendon_is_one_spring_k_t_that_only_pulls():
-    description = fp.load_finger("ub")
+    description = fp.load_finger("ub_stand_in")
     finger, model = fp.Finger(description), load(to_mjcf(description, massless=True))
     assert (model.nq, model.ntendon) == (4, 5)
     for position, velocity, _, _, command in random_states(finger, 50, slack=0.0):
@@ -103,7 +103,9 @@ def test_without_masses_a_passive_tendon_is_one_spring_k_t_that_only_pulls():
         np.testing.assert_allclose(data.qacc, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("name, overrides", [("fig6", {}), ("fig6", SOFT)], ids=["fig6", "soft passive tendon"])
+@pytest.mark.parametrize(
+    "name, overrides", [("reversals", {}), ("reversals", SOFT)], ids=["reversals", "soft passive tendon"]
+)
 def test_mujoco_converges_to_our_trajectory_at_the_first_order_of_its_time_step(name, overrides):
     found = mujoco_motion.converge(name, overrides)
     result, finger = found.ours, found.scenario.finger
@@ -172,7 +174,7 @@ def test_shapes_are_those_of_the_urdf_and_do_not_collide_with_each_other(name):
 
 
 def test_a_ball_that_is_dropped_on_the_finger_touches_it():
-    root = ET.fromstring(to_mjcf(fp.load_finger("ub", {"finger.gravity": [0.0, 0.0, 0.0]})))
+    root = ET.fromstring(to_mjcf(fp.load_finger("ub_stand_in", {"finger.gravity": [0.0, 0.0, 0.0]})))
     ball = ET.SubElement(root.find("worldbody"), "body", pos="0.04 0 0.012")
     ET.SubElement(ball, "freejoint")
     ET.SubElement(ball, "geom", size="0.005", mass="0.01")
@@ -182,7 +184,7 @@ def test_a_ball_that_is_dropped_on_the_finger_touches_it():
 
 
 def test_the_keyframe_holds_the_posture_with_both_halves_stretched_alike():
-    description = fp.load_finger("ub")
+    description = fp.load_finger("ub_stand_in")
     posture = [0.1, 0.5, 0.6, 0.3]
     model = load(to_mjcf(description, posture=posture))
     np.testing.assert_allclose(model.key_qpos[0], [*posture, 0.5 * (0.0035 * 0.6 + 0.005 * 0.3)], rtol=1e-15)
@@ -190,13 +192,13 @@ def test_the_keyframe_holds_the_posture_with_both_halves_stretched_alike():
 
 def test_gravity_does_not_act_on_the_lumped_mass():
     for gravity in ([0.0, 0.0, -9.81], [3.0, -4.0, 5.0], [0.0, 0.0, 0.0]):
-        model = load(to_mjcf(fp.load_finger("ub", {"finger.gravity": gravity})))
+        model = load(to_mjcf(fp.load_finger("ub_stand_in", {"finger.gravity": gravity})))
         data = forward(model, model.qpos0, 0.0, 0.0)
         assert abs(data.qfrc_bias[4]) < 1e-19
 
 
 def test_the_file_lists_at_its_head_what_is_left_out():
-    text = to_mjcf(fp.load_finger("ub"))
+    text = to_mjcf(fp.load_finger("ub_stand_in"))
     head = text[: text.index("-->")]
     for phrase in ("stiction and Coulomb", "stroke limiters", "at zero", "fingertip", "clamped", "lumped mass"):
         assert phrase in head
@@ -205,7 +207,7 @@ def test_the_file_lists_at_its_head_what_is_left_out():
 
 
 def test_numbers_in_the_file_are_read_back_as_the_same_floats():
-    description = fp.load_finger("ub", {"finger.passive_tendon.stiffness": 12345.678901234567})
+    description = fp.load_finger("ub_stand_in", {"finger.passive_tendon.stiffness": 12345.678901234567})
     model = load(to_mjcf(description, timestep=1.2345678901234567e-6))
     assert model.opt.timestep == 1.2345678901234567e-6
     assert model.tendon_stiffness[model.tendon("T5_distal").id] == 2.0 * 12345.678901234567
@@ -217,14 +219,14 @@ def test_numbers_in_the_file_are_read_back_as_the_same_floats():
 )
 def test_wrong_options_are_errors_that_name_them(options, entry):
     with pytest.raises(InputError) as caught:
-        to_mjcf(fp.load_finger("ub"), **options)
+        to_mjcf(fp.load_finger("ub_stand_in"), **options)
     assert caught.value.entry == entry
 
 
 def test_a_scenario_is_exported_as_its_finger_or_hand_is():
-    assert to_mjcf(fp.load_scenario("fig6")) == to_mjcf(fp.load_finger("ub"))
+    assert to_mjcf(fp.load_scenario("reversals")) == to_mjcf(fp.load_finger("ub_stand_in"))
     assert to_mjcf(fp.load_scenario("hand")) == to_mjcf(fp.load_hand("ub_hand"))
-    assert to_urdf(fp.load_scenario("fig6")) == to_urdf(fp.load_finger("ub"))
+    assert to_urdf(fp.load_scenario("reversals")) == to_urdf(fp.load_finger("ub_stand_in"))
 
 
 def test_a_joint_without_a_link_is_an_error_that_names_it():
@@ -246,7 +248,7 @@ def test_what_is_no_finger_of_links_is_refused_by_name(export):
 
 def test_a_joint_offset_puts_mujoco_s_fingertip_and_mass_where_the_urdf_has_them():
     offsets = {"finger.joints.proximal.link.offset": 6e-3, "finger.joints.distal.link.offset": -4e-3}
-    finger = fp.Finger(fp.load_finger("ub", offsets))
+    finger = fp.Finger(fp.load_finger("ub_stand_in", offsets))
     model = load(to_mjcf(finger.description))
     q = np.array([0.1, 0.4, 0.7, 0.3])
     data = forward(model, np.append(q, 0.0), np.zeros(5), np.zeros(4))

@@ -15,16 +15,16 @@ from finger_pin.identification.scenario_parameters import ScenarioPart
 COULOMB = "finger.tendon_friction.coulomb"
 JOINT_COULOMB, JOINT_STICTION = "finger.joint_friction.coulomb", "finger.joint_friction.stiction"
 TOLERANCES = "simulation.rtol", "simulation.atol_scale"
-# What is seen of fig6, by variable, label and column, and its noise.
+# What is seen of reversals, by variable, label and column, and its noise.
 SEEN = [("joint_position", "proximal", 1), ("joint_position", "medial", 2), ("tendon_tension", "T3", 2)]
 NOISE = {"joint_position": 1e-3, "tendon_tension": 0.02}
 
 
 def under_control(duration):
-    """A recording of fig6, and the entries of what is to be found in it; two numbers are wrong at the start."""
+    """A recording of reversals, and the entries of what is to be found in it; two numbers are wrong at the start."""
     keys = {COULOMB: (0.02, 0.5), "finger.joint_friction.viscous": (1e-4, 1e-2)}
     seen = {"simulation.duration": duration, "simulation.sample_rate": 200.0}
-    made = fp.prepare(fp.load_scenario("fig6", seen), list(keys), tuple(NOISE)).run()
+    made = fp.prepare(fp.load_scenario("reversals", seen), list(keys), tuple(NOISE)).run()
     rng = np.random.default_rng(6)
     data = {f"{v}.{label}": made[v][:, k] + rng.normal(0.0, NOISE[v], len(made.time)) for v, label, k in SEEN}
     recordings = {"motion": {"time": "t", "settle": 0.1, "outputs": {name: name for name in data}}}
@@ -37,7 +37,7 @@ def test_slopes_that_searches_ask_for_know_what_bends_and_bends_back():
     posed, tight = {"simulation.initial.position.medial": 0.2}, dict.fromkeys(TOLERANCES, 1e-11)
     found, exact = (
         build_problem(scenario, settings, [read_recording("motion", settings.recordings["motion"], data["motion"])])
-        for scenario, settings in (load_bench("fig6", posed | more, entries) for more in ({}, tight))
+        for scenario, settings in (load_bench("reversals", posed | more, entries) for more in ({}, tight))
     )
     slopes = found.slopes(found.start)
     for k in range(2):
@@ -51,7 +51,7 @@ def test_slopes_that_searches_ask_for_know_what_bends_and_bends_back():
 def test_what_a_finger_under_control_tells_to_a_hundredth_has_nearly_the_intervals_of_its_slopes():
     entries, data = under_control(1.0)
     changed = {COULOMB: 0.16, "finger.joint_friction.viscous": 1.5e-3}
-    result = fp.identify("fig6", **entries, data=data, overrides=changed, starts=1)
+    result = fp.identify("reversals", **entries, data=data, overrides=changed, starts=1)
     truth, width = np.array([0.11, 1e-3]), (result.upper - result.lower).values
     assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and np.all(width < 0.02 * truth)
     np.testing.assert_allclose(result.noise.values, [NOISE[v] for v, _, _ in SEEN], rtol=0.2)
@@ -62,7 +62,7 @@ def test_what_a_finger_under_control_tells_to_a_hundredth_has_nearly_the_interva
 def test_profiles_follow_a_likelihood_that_errors_of_runs_do_not_make_jump():
     """Every run has steps of its own; over a part of an interval so small the likelihood is a straight line."""
     entries, data = under_control(4.0)
-    scenario, settings = load_bench("fig6", None, entries)
+    scenario, settings = load_bench("reversals", None, entries)
     taken = [read_recording(name, each, data[name]) for name, each in settings.recordings.items()]
     problem, jumps = build_problem(scenario, settings, taken), []
     for each in (problem, problem.fine()):
@@ -74,7 +74,7 @@ def test_profiles_follow_a_likelihood_that_errors_of_runs_do_not_make_jump():
 
 
 def test_coulomb_and_stiction_of_joints_are_found_together_though_their_bounds_overlap():
-    base = fp.load_scenario("fig6", {"simulation.duration": 1.0, "simulation.sample_rate": 100.0})
+    base = fp.load_scenario("reversals", {"simulation.duration": 1.0, "simulation.sample_rate": 100.0})
     truth = {JOINT_COULOMB: 4e-4, JOINT_STICTION: 7e-4}
     run, rng = fp.simulate(fp.load_scenario(base, truth)), np.random.default_rng(3)
     data, joints = {"t": run.time.values}, ("proximal", "medial")
@@ -96,7 +96,7 @@ def test_coulomb_and_stiction_of_joints_are_found_together_though_their_bounds_o
 
 
 def test_values_that_do_not_go_together_are_brought_to_where_they_do_and_those_that_are_held_stay():
-    family = ParametrisedScenario(fp.load_scenario("fig6"), (JOINT_COULOMB, JOINT_STICTION))
+    family = ParametrisedScenario(fp.load_scenario("reversals"), (JOINT_COULOMB, JOINT_STICTION))
     part = ScenarioPart(family, np.arange(2))
     limits = Limits.checked([part], family.keys, np.array([1e-4, 1e-4]), np.array([1e-3, 2e-3]))
     for given, free, nearest in [

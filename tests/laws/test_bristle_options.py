@@ -18,7 +18,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::finger_pin.exceptions.MicroDamp
 
 @pytest.fixture(scope="module")
 def optional():
-    return fp.Finger(fp.load_finger("ub", OPTIONS))
+    return fp.Finger(fp.load_finger("ub_stand_in", OPTIONS))
 
 
 def random_states(finger, count, seed=0):
@@ -63,7 +63,7 @@ def test_tension_on_a_sticking_tendon_is_damped_by_sigma_1_and_the_normal_force_
     assert np.abs(speed[:2]).min() > 0.0
 
 
-@pytest.mark.parametrize("scenario", ["fig6", "stick_slip"])
+@pytest.mark.parametrize("scenario", ["reversals", "stick_slip"])
 def test_a_motion_with_the_options_agrees_between_integrators_and_closes_its_energy_account(scenario):
     results = [
         fp.simulate(fp.load_scenario(scenario, OPTIONS | {"simulation.duration": 0.1, "simulation.method": method}))
@@ -80,16 +80,16 @@ def test_a_motion_with_the_options_agrees_between_integrators_and_closes_its_ene
 
 def test_the_options_change_the_motion_and_their_defaults_are_the_papers():
     short = {"simulation.duration": 0.2}
-    paper = fp.simulate(fp.load_scenario("fig6", short))
+    paper = fp.simulate(fp.load_scenario("reversals", short))
     spelt = {
         f"finger.{kind}_friction.{name}": value
         for kind in ("tendon", "joint")
         for name, value in (("stribeck_exponent", 1), ("micro_damping", 0.0))
     }
-    assert fp.simulate(fp.load_scenario("fig6", short | spelt)).joint_position.equals(paper.joint_position)
+    assert fp.simulate(fp.load_scenario("reversals", short | spelt)).joint_position.equals(paper.joint_position)
     assert float(abs(paper.power_tendon_micro_damping).max()) == 0.0
     for entry_name, value in OPTIONS.items():
-        other = fp.simulate(fp.load_scenario("fig6", short | {entry_name: value}))
+        other = fp.simulate(fp.load_scenario("reversals", short | {entry_name: value}))
         assert float(abs(other.joint_position - paper.joint_position).max()) > 1e-7, entry_name
 
 
@@ -108,5 +108,5 @@ def test_the_options_change_the_motion_and_their_defaults_are_the_papers():
 def test_an_option_out_of_its_range_is_told_by_name(kind, name, value, says):
     entry_name = f"finger.{kind}_friction.{name}"
     with pytest.raises(fp.InputError, match=says) as caught:
-        fp.load_finger("ub", {entry_name: value})
+        fp.load_finger("ub_stand_in", {entry_name: value})
     assert entry_name in str(caught.value)

@@ -144,7 +144,9 @@ def test_a_passive_tendon_takes_the_area_of_its_loop_whatever_the_speed(tmp_path
 
 
 def test_what_halves_of_a_passive_tendon_hold_pulls_and_loads_as_they_do():
-    finger, bare = (fp.Finger(fp.load_finger("ub", {"finger.passive_tendon.hysteresis": h})) for h in (0.3, 0.0))
+    finger, bare = (
+        fp.Finger(fp.load_finger("ub_stand_in", {"finger.passive_tendon.hysteresis": h})) for h in (0.3, 0.0)
+    )
     rng, command = np.random.default_rng(4), np.array([2.0, 3.0, 5.0, 4.0])
     x = np.stack([finger.rest_state(each) for each in rng.uniform(0.2, 0.8, (20, 4)) * [0.1, 1.0, 1.0, 1.0]])
     x += rng.normal(size=x.shape) * 0.05 * finger.layout.scales()
@@ -167,5 +169,5 @@ def test_what_halves_of_a_passive_tendon_hold_pulls_and_loads_as_they_do():
 
 
 def test_a_model_for_mujoco_says_that_it_has_no_hysteresis():
-    held = fp.load_finger("ub", {"finger.passive_tendon.hysteresis": 0.1})
-    assert "(hysteresis)" in fp.to_mjcf(held) and "(hysteresis)" not in fp.to_mjcf("ub")
+    held = fp.load_finger("ub_stand_in", {"finger.passive_tendon.hysteresis": 0.1})
+    assert "(hysteresis)" in fp.to_mjcf(held) and "(hysteresis)" not in fp.to_mjcf("ub_stand_in")

@@ -14,7 +14,7 @@ from finger_pin.learning import Choice, Environment, LogUniform, Normal, Sensor,
 from finger_pin.learning.snapshot import known_variables
 
 COARSE = {"simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
-FIG6 = fp.load_scenario("fig6", COARSE)
+FIG6 = fp.load_scenario("reversals", COARSE)
 PULLS = [np.array([1.0, 1.0, 4.4, 3.1]) * scale for scale in (1.0, 1.5, 0.7, 2.0)]
 
 
@@ -122,7 +122,7 @@ SERVOS = {
     [("pinch", "tension", SHAKEN), ("servo_position", "motor_position", SERVOS), ("servo_position", "tension", {})],
 )
 def test_all_that_worlds_tell_is_what_one_tells_and_its_result(name, action, drawn):
-    scenario = fp.load_scenario(name if action != "tension" or drawn else "fig6", COARSE)
+    scenario = fp.load_scenario(name if action != "tension" or drawn else "reversals", COARSE)
     known = [each for each in known_variables(ClosedLoop.from_scenario(scenario)) if each != "contact_gap"]
     task = dict(reward=nothing, privileged=known, action=action, randomise=drawn)
     worlds = VectorEnvironment(3, scenario, **task)
@@ -144,7 +144,7 @@ def test_all_that_worlds_tell_is_what_one_tells_and_its_result(name, action, dra
 def test_what_is_drawn_acts_like_an_override():
     key = "finger.tendon_friction.coulomb"
     drawn = Environment(FIG6, reward=nothing, randomise={key: Uniform(0.3, 0.3)})
-    given = Environment(fp.load_scenario("fig6", {**COARSE, key: 0.3}), reward=nothing)
+    given = Environment(fp.load_scenario("reversals", {**COARSE, key: 0.3}), reward=nothing)
     assert drawn.reset(seed=1)[1]["drawn"][key] == pytest.approx(0.3)
     given.reset(seed=1)
     for pull in PULLS:

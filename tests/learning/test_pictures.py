@@ -6,7 +6,7 @@ import finger_pin as fp
 from finger_pin.learning import Environment, VectorEnvironment
 from finger_pin.learning.tasks import TASKS
 
-FIG6 = fp.load_scenario("fig6", {"simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3})
+FIG6 = fp.load_scenario("reversals", {"simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3})
 
 
 def nothing(signals):

@@ -56,7 +56,7 @@ STICK_SLIP = UB | {
     "f0": 3.0,
 }
 
-NUMBERS = {"fig6": UB, "stick_slip": STICK_SLIP}
+NUMBERS = {"reversals": UB, "stick_slip": STICK_SLIP}
 
 
 def dot(a, b):

@@ -39,7 +39,7 @@ def finger(motor, *, link=LINK, opposed=False, gravity=0.0, canal=0.0, **actuato
 def motor_of(name):
     """A motor that ships."""
     overrides = {"finger.actuators": {"M": {"motor": name, "tendons": ["T1"], "spool_radius": SPOOL}}}
-    return fp.load_finger("ub", overrides).actuators["M"].motor
+    return fp.load_finger("ub_stand_in", overrides).actuators["M"].motor
 
 
 def stepped(finger, command, times, *, angle=0.0, spool=None, stiction=0.0, rtol=1e-9):

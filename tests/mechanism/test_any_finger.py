@@ -231,7 +231,7 @@ def test_a_run_that_cannot_go_on_ends_with_time_state_and_advice():
         "simulation.atol_scale": 1e-15,
     }
     with pytest.raises(IntegrationError) as caught:
-        fp.simulate(fp.load_scenario("fig6", frantic))
+        fp.simulate(fp.load_scenario("reversals", frantic))
     error = caught.value
     says_what_to_try(error)
     assert "T5" in error.reason

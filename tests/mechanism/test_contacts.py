@@ -20,7 +20,7 @@ BALL = Object(shape="sphere", radius=0.02, mass=0.05, position=(0.1, 0.0, -0.08)
 
 def scene(**objects):
     """Return rigid body, links of the paper's finger, and the contacts of both with objects."""
-    description = fp.load_finger("ub")
+    description = fp.load_finger("ub_stand_in")
     body = add_free_objects(build_rigid_body(description), objects)
     links = {name: joint.link for name, joint in description.joints.items()}
     return body, links, contact_rows([*finger_solids(links, body), *object_solids(objects, body)], body.model.nv)
@@ -180,7 +180,7 @@ ERRORS = {
 @pytest.mark.parametrize("entries", ERRORS)
 def test_a_wrong_object_is_one_clear_line(entries, tmp_path):
     file = tmp_path / "scene.toml"
-    file.write_text(f'finger = "ub"\n[environment.objects.thing]\n{entries}\n')
+    file.write_text(f'finger = "ub_stand_in"\n[environment.objects.thing]\n{entries}\n')
     with pytest.raises(fp.InputError, match=ERRORS[entries]) as caught:
         fp.load_scenario(file)
     assert str(caught.value).startswith("environment.objects.thing") and "\n" not in str(caught.value)

@@ -16,7 +16,7 @@ TENDON_SIGNALS = (
 )
 
 
-@pytest.fixture(scope="module", params=["fig6", "stick_slip"])
+@pytest.fixture(scope="module", params=["reversals", "stick_slip"])
 def case(request):
     scenario = fp.load_scenario(request.param)
     return NUMBERS[request.param], ClosedLoop.from_scenario(scenario)

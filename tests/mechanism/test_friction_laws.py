@@ -58,7 +58,7 @@ def keys(numbers):
 
 def scenario(law, **more):
     return fp.load_scenario(
-        "fig6", {**SHORT, LAW: law} | {f"finger.joint_friction.{key}": v for key, v in more.items()}
+        "reversals", {**SHORT, LAW: law} | {f"finger.joint_friction.{key}": v for key, v in more.items()}
     )
 
 

@@ -23,7 +23,7 @@ POSES = np.radians([[0.0, 0.0, 0.0, 0.0], [8.0, 35.0, 20.0, 50.0], [-9.0, 85.0, 
 
 @pytest.fixture(scope="module")
 def finger():
-    return TendonGeometry(fp.load_finger("ub"))
+    return TendonGeometry(fp.load_finger("ub_stand_in"))
 
 
 def lengths(geometry, q):
@@ -36,7 +36,7 @@ def radial_distance(points, frame):
     return np.linalg.norm(((points - origin) @ rotation)[:, :2], axis=1)
 
 
-@pytest.mark.parametrize(("name", "radii"), [("ub", PAPER_RADII), ("planar", PLANAR_RADII)])
+@pytest.mark.parametrize(("name", "radii"), [("ub_stand_in", PAPER_RADII), ("planar", PLANAR_RADII)])
 @pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
 def test_turning_a_joint_shortens_every_path_by_its_winding_radius(name, radii, part):
     description = fp.load_finger(name)
@@ -58,7 +58,7 @@ def test_a_path_touches_each_of_its_pulleys_and_cuts_into_none(finger, q):
 
 
 def test_positive_radii_lie_on_the_side_to_which_the_joint_turns():
-    geometry = TendonGeometry(fp.load_finger("ub"))
+    geometry = TendonGeometry(fp.load_finger("ub_stand_in"))
     paths = {path.name: path.points for path in geometry.paths(np.zeros(4))}
     medial = sum(LENGTHS[:2])
     at = {name: points[np.argmin(np.abs(points[:, 0] - medial))] for name, points in paths.items()}
@@ -115,7 +115,7 @@ def test_half_of_the_passive_tendon_lies_beyond_its_mass_and_none_of_the_others(
 
 
 def test_a_slack_tendon_hangs_below_its_taut_path_and_keeps_its_ends():
-    description = fp.load_finger("ub")
+    description = fp.load_finger("ub_stand_in")
     q = np.radians([0.0, 10.0, 10.0, 10.0])
     taut = tendon_paths(description, q)
     slack = tendon_paths(description, q, np.array([0.0, 0.0, 1.0, 0.0, 0.0]))

@@ -83,7 +83,8 @@ def test_an_unloaded_joint_slides_at_the_floor(joints):
 def test_coefficients_can_differ_from_joint_to_joint(routing):
     coulomb, stiction = (1e-4, 2e-4, 3e-4, 4e-4), (1e-4, 3e-4, 5e-4, 7e-4)
     description = fp.load_finger(
-        "ub", {"finger.joint_friction.coulomb": list(coulomb), "finger.joint_friction.stiction": list(stiction)}
+        "ub_stand_in",
+        {"finger.joint_friction.coulomb": list(coulomb), "finger.joint_friction.stiction": list(stiction)},
     )
     joints = JointFriction.from_description(description, routing.loads)
     strands = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])

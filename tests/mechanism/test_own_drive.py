@@ -61,7 +61,7 @@ def test_a_run_records_it_and_its_energy_and_it_answers_a_step_as_its_equation_d
     """f^a = u (1 - exp(-t / T)), whatever the finger does meanwhile; its power is f^a times the tendon's velocity."""
     times = np.array([0.0, 0.1])
     overrides = {"simulation.duration": 0.1, "simulation.rtol": 1e-7, "simulation.atol_scale": 1e-7}
-    scenario = fp.load_scenario("fig6", overrides)
+    scenario = fp.load_scenario("reversals", overrides)
     result = fp.simulate(scenario, finger=driven, controller=(times, np.tile(TENSION, (2, 1))))
     expected = TENSION[2:] * (1.0 - np.exp(-result.time.values[:, None] / LAG))
     np.testing.assert_allclose(result.muscles_force, expected, atol=1e-5)
@@ -81,7 +81,7 @@ def test_a_drive_of_a_tendon_that_is_not_there_is_refused(finger):
 
 def test_a_run_of_it_goes_on_from_its_state(driven):
     """The tension after two times 10 ms is that of a first-order lag after 20 ms."""
-    short = fp.load_scenario("fig6", {"simulation.duration": 0.01, "simulation.rtol": 1e-8})
+    short = fp.load_scenario("reversals", {"simulation.duration": 0.01, "simulation.rtol": 1e-8})
     held = np.array([0.0, 0.01]), np.tile(TENSION, (2, 1))
     first = fp.simulate(short, finger=driven, controller=held)
     second = fp.simulate(short, finger=driven, controller=held, initial=first)

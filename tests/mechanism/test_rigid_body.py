@@ -14,7 +14,7 @@ from finger_pin.mechanism.urdf import build_rigid_body
 SAMPLES = 30
 
 
-@pytest.fixture(params=["ub", "planar"])
+@pytest.fixture(params=["ub_stand_in", "planar"])
 def body(request):
     return build_rigid_body(load_finger(request.param))
 
@@ -86,7 +86,7 @@ def test_forward_dynamics_of_a_batch_is_that_of_each_row(body):
 
 
 def test_jacobian_is_the_derivative_of_equation_1():
-    body = build_rigid_body(load_finger("ub"))
+    body = build_rigid_body(load_finger("ub_stand_in"))
     for q, _, _ in states(body):
         np.testing.assert_allclose(body.jacobian(q), derivative(equation_1, q, 1e-3), rtol=0, atol=1e-12)
 
@@ -99,7 +99,7 @@ def test_gravity_torque_is_the_gradient_of_potential_energy(body):
 
 
 def test_gravity_holds_the_straight_finger_down():
-    finger = load_finger("ub")
+    finger = load_finger("ub_stand_in")
     links = [joint.link for joint in finger.joints.values()]
     starts = np.concatenate([[0.0], np.cumsum([link.length for link in links])])[:-1]
     weights = 9.81 * np.array([link.mass for link in links])
@@ -179,7 +179,7 @@ def test_a_free_swing_keeps_its_energy(body):
 
 
 def test_link_directions_follow_the_links_of_the_paper_s_finger():
-    body = build_rigid_body(load_finger("ub"))
+    body = build_rigid_body(load_finger("ub_stand_in"))
     for q, _, _ in states(body):
         (c1, s1), t2, t23 = (np.cos(q[0]), np.sin(q[0])), q[1], q[1] + q[2]
         expected = [

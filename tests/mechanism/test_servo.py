@@ -180,7 +180,7 @@ def test_a_drive_that_overcomes_all_of_its_friction_slides_its_gears_under_the_c
 def test_a_finger_with_ideal_and_servo_tendons_gives_each_strand_to_the_joints():
     """Whatever pulls it, a strand's delivered tension turns the joints by (11) and loads them by (17)."""
     actuators = {"M": {"motor": "XL330-M288", "tendons": ["T3"], "spool_radius": SPOOL}}
-    mixed, ideal = fp.Finger(fp.load_finger("ub", {"finger.actuators": actuators})), fp.Finger("ub")
+    mixed, ideal = fp.Finger(fp.load_finger("ub_stand_in", {"finger.actuators": actuators})), fp.Finger("ub_stand_in")
     tension = np.array([2.0, 1.5, 6.0, 4.0])
     position = np.array([0.1, 0.4, 0.5, 0.3])
     found = mixed.evaluate(mixed.rest_state(position, tension=tension), tension)

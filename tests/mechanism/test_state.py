@@ -95,7 +95,7 @@ def test_tolerances_of_joints_that_slide_are_those_of_moved_objects_and_of_other
     assert layout.names_of("position")[0] == "block"
     np.testing.assert_array_equal(scales.position, [BLOCKS["object_pose"].scale[0], *turning.position])
     np.testing.assert_array_equal(scales.velocity, [BLOCKS["object_velocity"].scale[0], *turning.velocity])
-    assert {"position", "velocity"}.isdisjoint(dict(fp.Finger("ub").layout.scaled))
+    assert {"position", "velocity"}.isdisjoint(dict(fp.Finger("ub_stand_in").layout.scaled))
 
 
 @pytest.mark.parametrize("size", [18, 20, 0])
@@ -104,7 +104,7 @@ def test_a_state_of_the_wrong_size_is_refused_with_both_sizes(size):
         LAYOUTS["paper"].unpack(np.zeros(size))
 
 
-@pytest.mark.parametrize(("name", "size"), [("ub", 19), ("dexmart_index", 19), ("planar", 9)])
+@pytest.mark.parametrize(("name", "size"), [("ub_stand_in", 19), ("dexmart_index", 19), ("planar", 9)])
 def test_shipped_fingers_have_the_layout_of_their_description(name, size):
     description = fp.load_finger(name)
     layout = fp.Finger(description).layout
@@ -113,7 +113,7 @@ def test_shipped_fingers_have_the_layout_of_their_description(name, size):
     assert layout.names_of("tendon_stiction") == tuple(description.tendons)
 
 
-@pytest.mark.parametrize("name", ["ub", "dexmart_index"])
+@pytest.mark.parametrize("name", ["ub_stand_in", "dexmart_index"])
 def test_a_layout_that_lacks_a_number_of_any_block_is_refused_before_anything_is_computed(name):
     finger = fp.Finger(name)
     labels = dict(zip(BLOCKS, finger.layout.labels, strict=True))

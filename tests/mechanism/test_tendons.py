@@ -22,7 +22,7 @@ def layer(ub):
 @pytest.fixture(scope="module")
 def dry():
     """The paper's tendons without viscous friction, so that steady sliding is pure Coulomb friction."""
-    return Tendons.from_description(fp.load_finger("ub", {"finger.tendon_friction.viscous": 0.0}))
+    return Tendons.from_description(fp.load_finger("ub_stand_in", {"finger.tendon_friction.viscous": 0.0}))
 
 
 def at_rest(layer, position, passive=None, stiction=None, command=None):

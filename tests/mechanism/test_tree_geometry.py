@@ -54,7 +54,7 @@ def test_cords_that_no_motor_pulls_are_drawn_branch_by_branch_with_ends_at_their
     assert [set(tendon["strand"]) for tendon in scene.tendons] == [{len(scene.strands)}] * 2
     np.testing.assert_array_equal(scene.looseness(np.zeros((3, 1))), np.zeros((3, 2)))
     assert scene.header("", position[None], 1.0)["cords"]
-    assert not Scene("ub").header("", np.zeros((1, 4)), 1.0)["cords"]
+    assert not Scene("ub_stand_in").header("", np.zeros((1, 4)), 1.0)["cords"]
 
 
 def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():

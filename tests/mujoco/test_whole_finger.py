@@ -17,7 +17,7 @@ def test_the_paper_s_finger_in_mujoco_nears_our_motion_at_the_first_order_of_its
     monkeypatch.setattr(mujoco_motion, "DURATION", DURATION)
     settings = {"duration": DURATION, "rtol": 1e-9, "atol_scale": 1e-10, "sample_rate": 1000.0}
     overrides = {f"simulation.{key}": value for key, value in settings.items()}
-    scenario = fp.load_scenario("fig6", {"finger.stroke_limiter.stiffness": 0.0, **overrides})
+    scenario = fp.load_scenario("reversals", {"finger.stroke_limiter.stiffness": 0.0, **overrides})
     result = fp.simulate(scenario)
     ours = result["joint_position"].values
     text = fp.to_mjcf(scenario.finger, posture=tuple(ours[0]), shapes=False, friction=True)

@@ -21,7 +21,9 @@ def coupling(routing):
 @pytest.fixture(scope="module")
 def runs():
     names = ("paper", "all friction", "all friction, f5d 4 N, loop")
-    return {name: fp.simulate(fp.load_scenario("fig6", {**CASES[name], "simulation.duration": 5.0})) for name in names}
+    return {
+        name: fp.simulate(fp.load_scenario("reversals", {**CASES[name], "simulation.duration": 5.0})) for name in names
+    }
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +32,7 @@ def rows(runs, coupling):
 
 
 def test_every_case_is_sampled_alike_and_no_two_are_the_same():
-    cases = [fp.load_scenario("fig6", overrides) for overrides in CASES.values()]
+    cases = [fp.load_scenario("reversals", overrides) for overrides in CASES.values()]
     for scenario in cases:
         assert scenario.controller.sampling.period == 1e-3
         looped = isinstance(fp.control.build_controller(scenario), fp.control.PassiveTensionLoop)

@@ -80,7 +80,7 @@ def test_elasticities_are_the_exponents_of_a_planted_law_and_decide_which_fricti
 
     plant(law)
     counted = []
-    found = friction_influence(fp.load_scenario("fig6"), progress=counted.append)
+    found = friction_influence(fp.load_scenario("reversals"), progress=counted.append)
     assert sum(counted) == INFLUENCE_RUNS
     np.testing.assert_allclose(found.elasticity_joint, joint, rtol=1e-9)
     np.testing.assert_allclose(found.elasticity_tendon, tendon, rtol=1e-9)
@@ -95,13 +95,13 @@ def test_elasticities_are_the_exponents_of_a_planted_law_and_decide_which_fricti
 def test_locking_is_extrapolated_from_tensions_that_grow_as_the_loop_has_it(plant):
     """Planted: tension 1 / (1 - M / M_crit), which reaches infinity at the statics' own critical coefficient."""
     plant(lambda scenario: 1.0)
-    grip = friction_influence(fp.load_scenario("fig6")).gripping
+    grip = friction_influence(fp.load_scenario("reversals")).gripping
     assert grip.extrapolated == pytest.approx(1.0, abs=2e-3)
     assert grip.followed[0] == 1.0 and grip.followed[-1] == 0.0
 
 
 def test_a_simulated_finger_grips_itself_where_the_statics_say():
-    grip = gripping(fp.load_scenario("fig6"))
+    grip = gripping(fp.load_scenario("reversals"))
     assert 0.35e-3 * grip.predicted == pytest.approx(0.7418e-3, rel=1e-3)
     assert grip.extrapolated == pytest.approx(1.0, abs=0.03)
     assert grip.followed[0] > 0.9 and grip.followed[-1] < 0.25
@@ -131,7 +131,7 @@ def resting_passive_tension(finger, gain, minimum, desired):
 
 @pytest.mark.parametrize("desired", [1.0, 3.2, 5.0])
 def test_at_rest_without_friction_and_weight_plan_and_delivery_are_those_of_the_statics(finger, desired):
-    still = fp.load_scenario("fig6", STILL | {"simulation.duration": 3.0, "controller.passive_tension": desired})
+    still = fp.load_scenario("reversals", STILL | {"simulation.duration": 3.0, "controller.passive_tension": desired})
     bare = weightless(with_tendon_friction(with_joint_friction(still, 0.0), 0.0))
     _, _, planned, delivered = delivered_tensions([bare], None)
     expected = resting_passive_tension(finger, 1.0, 1.0, desired)
@@ -140,7 +140,9 @@ def test_at_rest_without_friction_and_weight_plan_and_delivery_are_those_of_the_
 
 def test_the_plan_is_met_where_nothing_spoils_it_and_every_cause_is_switched_on_alone():
     counted = []
-    found = passive_delivery(fp.load_scenario("fig6"), speeds=(0.5, 1.0), factors=(0.0, 1.0), progress=counted.append)
+    found = passive_delivery(
+        fp.load_scenario("reversals"), speeds=(0.5, 1.0), factors=(0.0, 1.0), progress=counted.append
+    )
     assert sum(counted) == 2 * 2 + 5
     assert DELIVERY_RUNS == 6 * 6 + 5
     assert found.causes["none"] < 0.02
@@ -160,7 +162,7 @@ def test_a_level_is_crossed_between_values_by_interpolation_or_never():
 
 
 def test_transmission_of_the_papers_finger_depends_on_posture_but_for_the_passive_tendon():
-    found = transmission(fp.load_scenario("fig6", {"simulation.duration": 1.0}))
+    found = transmission(fp.load_scenario("reversals", {"simulation.duration": 1.0}))
     # phi of T4 runs from 0.51 to 0.51 + pi: half of that is what one coefficient for all postures must err.
     assert found.blind_error[3] == pytest.approx(np.exp(0.11 * np.pi / 2.0) - 1.0, rel=1e-9)
     assert found.blind_error[4] == pytest.approx(0.0, abs=1e-12)
@@ -192,7 +194,7 @@ def test_findings_are_the_same_on_disk_and_on_the_screen(tmp_path):
 def test_scenarios_that_cannot_be_asked_are_refused():
     with pytest.raises(fp.InputError, match="passive"):
         passive_delivery(
-            fp.load_scenario("fig6", {"finger": "planar", "reference.joints": {"proximal": {"offset": 0.1}}})
+            fp.load_scenario("reversals", {"finger": "planar", "reference.joints": {"proximal": {"offset": 0.1}}})
         )
     with pytest.raises(fp.InputError, match="must move"):
-        friction_influence(fp.load_scenario("fig6", STILL))
+        friction_influence(fp.load_scenario("reversals", STILL))

@@ -19,7 +19,7 @@ from finger_pin.references.reference import SignalReference
 
 @pytest.fixture(scope="module")
 def fig6_scenario():
-    return fp.load_scenario("fig6")
+    return fp.load_scenario("reversals")
 
 
 def test_variations_are_the_overrides_that_they_stand_for(fig6_scenario):
@@ -33,12 +33,12 @@ def test_variations_are_the_overrides_that_they_stand_for(fig6_scenario):
         (with_passive_tension(fig6_scenario, (3.0,)), {"controller.passive_tension": [3.0]}),
         (weightless(fig6_scenario), {"finger.gravity": [0.0, 0.0, 0.0]}),
     ):
-        assert varied == fp.load_scenario("fig6", overrides)
+        assert varied == fp.load_scenario("reversals", overrides)
 
 
 def test_friction_of_every_joint_and_tendon_is_scaled_alike():
     uneven = {"finger.joint_friction.coulomb": [1e-4, 2e-4, 3e-4, 4e-4], "finger.joint_friction.stiction": 5e-4}
-    law = with_joint_friction(fp.load_scenario("fig6", uneven), 0.5).finger.joint_friction
+    law = with_joint_friction(fp.load_scenario("reversals", uneven), 0.5).finger.joint_friction
     assert law.coulomb == pytest.approx((5e-5, 1e-4, 1.5e-4, 2e-4))
     assert law.stiction == pytest.approx(2.5e-4)
 

@@ -1,4 +1,4 @@
-"""References (20): the passive tendon's planned elongation, followers in a chain, rates, and fig6 by hand."""
+"""References (20): the passive tendon's planned elongation, followers in a chain, rates, and reversals by hand."""
 
 import math
 
@@ -14,8 +14,8 @@ from finger_pin.references.signal import Signal
 
 
 @pytest.fixture(scope="module")
-def fig6(routing):
-    return SignalReference.from_scenario(fp.load_scenario("fig6"), routing)
+def reversals(routing):
+    return SignalReference.from_scenario(fp.load_scenario("reversals"), routing)
 
 
 def sinusoids(coupling, size, seed=12):
@@ -25,13 +25,13 @@ def sinusoids(coupling, size, seed=12):
 
 
 @pytest.mark.parametrize("time", [0.0, 0.25, 0.5, 1.0, 2.0, 2.75, 7.9])
-def test_fig6_is_the_motion_of_the_model_page(fig6, time):
+def test_reversals_is_the_motion_of_the_model_page(reversals, time):
     degree = math.pi / 180.0
     theta1 = 8.0 * degree * math.sin(math.pi * time)
     theta2 = (35.0 - 25.0 * math.cos(math.pi * time / 2.0)) * degree
     theta3 = (35.0 - 25.0 * math.cos(math.pi * time)) * degree
     theta4 = (3.5e-3 * theta3 - 1.0 / 5e4) / 5.0e-3
-    np.testing.assert_allclose(fig6.at(time).position, [theta1, theta2, theta3, theta4], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(reversals.at(time).position, [theta1, theta2, theta3, theta4], rtol=1e-12, atol=1e-14)
 
 
 def test_stick_slip_is_the_motion_of_the_model_page():
@@ -46,29 +46,29 @@ def test_stick_slip_is_the_motion_of_the_model_page():
 @pytest.mark.parametrize("desired", [0.0, 1.0, 2.5])
 def test_at_the_reference_the_passive_tendon_carries_its_desired_tension(desired, routing):
     reference = SignalReference.from_scenario(
-        fp.load_scenario("fig6", {"controller.passive_tension": desired}), routing
+        fp.load_scenario("reversals", {"controller.passive_tension": desired}), routing
     )
     theta = reference.at(np.linspace(0.0, 8.0, 50)).position
     tension = 5e4 * (3.5e-3 * theta[:, 2] - 5.0e-3 * theta[:, 3])
     np.testing.assert_allclose(tension, desired, atol=1e-10)
 
 
-def test_rates_are_the_time_derivatives_of_positions(fig6):
+def test_rates_are_the_time_derivatives_of_positions(reversals):
     times, step = np.linspace(0.1, 7.9, 40), 1e-3
-    near = fig6.at(times + step).position - fig6.at(times - step).position
-    far = fig6.at(times + 2 * step).position - fig6.at(times - 2 * step).position
+    near = reversals.at(times + step).position - reversals.at(times - step).position
+    far = reversals.at(times + 2 * step).position - reversals.at(times - 2 * step).position
     numeric = (8.0 * near - far) / (12.0 * step)
-    np.testing.assert_allclose(fig6.at(times).velocity, numeric, atol=1e-9)
+    np.testing.assert_allclose(reversals.at(times).velocity, numeric, atol=1e-9)
     assert np.abs(numeric).max(axis=0).min() > 0.1
 
 
-def test_many_times_are_each_time(fig6):
+def test_many_times_are_each_time(reversals):
     times = np.array([0.0, 0.4, 3.3])
-    many = fig6.at(times)
+    many = reversals.at(times)
     assert many.position.shape == many.velocity.shape == (3, 4)
     for index, time in enumerate(times):
-        np.testing.assert_allclose(many.position[index], fig6.at(time).position, rtol=1e-14)
-        np.testing.assert_allclose(many.velocity[index], fig6.at(time).velocity, rtol=1e-14, atol=1e-17)
+        np.testing.assert_allclose(many.position[index], reversals.at(time).position, rtol=1e-14)
+        np.testing.assert_allclose(many.velocity[index], reversals.at(time).velocity, rtol=1e-14, atol=1e-17)
 
 
 @pytest.mark.parametrize("order", [("P", "Q"), ("Q", "P")])
@@ -121,7 +121,7 @@ def test_two_passive_tendons_on_one_follower_are_refused_by_name(network):
 
 
 def test_a_joint_without_reference_is_held_at_zero(routing):
-    scenario = fp.Scenario.model_validate(fp.load_scenario("fig6").model_dump() | {"reference": {"joints": {}}})
+    scenario = fp.Scenario.model_validate(fp.load_scenario("reversals").model_dump() | {"reference": {"joints": {}}})
     theta = SignalReference.from_scenario(scenario, routing).at(np.array([0.0, 1.0])).position
     np.testing.assert_array_equal(theta[:, :3], 0.0)
     np.testing.assert_allclose(theta[:, 3], -1.0 / (5e4 * 5.0e-3), rtol=1e-12)

@@ -57,7 +57,7 @@ def test_corners_jumps_pulses_and_what_is_rougher_than_the_tolerance_stay_as_the
 def test_a_run_takes_no_more_steps_for_samples_that_are_rounded():
     times, steps = np.linspace(0.0, 0.2, 200_001), []
     wave = np.sin(np.outer(times, [4.0, 6.0, 7.0, 4.0]) + np.array([0.0, 0.3, 1.0, 2.0]))
-    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.2})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.2})
     for digits in (15, 7):
         pulled = np.round([2.0, 2.0, 5.0, 4.0] + 0.4 * wave, digits)
         steps.append(fp.simulate(scenario, controller=(times, pulled)).attrs["solver_steps"])

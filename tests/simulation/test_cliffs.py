@@ -67,7 +67,7 @@ def test_a_loop_that_diverges_is_stopped_with_the_speed_that_says_so():
 def test_the_estimated_error_of_the_main_job_has_the_size_of_its_error_and_is_in_the_summary(fig6_runs):
     result = fig6_runs["Rodas5P"]
     tight = {"simulation.duration": 0.1, "simulation.rtol": 1e-10, "simulation.atol_scale": 1e-10}
-    exact = fp.simulate(fp.load_scenario("fig6", tight))
+    exact = fp.simulate(fp.load_scenario("reversals", tight))
     error = float(np.sqrt(np.mean((result.joint_position - exact.joint_position) ** 2)))
     assert 0.1 * error < result.attrs["estimated_error"] < 100.0 * error
     assert "accuracy" not in result.attrs
@@ -83,7 +83,7 @@ def hunting(tolerance):
     overrides = HUNTING | {"simulation.rtol": tolerance, "simulation.atol_scale": tolerance}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SelfLockingWarning)
-        return fp.simulate(fp.load_scenario("fig6", overrides))
+        return fp.simulate(fp.load_scenario("reversals", overrides))
 
 
 @cache
@@ -125,7 +125,7 @@ def test_what_rings_in_a_slow_run_is_named_with_its_frequency(monkeypatch):
         "finger.tendon_friction.coulomb": 0.0,
         "simulation.initial.velocity.distal": 50.0,
     }
-    result = fp.simulate(fp.load_scenario("fig6", overrides))
+    result = fp.simulate(fp.load_scenario("reversals", overrides))
     # A mass between two halves of K_h = 2 K_t.
     frequency = np.sqrt(2 * 2 * 5e4 / 1e-7) / (2.0 * np.pi)
     name, _, rest = result.attrs["ringing"].partition(" rings almost undamped at ")
@@ -136,14 +136,14 @@ def test_what_rings_in_a_slow_run_is_named_with_its_frequency(monkeypatch):
 def test_a_result_that_cannot_fit_into_memory_is_refused_by_its_sample_rate(monkeypatch):
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 2**18}
     monkeypatch.setattr(os, "sysconf", pages.__getitem__)
-    scenario = fp.load_scenario("fig6", {"simulation.sample_rate": 5e5})
+    scenario = fp.load_scenario("reversals", {"simulation.sample_rate": 5e5})
     with pytest.raises(
         fp.InputError, match=r"^simulation.sample_rate = 500000.0: .* GiB of memory, .* at most"
     ) as found:
         fp.simulate(scenario)
     fitting = float(str(found.value).rsplit(" ", 1)[-1])
     settings = scenario.simulation.updated(sample_rate=0.99 * fitting)
-    recording.check_memory(settings, fp.Finger("ub"))
+    recording.check_memory(settings, fp.Finger("ub_stand_in"))
 
 
 def test_a_simulator_refuses_what_is_no_time_and_tensions_that_push(finger):
@@ -189,7 +189,7 @@ def test_an_account_that_does_not_close_is_told():
         rows = Rows("band", law, ("medial",), np.array([[0.05], [0.0], [2e-3]]), np.eye(5)[2:3])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", fp.exceptions.ScenarioWarning)
-            result = fp.simulate("fig6", finger=fp.Finger("ub", rows=[rows]))
+            result = fp.simulate("reversals", finger=fp.Finger("ub_stand_in", rows=[rows]))
         assert (
             (share_left_open(result) > 1e-4)
             == tells

@@ -45,7 +45,7 @@ TREE = {
 }
 #: Entries of a scenario by what they add; those of a finger stand under `finger`, wherever it is.
 FEATURES: dict[str, dict[str, Any]] = {
-    "finger": {"finger": {"base": "ub"}},
+    "finger": {"finger": {"base": "ub_stand_in"}},
     "tree": {"finger": TREE},
     "hand": {"hand": {"name": "two", "fingers": {"thumb": {"position": [0.0, -0.1, 0.0]}, "index": {}}}},
     "servo": {"finger": {"actuators": {"M3": {**SERVO, "tendons": ["T3"], "drive": "tension"}}}},
@@ -103,7 +103,7 @@ def scenario_with(features: set[str], path: Path) -> fp.Scenario:
         add(FEATURES[name], table)
     finger = table.pop("finger", {})
     if "hand" in table:
-        finger["base"] = "ub"
+        finger["base"] = "ub_stand_in"
         for placed in table["hand"]["fingers"].values():
             placed["finger"] = finger
     else:

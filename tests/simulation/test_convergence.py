@@ -27,14 +27,14 @@ HUNTING = {
 
 @pytest.fixture(scope="module")
 def calm():
-    scenario = fp.load_scenario("fig6", SHORT)
+    scenario = fp.load_scenario("reversals", SHORT)
     result = fp.simulate(scenario)
     return scenario, result, fp.check_convergence(scenario, result)
 
 
 @pytest.fixture(scope="module")
 def hunting():
-    scenario = fp.load_scenario("fig6", HUNTING)
+    scenario = fp.load_scenario("reversals", HUNTING)
     result = fp.simulate(scenario)
     return scenario, result, fp.check_convergence(scenario, result)
 
@@ -43,7 +43,7 @@ def test_the_difference_is_the_error_of_the_run(calm):
     """Against a motion at 1e-11 by the other method."""
     _, result, found = calm
     settings = {"simulation.method": "Rodas4", "simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
-    truth = fp.simulate(fp.load_scenario("fig6", SHORT | settings))
+    truth = fp.simulate(fp.load_scenario("reversals", SHORT | settings))
     error = (result.joint_position - truth.joint_position).values
     assert np.abs(error).max() > 1e-8
     np.testing.assert_allclose(found.difference, error, rtol=0.0, atol=0.05 * np.abs(error).max())
@@ -77,7 +77,7 @@ def test_a_stiff_loop_with_high_joint_friction_hunts_and_parts_from_its_repetiti
 def test_where_a_run_parts_a_smaller_tolerance_helps_as_the_warning_says():
     tighter = {"simulation.rtol": 1e-8, "simulation.atol_scale": 1e-8}
     with pytest.warns(fp.exceptions.AccuracyWarning, match=r"errs by about .*\(--check"):
-        found = fp.check_convergence(fp.load_scenario("fig6", HUNTING | tighter))
+        found = fp.check_convergence(fp.load_scenario("reversals", HUNTING | tighter))
     assert found.converged
 
 
@@ -90,11 +90,11 @@ def test_the_limit_says_what_parting_is(calm):
 
 def test_a_coarse_run_is_told_from_a_fine_one():
     coarse = {"simulation.rtol": 0.1, "simulation.atol_scale": 0.1, "simulation.duration": 0.3}
-    assert not fp.check_convergence(fp.load_scenario("fig6", coarse), limit=1e-4).converged
+    assert not fp.check_convergence(fp.load_scenario("reversals", coarse), limit=1e-4).converged
 
 
 def test_tolerances_are_divided_as_far_as_they_go():
-    scenario = fp.load_scenario("fig6", {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-9})
+    scenario = fp.load_scenario("reversals", {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-9})
     settings = tightened(scenario).simulation
     assert (settings.rtol, settings.atol_scale) == (1e-12, pytest.approx(1e-11))
     assert tightened(scenario, 10.0).simulation.atol_scale == pytest.approx(1e-10)
@@ -116,7 +116,7 @@ def test_a_check_that_cannot_be_made_is_refused_by_name(calm, overrides, options
     if "result" in options:
         options = {"result": calm[1]}
     with pytest.raises(InputError) as caught:
-        fp.check_convergence(fp.load_scenario("fig6", SHORT | overrides), **options)
+        fp.check_convergence(fp.load_scenario("reversals", SHORT | overrides), **options)
     assert caught.value.entry == entry
 
 
@@ -128,7 +128,7 @@ def test_a_sampled_controller_is_sampled_in_both_runs(monkeypatch):
         return fp.simulate(scenario, **options)
 
     monkeypatch.setattr("finger_pin.simulation.convergence.simulate", watch)
-    found = fp.check_convergence(fp.load_scenario("fig6", {"simulation.duration": 0.02}), control_period=2e-3)
+    found = fp.check_convergence(fp.load_scenario("reversals", {"simulation.duration": 0.02}), control_period=2e-3)
     assert seen == [(1e-6, 2e-3), (pytest.approx(1e-8), 2e-3)]
     assert found.converged
 
@@ -200,7 +200,7 @@ def test_the_command_line_checks_on_request_and_stores_what_it_found(run, tmp_pa
 
 def test_a_run_that_parts_is_a_warning_and_no_error(run, tmp_path, hunting):
     sets = [part for key, value in HUNTING.items() for part in ("--set", f"{key}={value}")]
-    code, out, lines = run(*sets, scenario="fig6")
+    code, out, lines = run(*sets, scenario="reversals")
     assert (code, lines) == (0, [])
     assert "Warning: repeated at rtol 1e-08" in out
     assert f"the run parts at t = {hunting[2].parting_time:.6g} s" in " ".join(out.split())

@@ -36,12 +36,12 @@ INTERFACE = {
 
 
 def short(duration=0.02, **settings):
-    return fp.load_scenario("fig6", {"simulation.duration": duration} | settings)
+    return fp.load_scenario("reversals", {"simulation.duration": duration} | settings)
 
 
 @pytest.fixture(scope="module", params=["Rodas5P", "Radau"])
 def result(request, fig6_runs):
-    """The start of fig6 by the compiled core and by the textbook path."""
+    """The start of reversals by the compiled core and by the textbook path."""
     return fig6_runs[request.param]
 
 
@@ -90,7 +90,7 @@ def test_coordinates_are_named_after_the_finger(result):
 
 def test_samples_obey_equation_18(result):
     """M theta'' + C theta' + G from Pinocchio's Newton-Euler recursion against the recorded torques."""
-    body = fp.Finger(fp.load_finger("ub")).rigid_body
+    body = fp.Finger(fp.load_finger("ub_stand_in")).rigid_body
     data = body.model.createData()
     net = result.joint_torque - result.joint_friction - result.limiter_torque + result.external_torque
     for index in range(0, len(result.time), 7):
@@ -183,7 +183,7 @@ def test_a_finger_without_passive_tendon_has_no_passive_variables(tmp_path):
 
 def test_two_passive_tendons_get_a_dimension_of_their_own():
     """The passive tendon of the paper's finger doubled: each of the two carries its own tension."""
-    table = fp.load_scenario("fig6", {"simulation.duration": 0.01}).model_dump()
+    table = fp.load_scenario("reversals", {"simulation.duration": 0.01}).model_dump()
     tendons = table["finger"]["tendons"]
     tendons["T6"] = {
         "kind": "passive",

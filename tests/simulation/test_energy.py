@@ -27,15 +27,15 @@ def turnover(result):
 
 @pytest.fixture(scope="module")
 def pushed():
-    """The finger pushed at its tip while it follows fig6."""
+    """The finger pushed at its tip while it follows reversals."""
     settings = {"environment.fingertip_force": [0.3, -0.2, 0.4], "simulation.duration": 0.1}
-    return fp.simulate(fp.load_scenario("fig6", settings))
+    return fp.simulate(fp.load_scenario("reversals", settings))
 
 
 @pytest.fixture(scope="module")
 def contact():
     """The abduction joint driven into its upper limit and back."""
-    return fp.simulate(fp.load_scenario("fig6", CONTACT))
+    return fp.simulate(fp.load_scenario("reversals", CONTACT))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -44,8 +44,8 @@ def test_the_account_closes_at_default_tolerances(fig6_runs, method):
     assert float(abs(result.energy_residual).max()) < 1e-5 * float(abs(result.energy_exchanged_actuators).max())
 
 
-def test_the_account_of_the_main_job_closes(fig6):
-    assert float(abs(fig6.energy_residual).max()) < 1e-5 * float(fig6.energy_exchanged_actuators.max())
+def test_the_account_of_the_main_job_closes(reversals):
+    assert float(abs(reversals.energy_residual).max()) < 1e-5 * float(reversals.energy_exchanged_actuators.max())
 
 
 @pytest.mark.parametrize("name", ["servo", "grasp"])
@@ -70,7 +70,9 @@ def test_the_residual_shrinks_with_the_tolerance(method):
     residuals = []
     for rtol in (1e-4, 1e-6, 1e-8):
         settings = {"duration": 0.05, "method": method, "rtol": rtol, "atol_scale": rtol}
-        result = fp.simulate(fp.load_scenario("fig6", {f"simulation.{key}": value for key, value in settings.items()}))
+        result = fp.simulate(
+            fp.load_scenario("reversals", {f"simulation.{key}": value for key, value in settings.items()})
+        )
         residuals.append(float(abs(result.energy_residual).max()))
     assert residuals[0] > 5.0 * residuals[1] > 25.0 * residuals[2]
 
@@ -96,7 +98,7 @@ def test_the_account_closes_through_contact_with_a_stroke_limiter(contact):
     np.testing.assert_allclose(contact.energy_limiter, expected, rtol=1e-9, atol=1e-15)
 
 
-@pytest.mark.parametrize("run", ["fig6", "pushed", "contact"])
+@pytest.mark.parametrize("run", ["reversals", "pushed", "contact"])
 def test_no_loss_is_ever_negative(run, request):
     result = request.getfixturevalue(run)
     for name in LOSSES:
@@ -106,7 +108,7 @@ def test_no_loss_is_ever_negative(run, request):
         assert float(result[f"energy_exchanged_{name}"][-1]) > 1e-7, name
 
 
-@pytest.mark.parametrize("run", ["fig6", "pushed", "contact"])
+@pytest.mark.parametrize("run", ["reversals", "pushed", "contact"])
 def test_stored_energies_other_than_gravity_are_never_negative(run, request):
     result = request.getfixturevalue(run)
     stored = {"kinetic", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles"}

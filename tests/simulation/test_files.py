@@ -33,7 +33,7 @@ def load_text(files):
 
 @pytest.fixture(scope="module")
 def result():
-    scenario = load_scenario("fig6", {"simulation.duration": 0.002, "simulation.sample_rate": 1000})
+    scenario = load_scenario("reversals", {"simulation.duration": 0.002, "simulation.sample_rate": 1000})
     return fp.simulate(scenario)
 
 

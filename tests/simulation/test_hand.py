@@ -232,19 +232,19 @@ def test_a_hand_is_built_by_its_name_and_steps_all_its_fingers():
 
 
 def test_a_finger_in_place_of_a_hand_and_a_hand_in_place_of_a_finger():
-    assert fp.load_scenario("fig6", {"hand": "ub_hand", "reference": {}}).hand.name == "ub_hand"
+    assert fp.load_scenario("reversals", {"hand": "ub_hand", "reference": {}}).hand.name == "ub_hand"
     with pytest.raises(InputError, match="no such joint"):
-        fp.load_scenario("hand", {"finger": "ub"})
+        fp.load_scenario("hand", {"finger": "ub_stand_in"})
 
 
 def test_a_hand_needs_no_name_and_what_is_missing_is_said_in_words(tmp_path):
     path = tmp_path / "mine.toml"
-    path.write_text('[hand.fingers]\nthumb = "ub"\n')
+    path.write_text('[hand.fingers]\nthumb = "ub_stand_in"\n')
     scenario = fp.load_scenario(path)
     assert scenario.hand.name == scenario.finger.name == "hand"
     assert fp.load_scenario(scenario, {"controller.gain": 2.0}).hand == scenario.hand
     for text, said in [
-        ('[hand]\nnmae = "mine"\n[hand.fingers]\nthumb = "ub"\n', "did you mean hand.name?"),
+        ('[hand]\nnmae = "mine"\n[hand.fingers]\nthumb = "ub_stand_in"\n', "did you mean hand.name?"),
         ('[hand]\nname = "mine"\n', "hand.fingers: is missing: Fingers by name."),
         ("[hand.fingers.thumb]\nscale = 1.0\n", "thumb.finger: is missing: Name of one that ships, path of a"),
     ]:

@@ -19,7 +19,7 @@ START = {
 
 
 def short(**entries):
-    return fp.load_scenario("fig6", {"simulation.duration": 0.02} | entries)
+    return fp.load_scenario("reversals", {"simulation.duration": 0.02} | entries)
 
 
 def test_joints_start_where_the_scenario_says_and_the_others_on_their_reference():
@@ -71,11 +71,11 @@ def test_a_run_continued_from_a_result_is_the_run_that_did_not_stop():
 SPRING = {"stiffness": 0.1, "rest": 0.2, "hysteresis": 0.2}
 #: Everything of a finger that has a state besides those of shipped scenarios: scenario, overrides, and the block.
 FEATURES = {
-    "passive tendon's hysteresis": ("fig6", {"finger.passive_tendon.hysteresis": 0.1}, "elastic_stiction"),
+    "passive tendon's hysteresis": ("reversals", {"finger.passive_tendon.hysteresis": 0.1}, "elastic_stiction"),
     "elastic tendons' hysteresis": ("servo", {"finger.actuators.*.tendon_hysteresis": 0.1}, "elastic_stiction"),
     "play": ("servo_position", {"finger.actuators.*.motor.friction.backlash": 0.01}, "spool_position"),
-    "springs' hysteresis": ("fig6", {"finger.joints.medial.spring": SPRING}, "further"),
-    "bends": ("fig6", {"finger.tendon_friction.place": "bends"}, "canal_stiction"),
+    "springs' hysteresis": ("reversals", {"finger.joints.medial.spring": SPRING}, "further"),
+    "bends": ("reversals", {"finger.tendon_friction.place": "bends"}, "canal_stiction"),
     "position loops": ("servo_position", {"finger.actuators.*.position_loop.integral": 20.0}, "motor_position"),
 }
 CASES = {name: (name, {}, "velocity") for name in list_scenarios()} | FEATURES

@@ -23,7 +23,11 @@ def plate(thickness, *position):
 def scene(duration, objects, moving=False, **settings):
     """Return a scenario of a finger at rest, or in the motion of Fig. 6, among objects."""
     entries = {"environment.objects": objects, "simulation.duration": duration, **settings}
-    return fp.load_scenario("fig6", entries) if moving else read_scenario({"name": "rest", "finger": "ub"}, entries)
+    return (
+        fp.load_scenario("reversals", entries)
+        if moving
+        else read_scenario({"name": "rest", "finger": "ub_stand_in"}, entries)
+    )
 
 
 def head_on(duration, *velocity, **settings):

@@ -14,7 +14,7 @@ HEIGHT, FREQUENCY = 0.01, 1.0
 OMEGA = 2.0 * np.pi * FREQUENCY
 #: A plate that goes up and down under a ball, which starts with the plate's velocity.
 LIFT = f"""
-finger = "ub"
+finger = "ub_stand_in"
 [environment.objects.ball]
 shape = "sphere"
 radius = 0.02
@@ -34,7 +34,7 @@ atol_scale = 1e-8
 #: A block on a belt that moves on by a metre in half a second, too fast for friction to follow.
 FRICTION = 0.5
 BELT = f"""
-finger = "ub"
+finger = "ub_stand_in"
 [environment.objects.block]
 shape = "box"
 sides = [0.04, 0.04, 0.01]
@@ -154,7 +154,7 @@ def test_a_simulator_moves_objects_along_their_paths_and_records_them(scenes):
 )
 def test_a_wrong_path_is_one_clear_line(entries, message, tmp_path):
     file = tmp_path / "scene.toml"
-    file.write_text(f'finger = "ub"\n[environment.objects.thing]\nshape = "sphere"\nradius = 0.1\n{entries}\n')
+    file.write_text(f'finger = "ub_stand_in"\n[environment.objects.thing]\nshape = "sphere"\nradius = 0.1\n{entries}\n')
     with pytest.raises(fp.InputError, match=message) as caught:
         fp.load_scenario(file)
     assert str(caught.value).startswith("environment.objects.thing") and "\n" not in str(caught.value)

@@ -41,13 +41,13 @@ def share_left_open(loop, duration=0.015):
 
 @pytest.fixture(scope="module")
 def loop():
-    """The finger of fig6, pushed at its tip and driven a little into its lower limits."""
+    """The finger of reversals, pushed at its tip and driven a little into its lower limits."""
     settings = {
         "environment.fingertip_force": [0.2, 0.3, -0.3],
         "reference.joints.medial.offset": 0.42,
         "reference.joints.proximal.offset": 0.42,
     }
-    return ClosedLoop.from_scenario(fp.load_scenario("fig6", settings))
+    return ClosedLoop.from_scenario(fp.load_scenario("reversals", settings))
 
 
 def test_the_account_of_the_loop_to_be_tampered_with_closes(loop):

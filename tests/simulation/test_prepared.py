@@ -13,7 +13,7 @@ from finger_pin.core.tables import build_tables
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.exceptions import InputError, Interrupted
 
-SCENARIOS = ("fig6", "stick_slip", "servo", "servo_position", "press", "pinch", "hand", "grasp")
+SCENARIOS = ("reversals", "stick_slip", "servo", "servo_position", "press", "pinch", "hand", "grasp")
 
 # The other fingers have the keys of the thumb, and the hand of `grasp` is that of `hand`.
 ALIKE = re.compile(r"grasp\.hand\.|hand\.hand\.fingers\.(?!thumb)")
@@ -84,7 +84,7 @@ def test_every_number_that_ships_makes_what_reading_it_anew_does(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "finger"), [("fig6", ""), ("servo_position", ""), ("pinch", "left"), ("hand", "thumb")]
+    ("name", "finger"), [("reversals", ""), ("servo_position", ""), ("pinch", "left"), ("hand", "thumb")]
 )
 def test_a_run_records_bit_for_bit_what_simulating_the_scenario_read_anew_does(name, finger):
     key = f"hand.fingers.{finger}.finger.tendon_friction.coulomb" if finger else "finger.tendon_friction.coulomb"
@@ -101,7 +101,7 @@ def test_a_run_records_bit_for_bit_what_simulating_the_scenario_read_anew_does(n
         assert run.units(each) == read[each].units
 
 
-@pytest.mark.parametrize("name", ["fig6", "servo_position", "pinch", "hand"])
+@pytest.mark.parametrize("name", ["reversals", "servo_position", "pinch", "hand"])
 def test_what_needs_no_more_than_forces_has_the_bits_of_the_whole_result(name):
     scenario = fp.load_scenario(name, {"simulation.duration": 0.05})
     joints = ("position", "velocity", "reference", "torque_command", "torque")
@@ -129,11 +129,14 @@ def test_what_changes_the_structure_is_built_anew():
     assert np.array_equal(
         motors.run([*other.values()])["motor_current"], fp.simulate(fp.load_scenario("servo", other)).motor_current
     )
-    fingers = fp.prepare("fig6", ["finger", "reference", "simulation.duration"], ["joint_position"])
+    fingers = fp.prepare("reversals", ["finger", "reference", "simulation.duration"], ["joint_position"])
     planar = {"finger": "planar", "reference": {"joints": {}}, "simulation.duration": 0.02}
-    run, read = fingers.run([*planar.values()]), fp.prepare(fp.load_scenario("fig6", planar), [], ["joint_position"])
+    run, read = (
+        fingers.run([*planar.values()]),
+        fp.prepare(fp.load_scenario("reversals", planar), [], ["joint_position"]),
+    )
     assert np.array_equal(run["joint_position"], read.run()["joint_position"])
-    assert run["joint_position"].shape != fingers.run(["ub", {"joints": {}}, 0.02])["joint_position"].shape
+    assert run["joint_position"].shape != fingers.run(["ub_stand_in", {"joints": {}}, 0.02])["joint_position"].shape
 
 
 def test_one_number_of_a_list_and_a_star_stand_for_themselves():
@@ -158,7 +161,7 @@ def test_one_number_of_a_list_and_a_star_stand_for_themselves():
 )
 def test_what_is_wrong_is_refused_in_one_line(keys, values, said):
     with pytest.raises(InputError) as error:
-        fp.prepare("fig6", keys).run(values)
+        fp.prepare("reversals", keys).run(values)
     assert said in str(error.value) and "\n" not in str(error.value)
 
 
@@ -166,24 +169,24 @@ def test_what_is_wrong_is_refused_in_one_line(keys, values, said):
     ("scenario", "key", "said"),
     [
         ("hand", "finger.tendon_friction.coulomb", "there is a hand; keys of its fingers begin with hand.fingers"),
-        ("fig6", "hand.fingers.index.scale", "there is one finger"),
+        ("reversals", "hand.fingers.index.scale", "there is one finger"),
     ],
 )
 def test_a_key_of_a_finger_is_none_of_a_hand_and_the_other_way_round(scenario, key, said):
     with pytest.raises(InputError, match=said):
         fp.prepare(scenario, [key])
     with pytest.raises(InputError, match=said):
-        fp.Simulator("ub" if scenario == "fig6" else "ub_hand").set_parameters({key: 0.1})
+        fp.Simulator("ub_stand_in" if scenario == "reversals" else "ub_hand").set_parameters({key: 0.1})
 
 
 def test_a_variable_that_the_result_does_not_have_is_refused():
     with pytest.raises(InputError, match="did you mean joint_position"):
-        fp.prepare("fig6", record=["joint_positon"])
+        fp.prepare("reversals", record=["joint_positon"])
 
 
 def test_what_is_interrupted_is_the_begin_of_the_whole():
     looks = itertools.count()
-    prepared = fp.prepare("fig6", ["simulation.duration"])
+    prepared = fp.prepare("reversals", ["simulation.duration"])
     with pytest.raises(Interrupted) as said:
         prepared.run([2.0], stop=lambda: next(looks) == 3)
     found, whole = said.value.result, prepared.run([2.0])
@@ -192,7 +195,7 @@ def test_what_is_interrupted_is_the_begin_of_the_whole():
 
 
 def test_what_is_prepared_and_what_is_stepped_print_in_one_line_what_they_are():
-    prepared = fp.prepare("fig6", ["controller.gain"], ["joint_position"])
-    assert repr(prepared) == "Prepared(fig6, controller.gain=1.0; records joint_position)"
-    simulator = fp.Simulator("ub", position=[0.0, 0.3, 0.25, 0.2])
+    prepared = fp.prepare("reversals", ["controller.gain"], ["joint_position"])
+    assert repr(prepared) == "Prepared(reversals, controller.gain=1.0; records joint_position)"
+    simulator = fp.Simulator("ub_stand_in", position=[0.0, 0.3, 0.25, 0.2])
     assert repr(simulator) == "Simulator(ub at t = 0 s, theta = [0, 0.3, 0.25, 0.2] rad)"

@@ -22,11 +22,11 @@ def simulated(text, total):
 
 
 def test_a_notebook_shows_how_far_a_simulation_and_a_study_are(notebook, capsys):
-    fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 1.5}))
+    fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 1.5}))
     values = simulated(capsys.readouterr().err, "1.5")
     assert values == sorted(values) and (values[0], values[-1]) == (0.0, 1.5)
     gains = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0]
-    fp.simulate_many([fp.load_scenario("fig6", SHORT | {"controller.gain": gain}) for gain in gains])
+    fp.simulate_many([fp.load_scenario("reversals", SHORT | {"controller.gain": gain}) for gain in gains])
     assert "6/6" in capsys.readouterr().err
 
 
@@ -34,9 +34,9 @@ def test_a_notebook_shows_nothing_of_what_is_over_within_its_patience_and_a_scri
     notebook, capsys, monkeypatch
 ):
     monkeypatch.setattr(progress, "_PATIENCE", 1e6)
-    fp.simulate(fp.load_scenario("fig6", SHORT))
+    fp.simulate(fp.load_scenario("reversals", SHORT))
     monkeypatch.delitem(sys.modules, "IPython")
-    fp.simulate(fp.load_scenario("fig6", SHORT))
+    fp.simulate(fp.load_scenario("reversals", SHORT))
     assert progress.notebook_bar("s", 1.0) is None and capsys.readouterr() == ("", "")
 
 

@@ -17,7 +17,7 @@ from finger_pin.simulation.results import ResultFolder
 
 def short(duration):
     """Return one variable of a result: a file that is written in no time."""
-    return fp.simulate(load_scenario("fig6", {"simulation.duration": duration}))[["joint_position"]]
+    return fp.simulate(load_scenario("reversals", {"simulation.duration": duration}))[["joint_position"]]
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ TIGHT = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
     ("name", "entries", "keys", "variables", "bound"),
     [
         # Until 0.7 s another tension takes the lead in (22), twice.
-        ("fig6", POSED | {"simulation.duration": 0.7}, FRICTION, VARIABLES, 1e-3),
+        ("reversals", POSED | {"simulation.duration": 0.7}, FRICTION, VARIABLES, 1e-3),
         # Of the last number the rotors feel the most.
         ("servo", POSED, [*FRICTION, "finger.actuators.*.motor.friction.viscous"], VARIABLES, 3e-3),
         # A pad that touches a plate, sticks and slips.
@@ -129,8 +129,8 @@ def test_a_drum_on_a_spring_has_the_derivatives_of_the_damped_oscillator():
 def test_of_a_sampled_controller_they_are_the_differences_of_tight_runs_too():
     entries = {"simulation.duration": 0.1, "controller.sampling.period": 0.005}
     keys = ["controller.gain"]
-    run = fp.prepare(fp.load_scenario("fig6", entries), keys).run(sensitivities=True)
-    exact = fp.prepare(fp.load_scenario("fig6", entries | TIGHT), keys)
+    run = fp.prepare(fp.load_scenario("reversals", entries), keys).run(sensitivities=True)
+    exact = fp.prepare(fp.load_scenario("reversals", entries | TIGHT), keys)
     up, down = exact.run([1.0 + 1e-5]), exact.run([1.0 - 1e-5])
     expected = (up["joint_position"] - down["joint_position"]) / 2e-5
     error = run.slopes["joint_position"][0] - expected
@@ -168,6 +168,6 @@ def test_each_finger_of_a_hand_feels_numbers_of_its_own_alone():
 
 
 def test_what_has_no_slope_is_refused():
-    prepared = fp.prepare(fp.load_scenario("fig6", {"simulation.duration": 0.01}), ["simulation.method"])
+    prepared = fp.prepare(fp.load_scenario("reversals", {"simulation.duration": 0.01}), ["simulation.method"])
     with pytest.raises(fp.InputError, match="single numbers"):
         prepared.run(["Rodas4"], sensitivities=True)

@@ -169,7 +169,7 @@ def test_a_spool_of_two_tendons_works_beside_sampled_tensions_and_closes_the_acc
     both = {"motor": "STS3215", "tendons": ["T1", "T4"], "spool_radius": [0.006, 0.005], "drive": "position"}
     actuators = {"M": {**both, "pretension": [3.0, 3.0]}}
     overrides = {"finger.actuators": actuators, "simulation.duration": 0.1, "controller.sampling.period": 1.5e-3}
-    result = fp.simulate(fp.load_scenario("fig6", overrides))
+    result = fp.simulate(fp.load_scenario("reversals", overrides))
     assert np.all(np.ptp(result.spool_tension.values, axis=0) > 0.0) and float(result.spool_tension.min()) > 0.0
     assert np.ptp(result.motor_voltage.values) > 0.0
     # T2 has an ideal source, whose sampled tension goes right into the canal.
@@ -248,7 +248,7 @@ def test_servos_start_with_their_tendons_stretched_by_what_is_commanded_there(co
     """At rest on the reference, (22) plans f0 times the ratio of the internal tensions."""
     settings = {f"controller.{key}": value for key, value in controller.items()} | {"controller.damping": 0.0}
     result = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.002, **settings}))
-    internal = fp.Finger("ub").routing.force_closure().tension[:4]
+    internal = fp.Finger("ub_stand_in").routing.force_closure().tension[:4]
     np.testing.assert_allclose(result.spool_tension.values[0, :4], internal / internal.min(), rtol=1e-6)
 
 

@@ -16,7 +16,7 @@ from finger_pin.references.reference import ReferenceSignals
 
 
 def short(duration=0.02, **settings):
-    return fp.load_scenario("fig6", {"simulation.duration": duration} | settings)
+    return fp.load_scenario("reversals", {"simulation.duration": duration} | settings)
 
 
 @pytest.mark.parametrize(
@@ -121,9 +121,9 @@ def test_an_interruption_keeps_what_was_computed(fig6_runs, method):
 
 
 @pytest.mark.parametrize("method", ["Rodas5P", "Rodas4"])
-def test_an_interruption_of_the_compiled_core_keeps_what_was_computed(method, fig6):
+def test_an_interruption_of_the_compiled_core_keeps_what_was_computed(method, reversals):
     seen = []
-    scenario = fp.load_scenario("fig6", {"simulation.method": method})
+    scenario = fp.load_scenario("reversals", {"simulation.method": method})
     with pytest.raises(Interrupted) as caught:
         fp.simulate(scenario, progress=seen.append, stop=lambda: seen[-1] > 2.0)
     error = caught.value
@@ -131,7 +131,7 @@ def test_an_interruption_of_the_compiled_core_keeps_what_was_computed(method, fi
     assert 1.5 < error.time <= seen[-1]
     assert error.result.attrs["interrupted"] == f"interrupted at t = {error.time:.6g} s of 8 s"
     assert error.time - 1e-3 < float(error.result.time[-1]) <= error.time
-    whole = fig6.sel(time=error.result.time)
+    whole = reversals.sel(time=error.result.time)
     np.testing.assert_allclose(error.result.joint_position, whole.joint_position, atol=1e-3)
 
 
@@ -185,7 +185,7 @@ def test_a_sampled_controller_is_asked_once_a_period_and_held_between():
 
 
 def test_a_sampled_controller_approaches_the_continuous_one_in_proportion_to_its_period(fig6_runs):
-    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.1})
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.1})
     reference = fig6_runs["Rodas5P"].joint_position
     differences = [
         float(abs(fp.simulate(scenario, control_period=period).joint_position - reference).max())
@@ -218,12 +218,12 @@ def test_an_observer_sees_rising_times_and_the_signals_of_the_dynamics_and_chang
 
 def test_names_and_paths_will_do_for_a_scenario_and_a_finger(tmp_path):
     path = tmp_path / "short.toml"
-    path.write_text('extends = "fig6"\n[simulation]\nduration = 0.002\n', encoding="utf-8")
+    path.write_text('extends = "reversals"\n[simulation]\nduration = 0.002\n', encoding="utf-8")
     expected = fp.simulate(fp.load_scenario(path))
     assert fp.simulate(path).equals(expected) and fp.simulate(str(path)).equals(expected)
     with pytest.raises(fp.InputError, match="did you mean fig6"):
         fp.simulate("fgi6")
-    assert fp.Finger("ub").description == fp.load_finger("ub")
+    assert fp.Finger("ub_stand_in").description == fp.load_finger("ub_stand_in")
     with pytest.raises(fp.InputError, match="no such finger"):
         fp.Finger("no_such_hand")
 

@@ -182,7 +182,7 @@ def test_a_reset_goes_to_any_state_that_is_given_and_refuses_others(simulator: S
 def test_other_parameters_make_the_finger_that_is_read_with_them(simulator: Simulator) -> None:
     simulator.step(np.full(4, 2.0), 0.01)
     key, value = "finger.tendon_friction.coulomb", 0.03
-    other = fp.Simulator(fp.Finger(fp.load_finger("ub", {key: value})))
+    other = fp.Simulator(fp.Finger(fp.load_finger("ub_stand_in", {key: value})))
     other.x = simulator.x
     simulator.set_parameters({key: value})
     simulator.step(np.full(4, 3.0), 0.01)
@@ -221,7 +221,7 @@ def test_a_palm_moves_along_its_path_and_the_result_has_it(tmp_path: Path) -> No
     path = {"z": {"amplitude": 0.02, "frequency": 3.0}, "roll": {"amplitude": 0.5, "frequency": 1.0}}
     table = {
         "name": "shaken",
-        "hand": {"name": "one", "fingers": {"index": {"finger": "ub"}}, "palm": {"path": path}},
+        "hand": {"name": "one", "fingers": {"index": {"finger": "ub_stand_in"}}, "palm": {"path": path}},
         "controller": {"kind": "tensions", "minimum_tension": 2.0},
         "simulation": {"duration": 0.3, "rtol": 1e-8, "atol_scale": 1e-8},
     }
@@ -239,5 +239,5 @@ def test_a_palm_moves_along_its_path_and_the_result_has_it(tmp_path: Path) -> No
 
 
 def test_the_state_has_pinocchios_short_names():
-    state = fp.Simulator("ub", position=[0.0, 0.1, 0.2, 0.3]).state
+    state = fp.Simulator("ub_stand_in", position=[0.0, 0.1, 0.2, 0.3]).state
     assert state.q is state.position and state.v is state.velocity

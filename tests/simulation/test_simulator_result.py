@@ -28,7 +28,7 @@ def pushed(simulator: fp.Simulator, steps: int, seed: int) -> fp.Simulator:
 def test_held_tensions_give_the_dataset_of_an_open_loop_scenario(finger: fp.Finger) -> None:
     tensions = dict(zip(finger.routing.tendons, TENSION.tolist(), strict=False))
     entries = {f"controller.tensions.{name}.offset": tension for name, tension in tensions.items()}
-    scenario = fp.load_scenario("fig6", {"controller.kind": "tensions", "simulation.duration": 0.02, **entries})
+    scenario = fp.load_scenario("reversals", {"controller.kind": "tensions", "simulation.duration": 0.02, **entries})
     start = fp.Finger(scenario.finger).rest_state(START)
     expected = fp.simulate(scenario, initial=start)
     simulator = fp.Simulator(fp.Finger(scenario.finger), START)

@@ -12,7 +12,7 @@ def let_go(floor: float) -> tuple[fp.Scenario, np.ndarray]:
     """Return a finger that nothing pulls, all of whose tendons have just turned round."""
     entries = {f"controller.tensions.T{i}.offset": 0.0 for i in range(1, 5)}
     entries |= {"controller.kind": "tensions", "finger.tendon_friction.floor": floor, "simulation.duration": 0.01}
-    scenario = fp.load_scenario("fig6", entries)
+    scenario = fp.load_scenario("reversals", entries)
     finger = fp.Finger(scenario.finger)
     x = finger.rest_state(np.array([0.0, 0.4, 0.5, 0.35]))
     state = finger.layout.unpack(x)

@@ -12,7 +12,7 @@ HAND = """
 name = "one"
 gravity = [0.0, 0.0, -9.81]
 [hand.fingers.only]
-finger = "ub"
+finger = "ub_stand_in"
 """
 #: At rest at first, so that the palm's frame is the world's when the ball is thrown.
 TUMBLE = """

@@ -12,7 +12,7 @@ from finger_pin.views.summary import summarize
 
 #: A ball that falls on the fingertip, off it, and on the floor.
 BALL = """
-finger = "ub"
+finger = "ub_stand_in"
 [reference.joints.proximal]
 offset = 0.1
 [environment.objects.ball]
@@ -83,7 +83,7 @@ def test_what_pushes_back_loads_every_joint_as_the_same_force_at_the_fingertip_w
     """(17) knows of a force beyond a joint, not of where it acts."""
     at = pressed.isel(time=1200)
     assert float(at.contact_normal_force.max()) > 0.5
-    plain = fp.load_scenario("fig6")
+    plain = fp.load_scenario("reversals")
     finger = fp.Finger(plain.finger)
     x = finger.rest_state(at.joint_position.values, at.joint_velocity.values)
     state = finger.layout.unpack(x)

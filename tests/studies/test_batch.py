@@ -18,7 +18,7 @@ SHORT = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0}
 
 
 def scenarios(*gains: float) -> list[fp.Scenario]:
-    return [fp.load_scenario("fig6", {**SHORT, "controller.gain": gain}) for gain in gains]
+    return [fp.load_scenario("reversals", {**SHORT, "controller.gain": gain}) for gain in gains]
 
 
 def test_runs_at_once_are_bit_by_bit_the_runs_one_by_one() -> None:
@@ -57,7 +57,7 @@ def test_runs_that_all_fail_are_an_error_that_holds_what_was_computed(monkeypatc
 
 
 def test_what_only_some_runs_have_is_nan_in_the_others_and_said() -> None:
-    names = ("fig6", "servo", "press")
+    names = ("reversals", "servo", "press")
     runs = [fp.load_scenario(name, {"simulation.duration": 5e-3, "simulation.sample_rate": 1e3}) for name in names]
     ball = {"ball": {"shape": "sphere", "radius": 0.01, "mass": 0.01, "position": [0.0, 0.2, 0.0]}}
     more = runs[2].model_dump(exclude_none=True)
@@ -92,7 +92,7 @@ def test_only_the_chosen_variables_are_kept() -> None:
 
 def test_scenarios_are_taken_by_path(tmp_path: Path) -> None:
     file = tmp_path / "short.toml"
-    file.write_text('extends = "fig6"\n[simulation]\nduration = 0.01\n')
+    file.write_text('extends = "reversals"\n[simulation]\nduration = 0.01\n')
     alone = fp.simulate(file)
     assert (fp.simulate_many([file, str(file)], workers=1).joint_position == alone.joint_position).all()
 
@@ -121,7 +121,7 @@ def test_a_failing_run_is_nan_from_where_it_stopped_and_says_why(monkeypatch: py
         ([], {}, "scenarios"),
         (scenarios(1.0), {"workers": 0}, "workers"),
         (scenarios(1.0), {"variables": ["joint_positon"], "workers": 1}, "variables"),
-        ([*scenarios(1.0), fp.load_scenario("fig6")], {}, "scenarios[1].simulation.duration"),
+        ([*scenarios(1.0), fp.load_scenario("reversals")], {}, "scenarios[1].simulation.duration"),
         (
             [*scenarios(1.0), fp.load_scenario("stick_slip", {**SHORT, "simulation.sample_rate": 100.0})],
             {},

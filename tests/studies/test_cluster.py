@@ -47,14 +47,14 @@ def test_a_killed_worker_costs_no_run_and_doubles_none_and_all_are_those_of_thre
 
     over = {"controller.gain": GAINS}
     away = fp.sweep(
-        "fig6", over, metrics=METRICS, overrides=SHORT, output=tmp_path,
+        "reversals", over, metrics=METRICS, overrides=SHORT, output=tmp_path,
         executor=executor, progress=kill,
     )  # fmt: skip
     assert seen == [victim]
     keys = [json.loads(line)["key"] for line in (tmp_path / "runs.jsonl").read_text().splitlines()]
     assert len(keys) == len(set(keys)) == len(GAINS)
     assert set(away["status"].values) == {"done"}
-    here = fp.sweep("fig6", over, metrics=METRICS, overrides=SHORT, executor=ThreadPoolExecutor(2))
+    here = fp.sweep("reversals", over, metrics=METRICS, overrides=SHORT, executor=ThreadPoolExecutor(2))
     assert away.identical(here)
 
 
@@ -62,7 +62,7 @@ def test_a_run_that_kills_its_workers_is_recorded_with_its_reason(cluster, execu
     with distributed.Client(cluster) as client:
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 1))
     result = fp.sweep(
-        "fig6", {"controller.gain": [1.0, 2.0]}, metrics=[DIES], overrides=SHORT,
+        "reversals", {"controller.gain": [1.0, 2.0]}, metrics=[DIES], overrides=SHORT,
         executor=executor,
     )  # fmt: skip
     assert result["status"].values[1] == "failed"
@@ -72,7 +72,7 @@ def test_a_run_that_kills_its_workers_is_recorded_with_its_reason(cluster, execu
 def test_a_stop_ends_a_sweep_on_a_cluster(executor):
     done = []
     result = fp.sweep(
-        "fig6", {"controller.gain": GAINS}, metrics=[SLOW], overrides=SHORT,
+        "reversals", {"controller.gain": GAINS}, metrics=[SLOW], overrides=SHORT,
         executor=executor, progress=lambda *numbers: done.append(numbers[0]),
         stop=lambda: bool(done) and done[-1] >= 2,
     )  # fmt: skip
@@ -93,16 +93,16 @@ def test_a_scheduler_that_goes_away_is_told_and_what_was_done_stays(tmp_path):
     ) as own:
         away = distributed.Client(own, set_as_default=False).get_executor(pure=False)
         with pytest.raises(ExecutorError, match="the executor cannot go on"):
-            fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=away, progress=leave)
+            fp.sweep("reversals", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=away, progress=leave)
     assert len((folder / "runs.jsonl").read_text().splitlines()) == 2
-    again = fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=ThreadPoolExecutor(2))
+    again = fp.sweep("reversals", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=ThreadPoolExecutor(2))
     np.testing.assert_array_equal(again["slow_gain"], GAINS)
 
 
 def test_workers_of_another_source_are_refused(executor, monkeypatch):
     monkeypatch.setattr("finger_pin.studies.records.source_digest", lambda: "another")
     with pytest.raises(ExecutorError, match=r"a worker has another finger_pin \(\d.*\), not that of source another"):
-        fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], overrides=SHORT, executor=executor)
+        fp.sweep("reversals", {"controller.gain": [1.0]}, metrics=[GAIN], overrides=SHORT, executor=executor)
 
 
 def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, capsys):

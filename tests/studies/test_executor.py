@@ -75,13 +75,14 @@ def test_a_stop_ends_what_runs_in_threads_and_leaves_the_rest():
 GAINS, SHORT = (0.5, 1.0, 2.0), {"simulation.duration": 0.02}
 STUDIES = {
     "many": lambda **options: fp.simulate_many(
-        [fp.load_scenario("fig6", {**SHORT, "controller.gain": gain}) for gain in GAINS], **{"workers": 1} | options
+        [fp.load_scenario("reversals", {**SHORT, "controller.gain": gain}) for gain in GAINS],
+        **{"workers": 1} | options,
     ),
     "sweep": lambda **options: fp.sweep(
-        "fig6", {"controller.gain": GAINS}, overrides=SHORT, **{"executor": Serial()} | options
+        "reversals", {"controller.gain": GAINS}, overrides=SHORT, **{"executor": Serial()} | options
     ),
     "optimise": lambda **options: fp.optimise(
-        "fig6",
+        "reversals",
         ["controller.gain=0.5:4"],
         overrides=SHORT,
         constraints=[],
@@ -103,9 +104,9 @@ def test_ctrl_c_in_python_keeps_the_runs_that_are_finished(study):
     if study == "many":
         assert (result.run.values.tolist(), result.failure.values.tolist()) == ([0], [""])
         assert result.scenario.values.tolist() == [
-            fp.to_toml(fp.load_scenario("fig6", {**SHORT, "controller.gain": 0.5}))
+            fp.to_toml(fp.load_scenario("reversals", {**SHORT, "controller.gain": 0.5}))
         ]
-        alone = fp.simulate(fp.load_scenario("fig6", {**SHORT, "controller.gain": GAINS[0]})).joint_position
+        alone = fp.simulate(fp.load_scenario("reversals", {**SHORT, "controller.gain": GAINS[0]})).joint_position
         assert (result.joint_position[0].values == alone.values).all()
     else:
         assert result.status.values[0] == "done" and set(result.status.values[1:]) <= {"missing"}
@@ -146,7 +147,7 @@ def test_what_is_no_executor_is_refused_in_one_line(study, given):
 @pytest.mark.parametrize("workers", [0, 2.5, "2", True])
 def test_a_number_of_threads_is_a_whole_number(workers):
     with pytest.raises(fp.InputError, match=r"^workers[^\n]*$"):
-        fp.simulate_many(["fig6"], workers=workers)
+        fp.simulate_many(["reversals"], workers=workers)
 
 
 @pytest.mark.parametrize("study", STUDIES)
@@ -184,7 +185,8 @@ def doubled(run):
     return FACTOR * run.scenario.controller.gain
 
 
-result = fp.sweep("fig6", {"controller.gain": [1.0, 3.0]}, metrics=[Metric("doubled", "N m/rad", "doubled", doubled)])
+metrics = [Metric("doubled", "N m/rad", "doubled", doubled)]
+result = fp.sweep("reversals", {"controller.gain": [1.0, 3.0]}, metrics=metrics)
 print(result["doubled"].values, end="")
 """
 

@@ -83,7 +83,8 @@ def test_all_metrics_of_the_package_have_digests_of_their_own():
 def test_runs_with_a_law_of_ones_own_are_kept_under_a_digest_of_it():
     law = fp.Law("none", ("k",), lambda row, p: (0.0 * row.length, 0.0), lambda row, p, s: ((0,) * 7, (0,) * 6), abs)
     fingers = [
-        fp.Finger("ub", rows=[fp.Rows("none", law, ("a",), [[number]], np.zeros((1, 5)))]) for number in (1.0, 2.0, 1.0)
+        fp.Finger("ub_stand_in", rows=[fp.Rows("none", law, ("a",), [[number]], np.zeros((1, 5)))])
+        for number in (1.0, 2.0, 1.0)
     ]
     first, other, again = map(finger_digest, fingers)
-    assert first == again != other and first != finger_digest(fp.Finger("ub"))
+    assert first == again != other and first != finger_digest(fp.Finger("ub_stand_in"))

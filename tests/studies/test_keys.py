@@ -11,33 +11,35 @@ LENGTH = "finger.joints.distal.link.length"
 
 
 @pytest.fixture(scope="module")
-def fig6():
-    return BaseScenario.load("fig6")
+def reversals():
+    return BaseScenario.load("reversals")
 
 
-def test_a_point_changes_its_keys_and_nothing_else(fig6):
-    changed = fig6.at({"controller.gain": 2.0, RADIUS: 0.007})
-    expected = fp.load_scenario("fig6", {"controller.gain": 2.0, RADIUS: 0.007})
+def test_a_point_changes_its_keys_and_nothing_else(reversals):
+    changed = reversals.at({"controller.gain": 2.0, RADIUS: 0.007})
+    expected = fp.load_scenario("reversals", {"controller.gain": 2.0, RADIUS: 0.007})
     assert changed == expected
     assert changed.finger.tendons["T3"].crossings["medial"].radius == 0.007
 
 
-def test_what_a_file_leaves_to_its_default_follows_a_length(fig6):
-    link = fig6.at({LENGTH: 0.03}).finger.joints["distal"].link
+def test_what_a_file_leaves_to_its_default_follows_a_length(reversals):
+    link = reversals.at({LENGTH: 0.03}).finger.joints["distal"].link
     assert link.length == 0.03
     assert link.centre_of_mass == 0.015
 
 
-def test_an_index_means_one_number_of_a_list(fig6):
-    changed = fig6.at({"environment.fingertip_force[2]": -0.5, "environment.fingertip_force[0]": 0.1})
+def test_an_index_means_one_number_of_a_list(reversals):
+    changed = reversals.at({"environment.fingertip_force[2]": -0.5, "environment.fingertip_force[0]": 0.1})
     assert changed.environment.fingertip_force == (0.1, 0.0, -0.5)
-    listed = BaseScenario.load("fig6", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
+    listed = BaseScenario.load("reversals", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
     assert listed.at({"controller.gain[1]": 9.0}).controller.gain == (1.0, 9.0, 3.0, 4.0)
     assert listed.scenario.controller.gain == (1.0, 2.0, 3.0, 4.0)
 
 
-def test_a_whole_number_stays_one(fig6):
-    changed = BaseScenario.load("fig6", {"finger.tendons.T5.mass_after": 1}).at({"finger.tendons.T5.mass_after": 2.0})
+def test_a_whole_number_stays_one(reversals):
+    changed = BaseScenario.load("reversals", {"finger.tendons.T5.mass_after": 1}).at(
+        {"finger.tendons.T5.mass_after": 2.0}
+    )
     assert changed.finger.tendons["T5"].mass_after == 2
 
 
@@ -62,29 +64,29 @@ def test_a_whole_number_stays_one(fig6):
         ("finger.gravity[-1]", "index"),
     ],
 )
-def test_a_key_that_holds_no_number_is_told_in_one_line(fig6, key, says):
+def test_a_key_that_holds_no_number_is_told_in_one_line(reversals, key, says):
     with pytest.raises(fp.InputError) as caught:
-        fig6.check(key, [0.5, 0.6])
+        reversals.check(key, [0.5, 0.6])
     assert says in str(caught.value)
     assert str(caught.value).isprintable()
 
 
-def test_a_key_is_right_if_any_of_its_values_is_or_may_be_with_other_keys(fig6):
-    fig6.check("controller.gain", [-1.0, 1.0])
+def test_a_key_is_right_if_any_of_its_values_is_or_may_be_with_other_keys(reversals):
+    reversals.check("controller.gain", [-1.0, 1.0])
     with pytest.raises(fp.InputError, match=r"controller\.gain"):
-        fig6.check("controller.gain", [-1.0, -2.0])
+        reversals.check("controller.gain", [-1.0, -2.0])
     # Neither has force closure, but other radii may give it.
-    fig6.check(RADIUS, [-0.005, -0.006])
+    reversals.check(RADIUS, [-0.005, -0.006])
     with pytest.raises(fp.InputError, match=f"{RADIUS}: no value of it can be simulated: .*force closure"):
-        fig6.check(RADIUS, [-0.005, -0.006], alone=True)
+        reversals.check(RADIUS, [-0.005, -0.006], alone=True)
 
 
-def test_a_key_may_hold_a_name_or_a_whole_table_that_a_name_stands_for(fig6):
-    fig6.check("simulation.method", ["Rodas4", "Rodas5P"])
-    assert fig6.at({"simulation.method": "Rodas4"}).simulation.method == "Rodas4"
-    fig6.check("finger", ["ub", "dexmart_index"])
-    assert fig6.at({"finger": "dexmart_index"}).finger == fp.load_finger("dexmart_index")
-    fig6.check("controller.gravity_compensation", [True, False])
+def test_a_key_may_hold_a_name_or_a_whole_table_that_a_name_stands_for(reversals):
+    reversals.check("simulation.method", ["Rodas4", "Rodas5P"])
+    assert reversals.at({"simulation.method": "Rodas4"}).simulation.method == "Rodas4"
+    reversals.check("finger", ["ub_stand_in", "dexmart_index"])
+    assert reversals.at({"finger": "dexmart_index"}).finger == fp.load_finger("dexmart_index")
+    reversals.check("controller.gravity_compensation", [True, False])
 
 
 @pytest.mark.parametrize(
@@ -97,20 +99,20 @@ def test_a_key_may_hold_a_name_or_a_whole_table_that_a_name_stands_for(fig6):
         ("finger", ["bu"], "there are dexmart_index, planar, ub"),
     ],
 )
-def test_a_name_that_a_key_cannot_hold_is_told_in_one_line(fig6, key, values, says):
+def test_a_name_that_a_key_cannot_hold_is_told_in_one_line(reversals, key, values, says):
     with pytest.raises(fp.InputError, match=says):
-        fig6.check(key, values)
+        reversals.check(key, values)
 
 
 def test_a_reference_that_a_scenario_leaves_out_is_a_key():
-    still = BaseScenario.load("fig6", {"reference.joints": {}})
+    still = BaseScenario.load("reversals", {"reference.joints": {}})
     still.check("reference.joints.medial.offset", [0.1])
     assert still.at({"reference.joints.medial.offset": 0.1}).reference.joints["medial"].offset == 0.1
 
 
-def test_a_misspelt_name_of_a_tendon_does_not_make_a_new_one(fig6):
+def test_a_misspelt_name_of_a_tendon_does_not_make_a_new_one(reversals):
     with pytest.raises(fp.InputError, match=r"did you mean finger\.tendons\.T\d\.crossings\.abduction\.radius"):
-        fig6.check("finger.tendons.T9.crossings.abduction.radius", [0.001])
+        reversals.check("finger.tendons.T9.crossings.abduction.radius", [0.001])
 
 
 def test_what_a_key_holds_has_unit_and_name():
@@ -131,4 +133,4 @@ def test_a_star_stands_for_every_name_and_holds_what_the_first_one_holds():
     changed = servo.at({motor: "STS3215", radius: 0.006}).finger.actuators.values()
     assert [(each.motor.voltage, each.spool_radius) for each in changed] == [(7.4, 0.006)] * 4
     with pytest.raises(fp.InputError, match=r"finger\.actuators\.\*\.spool_radius"):
-        BaseScenario.load("fig6").check(radius, [0.004])
+        BaseScenario.load("reversals").check(radius, [0.004])

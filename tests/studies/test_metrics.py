@@ -16,7 +16,7 @@ TIME = np.array([0.0, 1.0, 2.0, 6.0])
 @pytest.fixture(scope="module")
 def made():
     """A run whose signals are written down here."""
-    run = Run(fp.load_scenario("fig6"))
+    run = Run(fp.load_scenario("reversals"))
     run.result = xr.Dataset(
         {
             "tracking_error": (("time", "joint"), [[0.3, 0.0], [0.3, 0.0], [-0.3, -0.4], [-0.3, -0.4]]),
@@ -55,7 +55,7 @@ def test_slack_time_counts_from_half_an_interval_before_to_half_after(made):
 
 
 def test_losses_are_what_was_supplied_and_not_stored():
-    run = Run(fp.load_scenario("fig6", {"simulation.duration": 0.1}))
+    run = Run(fp.load_scenario("reversals", {"simulation.duration": 0.1}))
     result = run.result
     stored = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
     gain = sum(float(result[f"energy_{name}"][-1] - result[f"energy_{name}"][0]) for name in stored)
@@ -68,7 +68,7 @@ def test_losses_are_what_was_supplied_and_not_stored():
 def test_the_self_locking_margin_falls_as_the_joints_friction_grows():
     margins = [
         METRICS["self_locking_margin"].measure(
-            Run(fp.load_scenario("fig6", {"finger.joint_friction.stiction": static}))
+            Run(fp.load_scenario("reversals", {"finger.joint_friction.stiction": static}))
         )
         for static in (3.5e-4, 7.0e-4)
     ]
@@ -77,7 +77,7 @@ def test_the_self_locking_margin_falls_as_the_joints_friction_grows():
 
 
 def test_the_fingertip_force_is_possible_in_every_direction_and_no_more_is():
-    scenario = fp.load_scenario("fig6")
+    scenario = fp.load_scenario("reversals")
     force = METRICS["fingertip_force"].measure(Run(scenario))
     finger = fp.Finger(scenario.finger)
     # Whole periods: the mean of every sinusoid is its offset.
@@ -90,7 +90,7 @@ def test_the_fingertip_force_is_possible_in_every_direction_and_no_more_is():
 
 
 def test_metrics_of_the_statics_simulate_nothing():
-    run = Run(fp.load_scenario("fig6"))
+    run = Run(fp.load_scenario("reversals"))
     METRICS["self_locking_margin"].measure(run)
     METRICS["fingertip_force"].measure(run)
     assert "result" not in vars(run)
@@ -109,7 +109,7 @@ def test_metrics_are_chosen_by_name_and_a_misspelt_one_is_told_the_nearest():
 def test_a_design_beyond_self_locking_is_measured_without_a_warning():
     """The tests make an error of every warning, so `simulate` alone stops there."""
     friction = {"finger.joint_friction.coulomb": 6e-3, "finger.joint_friction.stiction": 8e-3}
-    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.02} | friction)
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.02} | friction)
     with pytest.raises(fp.exceptions.SelfLockingWarning):
         fp.simulate(scenario)
     assert METRICS["self_locking_margin"].measure(Run(scenario)) < 1.0
@@ -118,7 +118,7 @@ def test_a_design_beyond_self_locking_is_measured_without_a_warning():
 
 def test_the_hysteresis_of_a_fingertip_is_the_chord_between_its_two_ways():
     """One joint turns by 0.05 rad less than it is told to, either way: 2 L sin(0.05) at the end of three links."""
-    run, time, behind = Run(fp.load_scenario("fig6")), np.linspace(0.0, 4.0, 4001), 0.05
+    run, time, behind = Run(fp.load_scenario("reversals")), np.linspace(0.0, 4.0, 4001), 0.05
     proximal = np.array([0.0, 1.0, 0.0, 0.0])
     wanted = (0.7 - 0.3 * np.cos(np.pi * time))[:, None] * proximal
     reached = wanted - behind * np.sign(np.sin(np.pi * time))[:, None] * proximal
@@ -177,7 +177,7 @@ def test_what_needs_a_reference_says_so_where_there_is_none():
 
 def test_the_settling_time_of_a_first_order_response_is_four_time_constants():
     """1 - exp(-t / T) is within 2 % of its end from t = T ln 50 on."""
-    run = Run(fp.load_scenario("fig6"))
+    run = Run(fp.load_scenario("reversals"))
     time = np.linspace(0.0, 10.0, 100_001)
     moved = np.stack([1.0 - np.exp(-time / 0.5), 0.0 * time], axis=1)
     run.result = xr.Dataset({"joint_position": (("time", "joint"), moved)}, {"time": time})
@@ -205,7 +205,7 @@ def test_a_winding_warms_up_as_its_closed_form_and_a_motor_without_its_numbers_i
 
 
 def test_the_grip_margin_is_the_friction_that_is_left_at_the_end():
-    run, time = Run(fp.load_scenario("fig6")), np.linspace(0.0, 1.0, 11)
+    run, time = Run(fp.load_scenario("reversals")), np.linspace(0.0, 1.0, 11)
     closed = np.array([1.0, 1.0, 0.0])
     signals = {"normal_force": closed, "level": 0.8 * closed, "friction": [0.2, 0.6, 0.0]}
     data = {f"contact_{name}": (("time", "contact"), np.tile(each, (11, 1))) for name, each in signals.items()}

@@ -121,7 +121,7 @@ def test_a_search_that_is_told_the_same_takes_the_same_course():
 def search_gain(folder=None, **options):
     """Search where the front is known: cheap is the gain, dear is its inverse, so every gain is on the front."""
     settings = {"minimise": [CHEAP, DEAR], "constraints": [], "effort": FEW, "overrides": SHORT, "executor": TWO}
-    return fp.optimise("fig6", ["controller.gain=0.5:2"], output=folder, **(settings | options))
+    return fp.optimise("reversals", ["controller.gain=0.5:2"], output=folder, **(settings | options))
 
 
 def test_the_front_is_of_designs_that_keep_the_bounds_and_is_numbered_by_the_first_objective(tmp_path):
@@ -151,7 +151,7 @@ def test_every_design_of_the_front_is_a_scenario_that_gives_its_numbers(tmp_path
 def test_designs_that_cannot_be_run_do_not_count_and_are_recorded_with_their_reason():
     radius = "finger.tendons.T3.crossings.medial.radius"
     result = fp.optimise(
-        "fig6", [f"{radius}=-0.005:0.008"], minimise=["self_locking_margin"], constraints=[], effort=FEW,
+        "reversals", [f"{radius}=-0.005:0.008"], minimise=["self_locking_margin"], constraints=[], effort=FEW,
         overrides=SHORT, executor=TWO,
     )  # fmt: skip
     negative = result[radius].values < 0.0
@@ -167,9 +167,9 @@ def test_radii_that_have_force_closure_only_together_are_searched():
     for key, (low, high) in over.items():
         for radius in (low, 0.5 * (low + high), high):
             with pytest.raises(fp.InputError, match="force closure"):
-                fp.load_scenario("fig6", {key: radius})
+                fp.load_scenario("reversals", {key: radius})
     result = fp.optimise(
-        "fig6", [f"{key}={low}:{high}" for key, (low, high) in over.items()], minimise=["self_locking_margin"],
+        "reversals", [f"{key}={low}:{high}" for key, (low, high) in over.items()], minimise=["self_locking_margin"],
         constraints=[], effort=FEW, overrides=SHORT, executor=TWO,
     )  # fmt: skip
     assert result["feasible"].all()
@@ -226,7 +226,7 @@ def test_progress_counts_the_designs_of_all_generations():
 )
 def test_wrong_input_writes_nothing(tmp_path, over, options):
     with pytest.raises(fp.InputError):
-        fp.optimise("fig6", over, output=tmp_path / "out", **options)
+        fp.optimise("reversals", over, output=tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
 
 

@@ -64,7 +64,7 @@ def test_a_search_without_a_design_that_keeps_the_bounds_has_its_own_exit_code(s
     ]
     assert script.main([*arguments, "--quiet"]) == 3
     assert capsys.readouterr().err == "optimise.py: no design keeps all constraints\n"
-    assert list(tmp_path.glob("results/optimise-fig6-*/figures/pareto.png"))
+    assert list(tmp_path.glob("results/optimise-reversals-*/figures/pareto.png"))
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def grid(tmp_path_factory):
     over = {"controller.gain": [0.5, 1.0, 2.0], RADIUS: [-0.005, 0.0063]}
     metrics = ["tracking_rms", "tension_peak"]
     result = fp.sweep(
-        "fig6", over, metrics=metrics, overrides=SHORT, output=folder, executor=TWO,
+        "reversals", over, metrics=metrics, overrides=SHORT, output=folder, executor=TWO,
         progress=lambda *numbers: seen.append(numbers),
     )  # fmt: skip
     return folder, result, seen
@@ -40,7 +40,7 @@ def test_a_grid_has_a_dimension_per_key_and_every_number_is_that_of_its_own_run(
     _, result, _ = grid
     assert result["tracking_rms"].dims == ("controller.gain", RADIUS)
     for gain in (0.5, 1.0, 2.0):
-        alone = Run(fp.load_scenario("fig6", {**SHORT, "controller.gain": gain, RADIUS: 0.0063}))
+        alone = Run(fp.load_scenario("reversals", {**SHORT, "controller.gain": gain, RADIUS: 0.0063}))
         for name in ("tracking_rms", "tension_peak"):
             found = result[name].sel({"controller.gain": gain, RADIUS: 0.0063})
             assert float(found) == METRICS[name].measure(alone)
@@ -66,7 +66,7 @@ def test_variables_and_coordinates_have_units_and_names_and_the_dataset_its_orig
         )
         assert result[name].attrs["long_name"]
     assert "version_finger_pin" in result.attrs
-    assert 'name = "fig6"' in result.attrs["scenario"]
+    assert 'name = "reversals"' in result.attrs["scenario"]
 
 
 def test_progress_begins_with_what_is_there_and_ends_with_all(grid):
@@ -85,7 +85,7 @@ def test_the_same_again_repeats_no_run(grid):
     before = (folder / "runs.jsonl").read_bytes()
     seen = []
     again = fp.sweep(
-        "fig6", fp.studies.Grid({"controller.gain": (0.5, 1.0, 2.0), RADIUS: (-0.005, 0.0063)}),
+        "reversals", fp.studies.Grid({"controller.gain": (0.5, 1.0, 2.0), RADIUS: (-0.005, 0.0063)}),
         metrics=["tracking_rms", "tension_peak"], overrides=SHORT, output=folder, executor=TWO,
         progress=lambda *numbers: seen.append(numbers),
     )  # fmt: skip
@@ -98,21 +98,23 @@ def test_samples_have_every_key_as_a_coordinate():
     cube = fp.studies.LatinHypercube(
         {"controller.gain": fp.studies.Range(0.5, 2.0), "environment.fingertip_force[2]": fp.studies.Range(0, 1)}, 3
     )
-    result = fp.sweep("fig6", cube, metrics=[GAIN], overrides=SHORT, executor=TWO)
+    result = fp.sweep("reversals", cube, metrics=[GAIN], overrides=SHORT, executor=TWO)
     assert result["gain"].dims == ("sample",)
     np.testing.assert_array_equal(result["gain"], result["controller.gain"])
     assert result["environment.fingertip_force[2]"].dims == ("sample",)
 
 
 def test_a_run_that_raises_is_told_in_one_line_and_the_others_go_on():
-    result = fp.sweep("fig6", {"controller.gain": [1.0, 2.0, 3.0]}, metrics=[RAISES], overrides=SHORT, executor=TWO)
+    result = fp.sweep(
+        "reversals", {"controller.gain": [1.0, 2.0, 3.0]}, metrics=[RAISES], overrides=SHORT, executor=TWO
+    )
     assert list(result["status"].values) == ["done", "failed", "done"]
     assert result["reason"].values[1] == "ArithmeticError: planted in two lines"
     np.testing.assert_array_equal(result["raises_at_two"], [1.0, np.nan, 3.0])
 
 
 def test_an_integration_that_fails_is_recorded_with_its_reason():
-    result = fp.sweep("fig6", {"controller.gain": [1.0, 2.0]}, metrics=[STOPS], overrides=SHORT, executor=TWO)
+    result = fp.sweep("reversals", {"controller.gain": [1.0, 2.0]}, metrics=[STOPS], overrides=SHORT, executor=TWO)
     assert list(result["status"].values) == ["done", "failed"]
     assert str(result["reason"].values[1]).startswith("the integration stopped at t = 0.01 s: the step is too small")
 
@@ -121,28 +123,30 @@ def test_a_pool_that_breaks_keeps_what_is_finished_and_the_same_call_does_the_re
     gains = [1.0, 3.0, 2.0, 4.0]
     options = {"metrics": [DIES_ONCE], "overrides": {**SHORT, "title": str(tmp_path)}, "output": tmp_path / "out"}
     with ProcessPoolExecutor(1) as pool, pytest.raises(fp.studies.ExecutorError, match="BrokenProcessPool"):
-        fp.sweep("fig6", {"controller.gain": gains}, executor=pool, **options)
+        fp.sweep("reversals", {"controller.gain": gains}, executor=pool, **options)
     assert (tmp_path / "mark").exists()
     assert [line["point"]["controller.gain"] for line in lines(tmp_path / "out")] == [1.0, 3.0]
     with ProcessPoolExecutor(1) as pool:
-        result = fp.sweep("fig6", {"controller.gain": gains}, executor=pool, **options)
+        result = fp.sweep("reversals", {"controller.gain": gains}, executor=pool, **options)
     np.testing.assert_array_equal(result["dies_once_at_two"], gains)
     assert len(lines(tmp_path / "out")) == 4
 
 
 def test_a_sweep_whose_runs_all_fail_is_an_error_that_holds_their_reasons(tmp_path):
     with pytest.raises(StudyError, match=r"every run failed; the first one: ArithmeticError: planted") as caught:
-        fp.sweep("fig6", {"controller.gain": [2.0]}, metrics=[RAISES], overrides=SHORT, output=tmp_path, executor=TWO)
+        fp.sweep(
+            "reversals", {"controller.gain": [2.0]}, metrics=[RAISES], overrides=SHORT, output=tmp_path, executor=TWO
+        )
     assert fp.load(tmp_path / "sweep.nc").identical(caught.value.result)
 
 
 def test_names_and_switches_are_swept_like_numbers(tmp_path):
     over = {"simulation.method": ["Rodas4", "Rodas5P"], "controller.gravity_compensation": [True, False]}
-    result = fp.sweep("fig6", over, metrics=["tracking_rms"], overrides=SHORT, output=tmp_path, executor=TWO)
+    result = fp.sweep("reversals", over, metrics=["tracking_rms"], overrides=SHORT, output=tmp_path, executor=TWO)
     for method in ("Rodas4", "Rodas5P"):
         for switch in (True, False):
             changed = {"simulation.method": method, "controller.gravity_compensation": switch}
-            alone = METRICS["tracking_rms"].measure(Run(fp.load_scenario("fig6", SHORT | changed)))
+            alone = METRICS["tracking_rms"].measure(Run(fp.load_scenario("reversals", SHORT | changed)))
             # A controller written in Python calls libraries that round by their number of threads.
             assert float(result["tracking_rms"].sel(changed)) == pytest.approx(alone, rel=1e-7)
     assert fp.load(tmp_path / "sweep.nc").identical(result)
@@ -171,7 +175,12 @@ def test_a_metric_that_was_edited_is_measured_anew_and_one_that_was_not_is_not(t
         (tmp_path / f"edited{number}.py").write_text(OWN_METRIC.format(factor=factor, sign=sign))
         metric = importlib.import_module(f"edited{number}").OWN
         result = fp.sweep(
-            "fig6", {"controller.gain": [1.0]}, metrics=[metric], overrides=SHORT, output=tmp_path / "o", executor=TWO
+            "reversals",
+            {"controller.gain": [1.0]},
+            metrics=[metric],
+            overrides=SHORT,
+            output=tmp_path / "o",
+            executor=TWO,
         )
         found.append((float(result["own"][0]), len(lines(tmp_path / "o"))))
     assert found == [(2.0, 1), (2.0, 1), (3.0, 2), (-3.0, 3)]
@@ -182,13 +191,13 @@ def test_what_depends_on_something_unknown_is_done_anew_and_said(tmp_path):
     metric = fp.studies.Metric("odd", "1", "odd", lambda run: float(mystery is not None))
     for count in (1, 2):
         with pytest.warns(UserWarning, match="the metric odd uses an object of type object, so its runs are done anew"):
-            fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[metric], output=tmp_path, executor=TWO)
+            fp.sweep("reversals", {"controller.gain": [1.0]}, metrics=[metric], output=tmp_path, executor=TWO)
         assert len(lines(tmp_path)) == count
 
 
 def test_another_source_of_the_package_does_all_anew(tmp_path, monkeypatch):
     def run():
-        fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], output=tmp_path, executor=TWO)
+        fp.sweep("reversals", {"controller.gain": [1.0]}, metrics=[GAIN], output=tmp_path, executor=TWO)
 
     run()
     monkeypatch.setattr("finger_pin.studies.records.source_digest", lambda: "another")
@@ -201,7 +210,7 @@ def test_failed_runs_are_repeated_when_asked_for(tmp_path):
 
     def run(**options):
         return fp.sweep(
-            "fig6", {"controller.gain": [1.0, 2.0]}, metrics=[RAISES], overrides=overrides, output=tmp_path,
+            "reversals", {"controller.gain": [1.0, 2.0]}, metrics=[RAISES], overrides=overrides, output=tmp_path,
             executor=TWO, **options,
         )  # fmt: skip
 
@@ -219,7 +228,7 @@ def test_a_stop_leaves_the_rest_missing_and_the_next_time_does_only_that(tmp_pat
 
     def run(stop=None):
         return fp.sweep(
-            "fig6", {"controller.gain": gains}, metrics=[SLOW], overrides=SHORT, output=tmp_path, executor=TWO,
+            "reversals", {"controller.gain": gains}, metrics=[SLOW], overrides=SHORT, output=tmp_path, executor=TWO,
             progress=lambda *numbers: done.append(numbers[0]), stop=stop,
         )  # fmt: skip
 
@@ -247,7 +256,7 @@ def test_a_stop_leaves_the_rest_missing_and_the_next_time_does_only_that(tmp_pat
 )
 def test_wrong_input_writes_nothing(tmp_path, over, options):
     with pytest.raises(fp.InputError):
-        fp.sweep("fig6", over, output=tmp_path / "out", **options)
+        fp.sweep("reversals", over, output=tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
 
 

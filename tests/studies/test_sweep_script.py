@@ -52,7 +52,7 @@ def test_a_sweep_writes_its_results_and_says_what_came_out(script, tmp_path, mon
     assert "4 runs: 2 done, 2 failed" in printed.out
     assert "force closure" in printed.out
     (folder,) = (tmp_path / "results").iterdir()
-    assert folder.name.startswith("sweep-fig6-duration-0.02-gain-0.5to2to2-tendons.T3.")
+    assert folder.name.startswith("sweep-reversals-duration-0.02-gain-0.5to2to2-tendons.T3.")
     found = {str(each.relative_to(folder)) for each in folder.rglob("*") if each.is_file()}
     assert found == {"study.toml", "runs.jsonl", "sweep.nc", "figures/sweep.png"}
     assert dict(fp.load(folder / "sweep.nc").sizes) == {"controller.gain": 2, radius: 2}

@@ -73,7 +73,7 @@ def synthetic(joints=4, actuated=4, passive=1, samples=2001, seed=0):
     }
     if passive > 1:
         coordinates["passive_tendon"] = names[actuated:]
-    return xr.Dataset(variables, coordinates, scene_metadata(fp.load_scenario("fig6")))
+    return xr.Dataset(variables, coordinates, scene_metadata(fp.load_scenario("reversals")))
 
 
 SIZES = {"paper": (4, 4, 1), "planar": (2, 3, 0), "two passive": (4, 4, 2), "many": (9, 6, 3)}

@@ -14,7 +14,7 @@ WORDS = {False: "it does not lock", True: "it locks"}
 @pytest.mark.parametrize("friction", [3.5e-4, 1e-3])
 def test_every_number_says_its_tendon_friction_and_posture_and_a_finger_that_locks_is_said_to(friction):
     overrides = {f"finger.joint_friction.{name}": friction for name in ("coulomb", "stiction")}
-    scenario = fp.load_scenario("fig6", overrides)
+    scenario = fp.load_scenario("reversals", overrides)
     found = fp.analysis.self_locking_map(fp.Finger(scenario.finger))
     without, somewhere, moving = summarize_locking(scenario, found).split("\n\n")
     assert "without tendon friction" in without
@@ -31,7 +31,7 @@ def test_every_number_says_its_tendon_friction_and_posture_and_a_finger_that_loc
 
 
 def test_the_posture_at_which_it_locks_first_is_named_where_postures_differ():
-    bent = fp.load_scenario("fig6", {"finger.tendons.T5.crossings.distal.bends": True})
+    bent = fp.load_scenario("reversals", {"finger.tendons.T5.crossings.distal.bends": True})
     found = fp.analysis.self_locking_map(fp.Finger(bent.finger))
     medial = found.angles[1][np.argmin(found.coefficient.min(axis=0))]
     assert f"locks at {1e3 * found.coefficient.min():.3f}, at proximal " in summarize_locking(bent, found)

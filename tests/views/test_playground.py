@@ -70,7 +70,7 @@ def test_a_spring_at_the_tip_pulls_with_its_stiffness(hinge):
 
 
 def test_joint_references_are_reached_and_followers_follow():
-    session = Session("fig6", rtol=1e-4)
+    session = Session("reversals", rtol=1e-4)
     goal = np.array([0.05, 0.5, 0.7])
     for index, angle in enumerate(goal):
         session.move(JOINTS, index, angle)
@@ -82,15 +82,18 @@ def test_joint_references_are_reached_and_followers_follow():
 
 
 def test_friction_that_is_changed_acts_as_if_it_had_been_there():
-    session = Session("fig6", rtol=1e-6)
+    session = Session("reversals", rtol=1e-6)
     run(session, 0.3)
     x, time_, before = session.simulator.x, session.simulator.time, session.finger
     session.change(0, 0.4)
     other = fp.Simulator(
-        fp.load_finger("ub", {"finger.tendon_friction.coulomb": 0.4}), method="Rodas4", rtol=1e-6, atol_scale=1e-6
+        fp.load_finger("ub_stand_in", {"finger.tendon_friction.coulomb": 0.4}),
+        method="Rodas4",
+        rtol=1e-6,
+        atol_scale=1e-6,
     )
     other.reset(x)
-    loop = ClosedLoop.from_scenario(fp.load_scenario("fig6"))
+    loop = ClosedLoop.from_scenario(fp.load_scenario("reversals"))
     for step in range(100):
         state, now = other.state, time_ + 1e-3 * step
         plan = loop.controller.command(now, loop.reference.at(now), state.position, state.velocity)
@@ -104,18 +107,18 @@ def test_friction_that_is_changed_acts_as_if_it_had_been_there():
 
 
 def test_what_is_not_allowed_leaves_the_finger_as_it_was():
-    session = Session("fig6", keys=["finger.joint_friction.stiction"])
+    session = Session("reversals", keys=["finger.joint_friction.stiction"])
     x = session.simulator.x
     with pytest.raises(fp.InputError, match="stiction"):
         session.change(len(session.parameters) - 1, 0.0)
     assert (session.simulator.x == x).all()
-    assert session.finger.description.joint_friction.stiction == fp.load_finger("ub").joint_friction.stiction
+    assert session.finger.description.joint_friction.stiction == fp.load_finger("ub_stand_in").joint_friction.stiction
     with pytest.raises(fp.InputError, match="T1 = 30"):
         session.move(TENDONS, 0, 30.0)
 
 
 def test_a_record_is_the_run_of_a_simulator_under_the_same_inputs_bit_by_bit(tmp_path):
-    session = Session("fig6")
+    session = Session("reversals")
     start, given, step = session.simulator.x, [], session.simulator.step
     session.simulator.step = lambda *arguments: given.append([np.copy(each) for each in arguments]) or step(*arguments)
     session.record()
@@ -124,26 +127,26 @@ def test_a_record_is_the_run_of_a_simulator_under_the_same_inputs_bit_by_bit(tmp
     session.handles[0] = session.tips[0] + 0.01
     run(session, 0.05)
     (piece,) = session.stop()
-    (path,) = save_pieces([piece], tmp_path / "play", "fig6")
-    plain = fp.Simulator(fp.Finger("ub"), method="Rodas4", rtol=1e-3, atol_scale=1e-3)
+    (path,) = save_pieces([piece], tmp_path / "play", "reversals")
+    plain = fp.Simulator(fp.Finger("ub_stand_in"), method="Rodas4", rtol=1e-3, atol_scale=1e-3)
     plain.reset(start)
     plain.x = start
     for command, period, force in given:
         plain.step(command, float(period), force)
     assert (plain.x == session.simulator.x).all()
     assert plain.result().equals(fp.load(path))
-    assert path.name == "fig6-1.nc"
+    assert path.name == "reversals-1.nc"
     assert float(np.abs(fp.load(path).fingertip_force).max()) > 0.1
 
 
 def test_a_record_has_a_piece_for_every_change_of_the_finger(tmp_path):
-    session = Session("fig6")
+    session = Session("reversals")
     session.record()
     run(session, 0.01)
     session.change(0, 0.3)
     run(session, 0.02)
     pieces = session.stop()
-    paths = save_pieces(pieces, tmp_path, "fig6")
+    paths = save_pieces(pieces, tmp_path, "reversals")
     lasts = [float(fp.load(path).time[-1]) for path in paths]
     assert lasts == pytest.approx([0.01, 0.03])
     frictions = [json.loads(fp.load(path).attrs["finger"])["tendon_friction"]["coulomb"] for path in paths]
@@ -164,7 +167,7 @@ def test_servos_in_position_drive_wind_as_in_a_simulation():
 
 
 def test_damping_of_light_links_is_that_of_a_simulation():
-    scenario = fp.load_scenario("fig6", {"controller.damping": 0.01, "simulation.duration": 0.3})
+    scenario = fp.load_scenario("reversals", {"controller.damping": 0.01, "simulation.duration": 0.3})
     session = Session(scenario, rtol=1e-5)
     run(session, 0.3)
     expected = fp.simulate(scenario).isel(time=-1)
@@ -173,7 +176,7 @@ def test_damping_of_light_links_is_that_of_a_simulation():
 
 
 def test_friction_in_use_is_bristle_force_over_its_level():
-    session = Session("fig6")
+    session = Session("reversals")
     run(session, 0.2)
     found, reading = session.signals(), session.reading()
     np.testing.assert_allclose(reading.tendon_use, np.abs(found.state.tendon_stiction) / found.tendons.level)
@@ -205,9 +208,9 @@ def test_time_runs_as_fast_as_asked_or_slower_and_says_so(cost, rate):
 
 def test_what_cannot_be_played_is_refused_in_one_line():
     with pytest.raises(fp.InputError, match=r"controller\.sampling: cannot be played"):
-        Session(fp.load_scenario("fig6", {"controller.sampling.period": 1e-3}))
+        Session(fp.load_scenario("reversals", {"controller.sampling.period": 1e-3}))
     with pytest.raises(fp.InputError, match=r"simulation\.start_time = 1\.0: must be 0"):
-        Session(fp.load_scenario("fig6", {"simulation.start_time": 1.0}))
+        Session(fp.load_scenario("reversals", {"simulation.start_time": 1.0}))
     with pytest.raises(fp.InputError, match="cannot change while it is played"):
         Session("press", keys=["environment.objects.plate.surface.friction"])
 
@@ -233,7 +236,7 @@ def until(condition, patience=120.0):
 
 def test_a_slider_on_the_page_moves_a_joint(browser, loaded, tmp_path):
     pytest.importorskip("viser", reason="needs viser, which the extra 'play' brings")
-    with fp.play("fig6", block=False, open_browser=False, folder=tmp_path) as playground:
+    with fp.play("reversals", block=False, open_browser=False, folder=tmp_path) as playground:
         assert playground.url.startswith("http://127.0.0.1:")
         assert playground.url in playground._repr_html_()
         session = playground.session
@@ -251,7 +254,7 @@ def test_a_slider_on_the_page_moves_a_joint(browser, loaded, tmp_path):
             until(lambda button=button: browser.find_elements("xpath", button))
             browser.find_element("xpath", button).click()
         until(lambda: playground.message.startswith("saved: "))
-        assert fp.load(tmp_path / "fig6-1.nc").joint_position[-1, 1] == pytest.approx(np.pi / 2.0, abs=0.2)
+        assert fp.load(tmp_path / "reversals-1.nc").joint_position[-1, 1] == pytest.approx(np.pi / 2.0, abs=0.2)
         errors = [line for line in browser.get_log("browser") if line["level"] == "SEVERE"]
         assert not errors
         assert {*loaded()} == {playground.url}

@@ -22,7 +22,7 @@ from finger_pin.views.playground.access import own_page_only  # noqa: E402
 @pytest.fixture(scope="module")
 def playground(tmp_path_factory):
     folder = tmp_path_factory.mktemp("play")
-    with fp.play("fig6", block=False, open_browser=False, folder=folder) as playing:
+    with fp.play("reversals", block=False, open_browser=False, folder=folder) as playing:
         yield playing
 
 

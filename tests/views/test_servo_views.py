@@ -77,5 +77,5 @@ def test_metrics_of_motors_are_those_of_the_result(result):
     assert METRICS["current_peak"].measure(run) == float(abs(result.motor_current).max())
     ends = max(float(result[name].max()) for name in ("spool_tension", "tendon_tension"))
     assert METRICS["tension_peak"].measure(run) == ends
-    ideal = Run(fp.load_scenario("fig6", {"simulation.duration": 0.002}))
+    ideal = Run(fp.load_scenario("reversals", {"simulation.duration": 0.002}))
     assert METRICS["heat"].measure(ideal) == METRICS["current_peak"].measure(ideal) == 0.0

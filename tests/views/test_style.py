@@ -57,7 +57,7 @@ def settings():
 before = settings()
 from finger_pin.exceptions import InputError
 from finger_pin.views import plots
-plots.plot_critical_friction("ub")
+plots.plot_critical_friction("ub_stand_in")
 print("matplotlib.pyplot" in sys.modules, "tkinter" in sys.modules, settings() == before)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

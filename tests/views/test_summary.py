@@ -12,7 +12,7 @@ from finger_pin.views.summary import summarize
 
 @pytest.fixture(scope="module")
 def result():
-    return fp.simulate(load_scenario("fig6", {"simulation.duration": 0.02}))
+    return fp.simulate(load_scenario("reversals", {"simulation.duration": 0.02}))
 
 
 def test_the_summary_names_every_joint_and_tendon_and_fits_a_terminal(result):

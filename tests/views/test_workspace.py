@@ -16,7 +16,7 @@ from finger_pin.views.plots.workspace_surfaces import fingertip_surface, flexion
 
 @pytest.fixture(scope="module")
 def paper_surface():
-    return fingertip_surface(Finger(load_finger("ub")), samples=31)
+    return fingertip_surface(Finger(load_finger("ub_stand_in")), samples=31)
 
 
 def test_workspace_extremes_are_those_of_equation_1(paper_surface):
@@ -35,7 +35,7 @@ def test_workspace_extremes_are_those_of_equation_1(paper_surface):
 
 
 def test_workspace_surface_bounds_all_that_the_finger_reaches(paper_surface):
-    section = flexion_section(Finger(load_finger("ub"))).patches.reshape(-1, 3)
+    section = flexion_section(Finger(load_finger("ub_stand_in"))).patches.reshape(-1, 3)
     radius = np.hypot(paper_surface[..., 0], paper_surface[..., 1]).ravel()
     height = paper_surface[..., 2].ravel()
     random = np.random.default_rng(5)
@@ -48,7 +48,7 @@ def test_workspace_surface_bounds_all_that_the_finger_reaches(paper_surface):
 
 
 def test_the_section_lies_in_the_flexion_plane_and_obeys_equation_4():
-    section = flexion_section(Finger(load_finger("ub")), samples=11)
+    section = flexion_section(Finger(load_finger("ub_stand_in")), samples=11)
     assert section.plane == (0, 2)
     assert section.patches.shape == (1, 11, 11, 3)
     angles = np.linspace(0.0, np.pi / 2, 11)
@@ -59,7 +59,7 @@ def test_the_section_lies_in_the_flexion_plane_and_obeys_equation_4():
 
 
 def test_a_driven_joint_that_would_leave_its_range_bounds_the_workspace():
-    finger = Finger(load_finger("ub", {"finger.joints.distal.range": [0.0, 0.35]}))
+    finger = Finger(load_finger("ub_stand_in", {"finger.joints.distal.range": [0.0, 0.35]}))
     section = flexion_section(finger, samples=61)
     flexed = np.linspace(0.0, np.pi / 2, 61)
     outside = np.isnan(section.patches[0, ..., 0]).all(axis=0)
@@ -76,19 +76,21 @@ def test_the_workspace_of_a_planar_finger_lies_in_its_plane():
     np.testing.assert_allclose(tips.min(axis=0), [-l2, 0.0, 0.0], atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["ub", "planar"])
-def test_fig2_prints_ranges_in_millimetres_and_accepts_finger_and_description(name, tmp_path):
+@pytest.mark.parametrize("name", ["ub_stand_in", "planar"])
+def test_fig2_prints_ranges_in_centimetres_and_accepts_finger_and_description(name, tmp_path):
     description = load_finger(name)
     for finger in (Finger(description), description):
         figure = plot_workspace(finger)
         space, plane = figure.axes
         labels = [space.get_xlabel(), space.get_ylabel(), space.get_zlabel(), plane.get_xlabel(), plane.get_ylabel()]
-        assert all(label.endswith("(mm)") for label in labels)
+        assert all(label.endswith("(cm)") for label in labels)
         texts = [" ".join(axes.get_title(loc="left").split()) for axes in (space, plane)]
-        assert all("mm" in text for text in texts)
-        assert all(("(4) imposed" in text) == (name == "ub") for text in texts)
-    if name == "ub":
-        assert "x: \N{MINUS SIGN}27.3 to 116.9 mm, y: \N{MINUS SIGN}20.3 to 20.3 mm, z: 0.0 to 96.7 mm" in texts[0]
+        assert all("cm" in text for text in texts)
+        assert ("(4) imposed" in texts[0]) == ("driven joints at 0" in texts[1]) == (name == "ub_stand_in")
+    if name == "ub_stand_in":
+        assert "x: \N{MINUS SIGN}2.7 to 11.7 cm, y: \N{MINUS SIGN}2.0 to 2.0 cm, z: 0.0 to 9.7 cm" in texts[0]
+        # theta4 = 0: the least x is that of the flexed finger, a1 - a3 - a4.
+        assert f"x: \N{MINUS SIGN}{1e2 * (A3 + A4 - A1):.1f} to 11.7 cm" in texts[1]
     plots.save_figure(figure, tmp_path / "fig2.png")
 
 

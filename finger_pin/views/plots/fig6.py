@@ -1,4 +1,4 @@
-"""Fig. 6: references, tracking errors, and every tendon's tension as planned and as delivered."""
+"""Fig. 6: angles over references, tracking errors, and every tendon's tension as planned and as delivered."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from finger_pin.simulation.recording import is_tracking
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
@@ -33,9 +34,9 @@ _OPEN_LOOP = (
 def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw Fig. 6 from a result.
 
-    (a) theta^d, or theta where theta^d is constant, and (b) theta^d - theta, deg; where nothing is followed, theta and
-    its rate. (c) One panel per tendon, N: dashed f_hat, solid f; for a passive tendon f is the tension of its distal
-    half (f5_4), and that of its proximal half (f5_3) is dotted.
+    (a) theta over theta^d, dashed, and (b) theta^d - theta, deg; where nothing is followed, theta and its rate. (c)
+    One panel per tendon, N: dashed f_hat, solid f; for a passive tendon f is the tension of its distal half (f5_4),
+    and that of its proximal half (f5_3) is dotted.
 
     Of a hand there is a row for each finger, with references, errors and delivered tensions.
 
@@ -57,13 +58,16 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
     figure, (left, right) = sheet([(5.1, height), (5.9, height)], width, titles)
     moves, tracks = bool(np.ptp(result["joint_reference"].values, axis=0).any()), is_tracking(result)
     below = "error θᵈ \N{MINUS SIGN} θ (°)" if tracks else "velocity (°/s)"
-    angles = stack(left, ["reference θᵈ (°)" if moves else "angle θ (°)", below])
-    constant = "; the references are constant" if tracks else ""
-    title(angles[0], "(a) references" if moves else f"(a) joint angles{constant}")
-    _joints(angles[0], result, "joint_reference" if moves else "joint_position")
+    angles = stack(left, ["angle θ (°)", below])
+    constant = "; the references are constant" if tracks and not moves else ""
+    title(angles[0], f"(a) joint angles{constant}")
+    _joints(angles[0], result, "joint_position")
+    lines = list(angles[0].get_lines())
+    if moves and tracks:
+        lines.append(_references(angles[0], result))
     title(angles[1], "(b) tracking errors" if tracks else "(b) joint velocities")
     _joints(angles[1], result, "tracking_error" if tracks else "joint_velocity")
-    legend(left, angles[0].get_lines())
+    legend(left, lines)
     panels = stack(right, [labelled(name, "N") for name in tendons])
     title(panels[0], "(c) tendon tensions")
     _tensions(panels, result)
@@ -75,6 +79,13 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
 def _joints(axes: Axes, result: xr.Dataset, variable: str) -> None:
     time, values = result["time"].values, np.rad2deg(result[variable].transpose("time", "joint").values)
     bundle(axes, time, values, names(result, "joint"), range(values.shape[1]))
+
+
+def _references(axes: Axes, result: xr.Dataset) -> Line2D:
+    """Draw theta^d of all joints, and return a line that stands for them."""
+    time, values = result["time"].values, np.rad2deg(result["joint_reference"].transpose("time", "joint").values)
+    look: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": thin(0.7)}
+    return [trace(axes, time, column, label="reference θᵈ", **look) for column in values.T][-1]
 
 
 def _tensions(panels: list[Axes], result: xr.Dataset) -> None:

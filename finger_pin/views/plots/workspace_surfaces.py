@@ -44,16 +44,22 @@ def fingertip_surface(finger: Finger, samples: int = 45) -> Array:
     Returns:
         Shape (patches, samples, samples, 3), m, base frame; not a number where a driven joint would leave its range.
     """
-    return _patches(finger, _constraint(finger).free, _rest(finger), samples)
+    return _patches(finger, _constraint(finger).free, _rest(finger), samples, _matrix(finger, True))
 
 
-def flexion_section(finger: Finger, samples: int = 61) -> Section:
-    """Return the planar section of the workspace: as `fingertip_surface`, with all but parallel joints held."""
-    held = _rest(finger)
+def flexion_section(finger: Finger, samples: int = 61, *, coupled: bool = True) -> Section:
+    """Return the planar section of the workspace: as `fingertip_surface`, with all but parallel joints held.
+
+    Args:
+        finger: Any finger.
+        samples: Points along either side of a patch.
+        coupled: Whether joints that passive tendons drive follow (4); else they are held as well.
+    """
+    held, matrix = _rest(finger), _matrix(finger, coupled)
     axes = _joint_axes(finger, held)
     parallel = [j for j in range(len(held)) if np.linalg.norm(np.cross(axes[j], axes[-1])) < _PARALLEL]
     moving = [j for j in _constraint(finger).free if j in parallel]
-    patches = _patches(finger, moving, held, samples)
+    patches = _patches(finger, moving, held, samples, matrix)
     normal = int(np.argmax(np.abs(axes[-1])))
     first, second = (axis for axis in range(3) if axis != normal)
     low, high = finger.stroke_limiter.lower, finger.stroke_limiter.upper
@@ -61,8 +67,16 @@ def flexion_section(finger: Finger, samples: int = 61) -> Section:
     for share in (0.0, 0.5, 1.0):
         pose = held.copy()
         pose[moving] = (1.0 - share) * held[moving] + share * high[moving]
-        poses.append(_skeleton(finger, np.clip(_constraint(finger).matrix @ pose, low, high)))
+        poses.append(_skeleton(finger, np.clip(matrix @ pose, low, high)))
     return Section(patches, (first, second), np.array(poses))
+
+
+def _matrix(finger: Finger, coupled: bool) -> Array:
+    """Return the matrix that gives all joints by those that are free, shape (n, n)."""
+    constraint = _constraint(finger)
+    return (
+        constraint.matrix if coupled else np.diag([float(j in constraint.free) for j in range(len(constraint.offset))])
+    )
 
 
 def _constraint(finger: Finger) -> PassiveCoupling:
@@ -74,9 +88,8 @@ def _rest(finger: Finger) -> Array:
     return np.asarray(np.clip(0.0, low, high))
 
 
-def _patches(finger: Finger, moving: list[int], held: Array, samples: int) -> Array:
+def _patches(finger: Finger, moving: list[int], held: Array, samples: int, matrix: Array) -> Array:
     low, high = finger.stroke_limiter.lower, finger.stroke_limiter.upper
-    matrix = _constraint(finger).matrix
     # A patch of fewer than two joints is a curve or a point: the missing ones stay where they are.
     pairs: list[tuple[int, ...]] = list(combinations(moving, 2)) or [tuple(moving)]
     patches = []

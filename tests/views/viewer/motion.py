@@ -15,7 +15,7 @@ def table(finger):
 
 
 def joint_position(t):
-    """The references of the scenario fig6; the distal joint in a fixed ratio to the medial one."""
+    """The references of the scenario reversals; the distal joint in a fixed ratio to the medial one."""
     medial = np.radians(35 - 25 * np.cos(np.pi * t))
     proximal = np.radians(35 - 25 * np.cos(np.pi * t / 2))
     return np.stack([np.radians(8) * np.sin(np.pi * t), proximal, medial, 0.7 * medial], axis=-1)
@@ -35,5 +35,5 @@ def make_result():
             "passive_tension_proximal": ("time", 0.5 * tensions(t)[:, 4]),
         },
         coords={"time": t},
-        attrs={"title": "a <test> motion", "finger": json.dumps(table("ub"))},
+        attrs={"title": "a <test> motion", "finger": json.dumps(table("ub_stand_in"))},
     )

@@ -77,7 +77,7 @@ def test_no_cone_is_larger_than_a_finger_is_wide(browser, pinched, tmp_path, fri
 
 
 def test_a_result_without_objects_has_none_on_its_page():
-    found, _ = played(fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.1})))
+    found, _ = played(fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.1})))
     assert "objects" not in found and set(found["chunks"][0]) == {"time", "pose", "path", "tension", "tip", "joint"}
 
 

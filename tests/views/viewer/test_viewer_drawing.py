@@ -49,7 +49,7 @@ def test_it_is_played_in_real_time_and_touches_nothing_but_the_finger(played):
 def test_links_stand_where_the_kinematics_say_and_tendons_have_the_colour_of_their_tension(played):
     sent = dict((command["path"], command) for _, command in played())
     q = joint_position(DURATION)
-    for name, (rotation, origin) in zip(fp.load_finger("ub").joints, frames(q), strict=False):
+    for name, (rotation, origin) in zip(fp.load_finger("ub_stand_in").joints, frames(q), strict=False):
         matrix = np.reshape(sent[f"/meshcat/bench/finger_pin/{name}_link"]["matrix"], (4, 4)).T
         np.testing.assert_allclose(matrix[:3, :3], rotation, atol=1e-9)
         np.testing.assert_allclose(matrix[:3, 3], origin, atol=1e-9)

@@ -101,7 +101,7 @@ def test_without_forces_the_panel_does_not_mention_them(page):
     assert not page.find_element("id", "forces").is_displayed()
 
 
-@pytest.mark.parametrize(("name", "posture"), [("planar", (0.4, 0.9)), ("ub", (0.0, 0.0, 0.0, 0.0))])
+@pytest.mark.parametrize(("name", "posture"), [("planar", (0.4, 0.9)), ("ub_stand_in", (0.0, 0.0, 0.0, 0.0))])
 def test_flat_sets_are_shown_too(browser, tmp_path, name, posture):
     finger = fp.Finger(fp.load_finger(name))
     path = tmp_path / "flat.html"

@@ -70,7 +70,7 @@ def test_the_scene_stands_upright_in_meshcat_which_has_z_up(page):
 @pytest.mark.parametrize("t", [0.0, 1.25, 2.4])
 def test_tendons_are_drawn_along_their_paths(page, t):
     seek(page, t)
-    geometry = TendonGeometry(fp.load_finger("ub"), resolution=60)
+    geometry = TendonGeometry(fp.load_finger("ub_stand_in"), resolution=60)
     for path in geometry.paths(joint_position(t)):
         if path.name == "T1" and tensions(t)[0] < 0.05:
             continue

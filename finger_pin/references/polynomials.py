@@ -1,0 +1,104 @@
+"""Piecewise polynomials of the kinds of signals: steps, ramps, points, half cosines and samples, about shared knots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from finger_pin.description.signals import SignalSettings
+from finger_pin.references.sample_fitting import thinned
+from finger_pin.typing import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+#: Number of coefficients of a polynomial, of degree five.
+ORDER = 6
+# Quintic pieces of half a period of a cosine: they miss it by (pi / 32)^6 / 92160 = 1e-11 of its height.
+_COSINE_PIECES = 32
+
+
+def polynomials(settings: Sequence[SignalSettings], tolerance: float) -> list[PPoly | None]:
+    """Return the polynomials that the kinds of signals add to the sinusoids, or None."""
+    found = [None if each.kind == "samples" else _polynomial(each) for each in settings]
+    rest = [index for index, each in enumerate(settings) if each.kind == "samples"]
+    while rest:
+        from scipy.interpolate import PPoly
+
+        # Those with the same times at once.
+        times = settings[rest[0]].times
+        together = [index for index in rest if settings[index].times == times]
+        values = np.transpose([np.asarray(settings[index].values) for index in together])
+        knots, coefficients = thinned(np.asarray(times), values, tolerance)
+        for column, index in enumerate(together):
+            found[index] = PPoly(coefficients[:, :, column], knots)
+        rest = [index for index in rest if index not in together]
+    return found
+
+
+def _polynomial(settings: SignalSettings) -> PPoly | None:
+    """Return the polynomial that a kind without samples adds to the sinusoid, or None."""
+    if settings.times is None and settings.time is None:
+        return None
+    from scipy.interpolate import PPoly
+
+    if settings.times is not None:
+        times, values = np.array(settings.times), np.array(settings.values)
+        if settings.kind == "cosine":
+            return _half_cosines(times, values)
+        length, change = np.diff(times), np.diff(values)
+        nothing = np.zeros_like(change)
+        terms = [6.0 / length**5, -15.0 / length**4, 10.0 / length**3]
+        return PPoly(np.array([*(change * term for term in terms), nothing, nothing, values[:-1]]), times)
+    start, height = settings.time or 0.0, settings.height or 0.0
+    if settings.duration is None:
+        return PPoly(np.array([[0.0, height]]), np.array([start - 1.0, start, start + 1.0]))
+    return PPoly(np.array([[height / settings.duration], [0.0]]), np.array([start, start + settings.duration]))
+
+
+def _half_cosines(times: Array, values: Array) -> PPoly:
+    """Return half periods of a cosine between points, as quintic Hermite pieces."""
+    from scipy.interpolate import BPoly, PPoly
+
+    phase = np.linspace(0.0, np.pi, _COSINE_PIECES + 1)
+    knots, pieces = [], []
+    for start, length, value, half in zip(times[:-1], np.diff(times), values[:-1], 0.5 * np.diff(values), strict=True):
+        circular = np.pi / length
+        shape = (1.0 - np.cos(phase), circular * np.sin(phase), circular**2 * np.cos(phase))
+        derivatives = half * np.column_stack(shape)
+        derivatives[:, 0] += value
+        knots.append(start + phase / circular)
+        pieces.append(PPoly.from_bernstein_basis(BPoly.from_derivatives(knots[-1], derivatives)).c)
+    ends = [part[:-1] for part in knots]
+    return PPoly(np.concatenate(pieces, axis=1), np.append(np.concatenate(ends), times[-1]))
+
+
+def joined(columns: Sequence[PPoly | None]) -> tuple[Array, Array]:
+    """Return knots, shape (m,), and coefficients, shape (6, m - 1, k), of polynomials about shared knots."""
+    own = [each.x for each in columns if each is not None]
+    if not own:
+        return np.array([0.0, 1.0]), np.zeros((ORDER, 1, len(columns)))
+    if all(np.array_equal(each, own[0]) for each in own):
+        together = np.zeros((ORDER, len(own[0]) - 1, len(columns)))
+        for index, each in enumerate(columns):
+            if each is not None:
+                together[ORDER - len(each.c) :, :, index] = each.c
+        return own[0], together
+    knots = np.unique(np.concatenate(own))
+    start, middle = knots[:-1], 0.5 * (knots[:-1] + knots[1:])
+    coefficients = np.zeros((ORDER, len(start), len(columns)))
+    for column, each in enumerate(columns):
+        if each is None:
+            continue
+        powers = np.vstack([np.zeros((ORDER - len(each.c), len(each.x) - 1)), each.c])[::-1]
+        piece = np.clip(np.searchsorted(each.x, middle) - 1, 0, len(each.x) - 2)
+        # Outside its own knots a signal keeps its value there; inside, its piece is expanded about the shared knot.
+        since = np.clip(start, each.x[0], each.x[-1]) - each.x[piece]
+        inside = (middle > each.x[0]) & (middle < each.x[-1])
+        for power in range(ORDER):
+            terms = [math.comb(h, power) * powers[h, piece] * since ** (h - power) for h in range(power, ORDER)]
+            coefficients[ORDER - 1 - power, :, column] = sum(terms) * (inside | (power == 0))
+    return knots, coefficients
