@@ -82,6 +82,11 @@ def _surface(rng: np.random.Generator) -> dict[str, float]:
     return {"stiffness": 10 ** rng.uniform(4.0, 6.0), "damping": float(rng.choice([0.0, 1.0, 5.0]))}
 
 
+def _mass(wanted: float, volume: float) -> float:
+    """Return a mass, or that of a heavy metal of this volume, m3, if this is less: denser solids are refused."""
+    return min(wanted, 2e4 * float(volume))
+
+
 def _velocity(rng: np.random.Generator) -> Array:
     found = np.asarray(rng.normal(size=3) * 10 ** rng.uniform(-1.5, 1))
     # So that nothing starts further away than objects may.
@@ -99,7 +104,7 @@ def ball_and_plate(rng: np.random.Generator) -> Flight:
     ball = Object(
         shape="sphere",
         radius=radius,
-        mass=10 ** rng.uniform(-3, -0.5),
+        mass=_mass(10 ** rng.uniform(-3, -0.5), 4.0 * radius**3),
         position=tuple(start),
         velocity=tuple(velocity),
         angular_velocity=tuple(_velocity(rng) * 10.0),
@@ -126,7 +131,7 @@ def two_balls(rng: np.random.Generator) -> Flight:
         f"ball_{i}": Object(
             shape="sphere",
             radius=radii[i],
-            mass=0.01 + rng.random(),
+            mass=_mass(0.01 + rng.random(), 4.0 * radii[i] ** 3),
             position=tuple(starts[i]),
             velocity=tuple(velocities[i]),
             surface=surface,
@@ -151,7 +156,7 @@ def spinning_capsule(rng: np.random.Generator) -> Flight:
         shape="capsule",
         radius=radii[0],
         length=length,
-        mass=0.1,
+        mass=_mass(0.1, 3.0 * length * radii[0] ** 2),
         position=tuple(start),
         velocity=tuple(velocity),
         angular_velocity=(0.0, spin, 0.0),
@@ -178,7 +183,7 @@ def tumbling_box(rng: np.random.Generator) -> Flight:
     box = Object(
         shape="box",
         sides=tuple(sides),
-        mass=0.1,
+        mass=_mass(0.1, np.prod(sides)),
         position=tuple(start),
         velocity=tuple(velocity),
         angular_velocity=(0.0, spin, 0.0),
@@ -202,7 +207,9 @@ def paddle(rng: np.random.Generator) -> Flight:
     sides, amplitude, circular = np.array([thick, 0.1, 0.1]), path.amplitude, 2.0 * np.pi * path.frequency
     place = np.array([float(rng.choice([-1.0, 1.0]) * rng.uniform(0.6, 0.9) * amplitude), *rng.uniform(-0.03, 0.03, 2)])
     blade = Object(shape="box", sides=tuple(sides), path={"x": path}, surface=surface)
-    ball = Object(shape="sphere", radius=radius, mass=0.05, position=tuple(place), surface=surface)
+    ball = Object(
+        shape="sphere", radius=radius, mass=_mass(0.05, 4.0 * radius**3), position=tuple(place), surface=surface
+    )
 
     def exact(t: Array) -> Array:
         swung = np.column_stack([amplitude * np.sin(circular * t), 0.0 * t, 0.0 * t])
@@ -218,7 +225,9 @@ def sweeping_link(rng: np.random.Generator) -> Flight:
     speed *= float(rng.choice([-1, 1]))
     far, angle = rng.uniform(0.03, 0.12), rng.uniform(0.5, 2.0 * np.pi - 0.5)
     place = np.array([far * np.cos(angle), far * np.sin(angle), 1.2 * rng.uniform(-1, 1) * (radius + 0.005)])
-    ball = Object(shape="sphere", radius=radius, mass=0.05, position=tuple(place), surface=surface)
+    ball = Object(
+        shape="sphere", radius=radius, mass=_mass(0.05, 4.0 * radius**3), position=tuple(place), surface=surface
+    )
 
     def gap(q: Array) -> Array:
         tip = 0.095 * np.column_stack([np.cos(q[:, 0]), np.sin(q[:, 0]), 0.0 * q[:, 0]])
