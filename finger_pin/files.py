@@ -155,6 +155,8 @@ def read_text(what: str, path: Path) -> str:
         InputError: If it cannot be read, is too large, or is no such text.
     """
     try:
+        if path.is_fifo():
+            raise InputError(what, "is a pipe, which may never end; give a file")
         with open(path, "rb") as file:
             data = file.read(_LARGEST + 1)
     except FileNotFoundError:

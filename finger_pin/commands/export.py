@@ -49,6 +49,8 @@ def export(
             what = "has no signals; simulate it, and give the folder of its results"
         raise wrong("SOURCE", f"{source}: {what}")
     if results:
+        if settings:
+            raise wrong("--set", "is for fingers, hands and scenarios; signals are as they were computed")
         from finger_pin.simulation.netcdf import load, save
 
         try:

@@ -15,7 +15,9 @@ _ROUNDING = 1e-9
 
 
 def force_capability(
-    finger: Annotated[str, typer.Argument(metavar="FINGER", help="Name, or path of a .toml file.")] = "ub",
+    finger: Annotated[
+        str, typer.Argument(metavar="FINGER", help="Finger, or scenario that has it: name, or path of a .toml file.")
+    ] = "ub",
     posture: Annotated[
         str | None, typer.Option(metavar="DEG,DEG,...", help="Joint angles; default a third of each range.")
     ] = None,
@@ -36,11 +38,14 @@ def force_capability(
 
     import finger_pin as fp
     from finger_pin.analysis import Friction, force_polytope, tension_for_force, tension_limits
+    from finger_pin.description.finger import one_finger
+    from finger_pin.description.loading import describe
     from finger_pin.description.validation import finite_vector
     from finger_pin.views.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
 
     finite_vector("--force", wish, 3)
-    built = fp.Finger(fp.load_finger(finger))
+    one_finger(described := describe(finger))
+    built = fp.Finger(described)
     if limit == "servos":
         most = tension_limits(built)
         if not np.isfinite(most).all():

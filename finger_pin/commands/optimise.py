@@ -20,6 +20,7 @@ from finger_pin.commands.options import (
     folder_name,
     overrides,
     pool,
+    refuse_format,
     wrong,
 )
 from finger_pin.commands.study import conduct
@@ -83,6 +84,7 @@ def optimise(
     """
     if no_constraints and constraint:
         raise wrong("--no-constraints", "contradicts --constraint")
+    refuse_format(figures, format)
     given = {"population": population, "generations": generations, "seed": seed}
     effort = {name: value for name, value in given.items() if value is not None}
     changed, crew = overrides(settings), pool(workers, scheduler)

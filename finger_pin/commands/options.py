@@ -46,20 +46,33 @@ def wrong(option: str, allowed: str) -> typer.TyperException:
     return typer.TyperException(f"{option}: {allowed}")
 
 
+def refuse_format(figures: bool, format: str | None) -> None:
+    """Refuse a format of figures that are not drawn."""
+    if format is not None and not figures:
+        raise wrong("--format", "has no effect with --no-figures")
+
+
 def overrides(settings: list[str], **short: str | None) -> dict[str, Any]:
     """Return overrides of `load_scenario` from texts KEY=VALUE, the value in TOML or a string without quotes.
 
     Args:
         settings: Of ``--set``.
-        short: By the name of a short option for an entry of ``simulation``, its text; it wins.
+        short: By the name of a short option for an entry of ``simulation``, its text.
+
+    Raises:
+        TyperException: If a text is none, or an entry is set twice.
     """
     found = {}
     for text in settings:
         key, equals, value = text.partition("=")
         if not equals or not key.strip():
             raise wrong("--set", f"{text}: must be KEY=VALUE, such as controller.gain=2")
+        if key.strip() in found:
+            raise wrong("--set", f"{text}: an earlier one sets the same entry")
         found[key.strip()] = _value(key.strip(), value)
     given = {f"simulation.{name}": text for name, text in short.items() if text is not None}
+    if twice := [key for key in given if key in found]:
+        raise wrong("--set", f"{twice[0]}: --{twice[0].rpartition('.')[2]} sets the same entry")
     return found | {key: _value(key, text) for key, text in given.items()}
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from finger_pin.commands.console import print_text, talks
-from finger_pin.commands.options import Format, Output, ScenarioName
+from finger_pin.commands.options import Format, ScenarioName, wrong
 
 if TYPE_CHECKING:
     from finger_pin.description.scenario import Scenario
@@ -16,7 +18,11 @@ SHARES = (0.5, 0.8, 0.9, 1.1, 1.4)
 
 
 def self_locking(
-    scenario: ScenarioName = "reversals", output: Output = Path("results/self_locking"), format: Format = None
+    scenario: ScenarioName = "reversals",
+    output: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Where results go; default results/self_locking.")
+    ] = None,
+    format: Format = None,
 ) -> None:
     """Report the joint friction at which a finger locks, draw its map, and show runs on both sides of it.
 
@@ -34,8 +40,11 @@ def self_locking(
     finger = loaded.finger
     sprung = finger.hand is None and any(joint.spring for joint in finger.joints.values())
     if sprung and not fp.Finger(finger).routing.force_closure().holds:
+        if given := [name for name, each in (("--output", output), ("--format", format)) if each is not None]:
+            raise wrong(given[0], "has no effect: of a finger that springs return nothing is drawn")
         print_text(summarize_return(fp.analysis.spring_return(finger)))
         return
+    output = output or Path("results/self_locking")
     margin = self_locking_margin(loaded)
     found = self_locking_map(fp.Finger(finger))
     text = summarize_locking(loaded, found)

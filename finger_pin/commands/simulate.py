@@ -10,7 +10,7 @@ import typer
 
 from finger_pin.cancellation import CancelToken
 from finger_pin.commands.console import complain, noted, print_text, progress_bar, talks
-from finger_pin.commands.options import Figures, Format, Quiet, ScenarioName, Settings, folder_name, overrides
+from finger_pin.commands.options import Figures, Format, Quiet, Settings, folder_name, overrides, refuse_format, wrong
 from finger_pin.exceptions import FingerPinError, IntegrationError, Interrupted, ScenarioWarning
 
 if TYPE_CHECKING:
@@ -25,7 +25,9 @@ class NotDrawn(FingerPinError):
 
 
 def simulate(
-    scenario: ScenarioName = "fig6",
+    scenario: Annotated[
+        str | None, typer.Argument(metavar="SCENARIO", help="Name, or path of a .toml file.", show_default="fig6")
+    ] = None,
     settings: Settings = [],  # noqa: B006
     duration: Annotated[str | None, typer.Option(metavar="S", help="Override simulation.duration.")] = None,
     method: Annotated[str | None, typer.Option(metavar="NAME", help="Override simulation.method.")] = None,
@@ -49,6 +51,9 @@ def simulate(
 ) -> None:
     """Simulate a scenario, write its results, and print a summary."""
     changed = overrides(settings, duration=duration, method=method)
+    refuse_format(figures, format)
+    if scenario is not None and mujoco is not None:
+        raise wrong("SCENARIO", f"{scenario}: --mujoco takes its place")
     if listed:
         print_text(listing())
         return
@@ -57,7 +62,7 @@ def simulate(
     from finger_pin.simulation.recording import only
     from finger_pin.simulation.results import ResultFolder
 
-    loaded = load_scenario(scenario, changed) if mujoco is None else _hand(mujoco, changed, quiet)
+    loaded = load_scenario(scenario or "fig6", changed) if mujoco is None else _hand(mujoco, changed, quiet)
     output = output or Path("results", default_name(loaded, settings, duration, method))
     if check:
         tightened(loaded)

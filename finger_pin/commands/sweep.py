@@ -20,6 +20,7 @@ from finger_pin.commands.options import (
     folder_name,
     overrides,
     pool,
+    refuse_format,
     wrong,
 )
 from finger_pin.commands.study import conduct
@@ -77,6 +78,9 @@ def sweep(
     if listed:
         return print_text(listing())
     _check(design, over, samples, seed)
+    refuse_format(figures, format)
+    if restart and retry_failed:
+        raise wrong("--retry-failed", "has no effect with --restart, which repeats all runs")
     changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.exceptions import StudyError
     from finger_pin.studies import sweep

@@ -20,7 +20,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.state import Motion, State
+from finger_pin.mechanism.state import Motion, State, as_floats
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
@@ -244,7 +244,7 @@ class ClosedLoop:
 
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""
-        return self.evaluate(time, x).finger.rate
+        return self.evaluate(time, as_floats("x", x, self.finger.layout.size)).finger.rate
 
 
 def _refuse_other(finger: Finger, scenario: Scenario) -> None:

@@ -28,6 +28,13 @@ class Rule(NamedTuple):
     says: str
 
 
+_STRIBECK = ("stiction", "stribeck_velocity", "stribeck_exponent", "micro_damping")
+_BRISTLES = ("stiffness", "floor")
+# Entries beside a choice that one value of it does not read.
+_UNREAD = {
+    "law": {"lugre": ("reversal_speed",), "dahl": (*_STRIBECK, "reversal_speed"), "coulomb": (*_STRIBECK, *_BRISTLES)},
+    "drive": {"tension": ("position_loop",), "position": ("friction_compensation", "reversal_speed")},
+}
 _OPEN = 'has no effect with controller.kind = "tensions"'
 
 
@@ -60,15 +67,12 @@ OF_FINGER = (
     ),
     Rule(
         "joint_friction",
-        ("stiction", "stribeck_velocity", "stribeck_exponent", "micro_damping"),
+        _STRIBECK,
         lambda _, friction: friction.law not in ("dahl", "coulomb"),
         'has no effect with law = "dahl" or "coulomb"',
     ),
     Rule(
-        "joint_friction",
-        ("stiffness", "floor"),
-        lambda _, friction: friction.law != "coulomb",
-        'has no effect with law = "coulomb"',
+        "joint_friction", _BRISTLES, lambda _, friction: friction.law != "coulomb", 'has no effect with law = "coulomb"'
     ),
     Rule(
         "joint_friction",
@@ -205,6 +209,17 @@ def idle(described: Description, rules: tuple[Rule, ...]) -> Iterator[tuple[str,
                     and not rule.acts(described, table)
                 ):
                     yield f"{name}{entry}", value, f"{rule.says}; leave it out"
+
+
+def without_unread(inherited: dict[str, Any], choices: dict[str, Any]) -> dict[str, Any]:
+    """Return a copy of a table less the entries that another value of a choice, such as the law, does not read."""
+    unread = {
+        entry
+        for choice, value in choices.items()
+        if isinstance(value, str) and inherited.get(choice) != value
+        for entry in _UNREAD.get(choice, {}).get(value, ())
+    }
+    return {entry: value for entry, value in inherited.items() if entry not in unread}
 
 
 def refuse_idle(described: Description, rules: tuple[Rule, ...]) -> None:

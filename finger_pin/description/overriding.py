@@ -8,7 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, get_origin
 
+from finger_pin.description.effects import without_unread
 from finger_pin.description.reading import (
+    NONE,
     Table,
     as_table,
     is_other_kind,
@@ -55,8 +57,8 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
     else:
         table["finger"] = resolve_finger(table["finger"], folder)
     spelt_out = _expand_wildcards(overrides, table)
-    # A kind comes before what belongs to it, and a motor before its entries.
-    first = (".kind", ".motor")
+    # A choice comes before what belongs to it, and a motor before its entries.
+    first = (".kind", ".motor", ".law", ".drive")
     for early in (True, False):
         _apply({key: value for key, value in spelt_out.items() if key.endswith(first) == early}, table)
         for finger in [as_table(each).get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
@@ -103,7 +105,13 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
         if last == "kind" and isinstance(value, str) and is_other_kind(inner, {"kind": value}):
             inner.clear()
         _refuse_new([*path, last], inner, table)
-        inner[last] = copy.deepcopy(value)
+        read = without_unread(inner, {last: value})
+        for unread in inner.keys() - read.keys():
+            del inner[unread]
+        if last in inner and isinstance(value, str) and value == NONE:
+            del inner[last]
+        else:
+            inner[last] = copy.deepcopy(value)
 
 
 def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:

@@ -6,6 +6,7 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
+import sys
 from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
@@ -39,6 +40,8 @@ def check_density(mass: float, inertia: float) -> None:
         mass: kg.
         inertia: Sum of the three principal moments about the mass centre, kg m2.
     """
+    if inertia < sys.float_info.min:
+        raise problem("mass", "is too small: its moments of inertia are below 2.2e-308 kg m2", mass)
     radius = (3.0 * mass / (4.0 * math.pi * _DENSEST)) ** (1.0 / 3.0)
     if inertia < 3.0 * 0.4 * mass * radius**2:
         raise problem("mass", "makes it denser than osmium, 22590 kg/m3: masses are in kg (is it in grams?)", mass)

@@ -12,6 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from finger_pin.description.effects import without_unread
 from finger_pin.description.recordings.columns import read_signals
 from finger_pin.description.recordings.series import PACKED
 from finger_pin.description.validation import suggestion
@@ -20,6 +21,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.files import expand, read_text
 
 Table = dict[str, Any]
+#: In place of an inherited table or value: takes it away, as if the base had left it out.
+NONE = "none"
 # Sections that may name a CSV file, the key that does, where its columns go, and their unit.
 _SIGNAL_FILES = (
     ("reference", "file", "joints", "rad"),
@@ -193,7 +196,7 @@ def _on_top(base: Table, hand: Table, folder: Path) -> Table:
     """
     fingers = as_table(as_table(hand).get("fingers"))
     for name, placed in fingers.items():
-        if isinstance(placed, str):
+        if isinstance(placed, str) and placed != NONE:
             placed = fingers[name] = {"finger": placed}
         finger = as_table(placed).get("finger")
         if isinstance(finger, str) or "base" in as_table(finger):
@@ -222,6 +225,8 @@ def resolve_signals(table: Table, folder: Path) -> None:
             for name, each in samples.items():
                 before, _, own = name.partition(".")
                 chosen, known = (before, own) if own and before in apart else (target, name)
+                if not isinstance(settings.get(chosen, {}), dict):
+                    raise InputError(f"{section}.{chosen}", f"must be a table beside {section}.{key}", settings[chosen])
                 settings[chosen] = {**as_table(settings.get(chosen)), known: each}
     _share_times(table)
 
@@ -260,9 +265,12 @@ def is_other_kind(base: Table, top: Table) -> bool:
 
 
 def merge(base: Table, top: Table) -> Table:
-    """Return a table with the entries of another on top."""
-    merged = dict(base)
+    """Return a table with the entries of another on top; "none" there takes away what is below it."""
+    merged = without_unread(base, top)
     for key, value in top.items():
+        if key in merged and isinstance(value, str) and value == NONE:
+            del merged[key]
+            continue
         both = isinstance(value, dict) and isinstance(merged.get(key), dict) and not is_other_kind(merged[key], value)
         # A table that names its base starts from that one.
         merged[key] = merge(merged[key], value) if both and "base" not in value else value

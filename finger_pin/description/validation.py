@@ -287,10 +287,10 @@ def checker(low: float, high: float, above: bool, hint: str, whole: bool = False
             number = math.inf
         if not math.isfinite(number):
             raise problem(where, "must be a finite number", value)
-        if number < low or (above and number == low):
-            # A limit at zero is about the sign, not about the unit.
-            unit = hint if low < 0.0 else ""
-            raise problem(where, f"must be {'above' if above else 'at least'} {low:g}{unit}", value)
+        # Below 2.3e-308 doubles lose digits. A limit at zero is about the sign, not about the unit.
+        if number < low or (above and number <= low + 2.3e-308):
+            least = "at least 2.3e-308" if number > low else f"{'above' if above else 'at least'} {low:g}"
+            raise problem(where, f"must be {least}{hint if low < 0.0 else ''}", value)
         if number > high:
             raise problem(where, f"must be at most {high:g}{hint}", value)
         if whole and number != int(number):

@@ -65,6 +65,8 @@ def from_mujoco(
         import mujoco
     except ImportError:
         raise InputError("model", f"needs MuJoCo: {installing('mujoco')}") from None
+    if isinstance(model, str | Path) and Path(model).is_fifo():
+        raise InputError(f"model {model}", "is a pipe, which may never end; give a file")
     if isinstance(model, str | Path | mujoco.MjSpec):
         try:
             spec = model.copy() if isinstance(model, mujoco.MjSpec) else mujoco.MjSpec.from_file(str(model))

@@ -13,6 +13,7 @@ from pydantic import model_validator
 from finger_pin.description.tree_parts import TreeTendon
 from finger_pin.description.validation import problem, quantity, real, suggestion, validate
 from finger_pin.exceptions import InputError
+from finger_pin.files import read_text
 
 
 class LaidTendon(TreeTendon):
@@ -68,8 +69,8 @@ def _tables(given: Mapping[str, Mapping[str, Any]] | str | Path) -> Mapping[str,
     if isinstance(given, Mapping):
         return given
     try:
-        found = tomllib.loads(Path(given).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        found = tomllib.loads(read_text(f"tendons {given}", Path(given)))
+    except tomllib.TOMLDecodeError as error:
         raise InputError(f"tendons {given}", f"cannot be read: {error}") from None
     tables = found.get("tendons")
     if set(found) != {"tendons"} or not isinstance(tables, dict):

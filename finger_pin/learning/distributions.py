@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
@@ -64,7 +65,9 @@ class Normal:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not (math.isfinite(self.mean) and 0.0 <= self.deviation < math.inf):
+        if not (
+            all(map(is_number, vars(self).values())) and math.isfinite(self.mean) and 0.0 <= self.deviation < math.inf
+        ):
             raise InputError("Normal", "mean must be finite, deviation finite and not negative", [*vars(self).values()])
         if not self.low <= self.mean <= self.high:
             raise InputError("Normal.mean", f"must be between low = {self.low:g} and high = {self.high:g}", self.mean)
@@ -93,7 +96,13 @@ class Choice:
         return self.values[int(random.integers(len(self.values)))]
 
 
+def is_number(value: Any) -> bool:
+    """Return whether a value is a real number, of Python or NumPy."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
 def _check_bounds(owner: Uniform | LogUniform) -> None:
-    if not (math.isfinite(owner.low) and math.isfinite(owner.high) and owner.low <= owner.high):
+    numbers = is_number(owner.low) and is_number(owner.high)
+    if not (numbers and math.isfinite(owner.low) and math.isfinite(owner.high) and owner.low <= owner.high):
         allowed = "low and high must be finite, and low not above high"
         raise InputError(type(owner).__name__, allowed, [owner.low, owner.high])

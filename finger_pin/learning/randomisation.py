@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.exceptions import InputError
-from finger_pin.learning.distributions import Choice, Distribution, LogUniform, Normal, Uniform
+from finger_pin.learning.distributions import Choice, Distribution, LogUniform, Normal, Uniform, is_number
 from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Task
 
@@ -93,10 +93,10 @@ class Randomisation:
         Raises:
             InputError: If it is negative.
         """
-        found = float(drawn.get(DELAY, delay))
-        if not 0.0 <= found < np.inf:
-            raise InputError(DELAY, "must be finite and not negative, s", found)
-        return found
+        found = drawn.get(DELAY, delay)
+        if not is_number(found) or not 0.0 <= found < np.inf:
+            raise InputError(DELAY, "must be a finite number of seconds, not negative", found)
+        return float(found)
 
 
 def _ends(distribution: Distribution) -> Sequence[Any]:

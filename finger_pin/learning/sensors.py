@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.exceptions import InputError
+from finger_pin.learning.distributions import is_number
 from finger_pin.typing import Array
 
 
@@ -31,7 +32,7 @@ class Sensor:
     def __post_init__(self) -> None:
         """Check the numbers."""
         for name, value in vars(self).items():
-            if not np.isfinite(value) or (value < 0.0 and name != "offset"):
+            if not is_number(value) or not np.isfinite(value) or (value < 0.0 and name != "offset"):
                 raise InputError(f"Sensor.{name}", "must be finite, and not negative but for an offset", value)
 
     def periods(self, period: float, name: str) -> int:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from finger_pin.description.caching import cached_property
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
-from finger_pin.learning.distributions import Distribution
+from finger_pin.learning.distributions import Distribution, is_number
 from finger_pin.learning.sensors import Sensor
 from finger_pin.typing import Array
 
@@ -71,8 +71,10 @@ class Task:
                 raise InputError(name, "must be a function", value)
         for name in ("period", "duration"):
             value = getattr(self, name)
-            if not isinstance(value, int | float) or not 0.0 < value < np.inf:
+            if not is_number(value) or not 0.0 < value < np.inf:
                 raise InputError(name, "must be above 0 and finite, s", value)
+        if not is_number(self.delay) or not 0.0 <= self.delay < math.inf:
+            raise InputError("delay", "must be a finite number of seconds, not negative", self.delay)
         for name in ("observation", "privileged"):
             value = getattr(self, name)
             if isinstance(value, str) or not isinstance(value, Sequence | Mapping):

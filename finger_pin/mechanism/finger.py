@@ -19,7 +19,7 @@ from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 from finger_pin.mechanism.scene import Scene
-from finger_pin.mechanism.state import Motion
+from finger_pin.mechanism.state import Motion, as_floats
 from finger_pin.mechanism.tendon_paths import Excursions, TendonPaths
 from finger_pin.mechanism.tree import build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
@@ -176,8 +176,9 @@ class Finger:
         """
         x = np.zeros(self.layout.size)
         state, middle = self.layout.unpack(x), self.tendons.rest_position
-        state.position[:] = position
-        state.velocity[:] = 0.0 if velocity is None else velocity
+        joints = len(self.routing.joints)
+        state.position[:] = as_floats("position", position, joints, single=True)
+        state.velocity[:] = 0.0 if velocity is None else as_floats("velocity", velocity, joints, single=True)
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
         if self.actuators.names:
             angle, taken = self.actuators.angle, self.excursion(state.position)
@@ -218,10 +219,16 @@ class Finger:
             outputs: "all", "no_acceleration" or "row_forces": others need not be computed; here all are.
 
         Raises:
-            InputError: If there are no such outputs.
+            InputError: If there are no such outputs, or an argument has another shape.
         """
         check_outputs(outputs)
+        x, inputs, fingertip_force = self._arguments(x, inputs, fingertip_force)
         return self.signals(x, inputs, fingertip_force, self.mechanism.evaluate(x, inputs, fingertip_force, base))
+
+    def _arguments(self, x: Array, inputs: Array, force: Array | None) -> tuple[Array, Array, Array | None]:
+        """Return packed states, inputs and fingertip forces as floats."""
+        packed = as_floats("x", x, self.layout.size), as_floats("inputs", inputs, self.mechanism.channels)
+        return *packed, None if force is None else as_floats("fingertip_force", force, 3)
 
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
@@ -253,21 +260,23 @@ class Finger:
 
     def coupling_at(self, position: Array) -> Array:
         """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""
-        return self._excursions.slopes(np.asarray(position, dtype=float))
+        return self._excursions.slopes(as_floats("position", position, len(self.routing.joints)))
 
     def excursion(self, position: Array) -> Array:
         """Return l of the actuated tendons at theta, shape (..., n), also of those along paths; shape (..., a), m."""
+        position = as_floats("position", position, len(self.routing.joints))
         return self._excursions.lengths(position)[..., : self.routing.actuated]
 
     def powers(
         self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, shape (m, N)."""
-        found = self.mechanism.evaluate(x, inputs, fingertip_force, base)
+        found = self.mechanism.evaluate(*self._arguments(x, inputs, fingertip_force), base)
         return np.stack(list(found.account()[1].values()), axis=-1), found.external
 
     def static_torque(self, position: Array) -> Array:
         """Return the torque that holds the finger at rest at theta, shape (n,): G and the springs' torque, N m."""
+        position = as_floats("position", position, len(self.routing.joints), single=True)
         return self.rigid_body.gravity_torque(position) + self.springs.torque(position, np.zeros_like(position))
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
@@ -275,12 +284,14 @@ class Finger:
 
         With a base that moves, energies are those of the motion in the world, where the base has no height.
         """
-        found = self.rigid_body.kinematics(position, velocity, base)
+        joints = len(self.routing.joints)
+        given = as_floats("position", position, joints), as_floats("velocity", velocity, joints)
+        found = self.rigid_body.kinematics(*given, base)
         return Motion(found.tip, found.kinetic_energy, found.potential_energy)
 
     def rhs(self, time: float, x: Array, inputs: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for custom solvers; ``time`` is not used."""
-        return self.mechanism.evaluate(x, inputs, fingertip_force).rate
+        return self.mechanism.evaluate(*self._arguments(x, inputs, fingertip_force)).rate
 
 
 #: A hand is a finger whose joints form a tree.

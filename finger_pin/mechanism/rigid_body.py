@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from finger_pin.description.caching import cached_property
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.state import Kinematics
+from finger_pin.mechanism.state import Kinematics, as_floats
 from finger_pin.typing import Array
 
 # The two halves of a free body; a quaternion of the spherical one has four numbers.
@@ -127,6 +127,7 @@ class RigidBody:
 
     def position_rate(self, q: Array, v: Array) -> Array:
         """Return q' = E(q) v, shape (..., nq)."""
+        q, v = self._floats(q=q, v=v)
         if self.model.nq == self.model.nv:
             return v
         rate = np.zeros(q.shape)
@@ -141,6 +142,11 @@ class RigidBody:
                 rate[..., at + 3] = -0.5 * np.sum(vector * part, axis=-1)
         return rate
 
+    def _floats(self, *, single: bool = False, **given: Array) -> tuple[Array, ...]:
+        """Return arguments by name as floats: q of shape (..., nq), others (..., nv)."""
+        model = self.model
+        return tuple(as_floats(k, v, model.nq if k == "q" else model.nv, single=single) for k, v in given.items())
+
     def external_torque(self, q: Array, forces: Array) -> Array:
         """Return sum of J^T F over the tips, shape (..., nv), for forces of shape (..., t, 3), N, base frame."""
         if q.ndim > 1:
@@ -152,6 +158,7 @@ class RigidBody:
 
     def link_directions(self, q: Array) -> Array:
         """Return e_j of (17), shape (..., joints, 3): along the link before the joint; base frame."""
+        (q,) = self._floats(q=q)
         if q.ndim > 1:
             return np.array([self.link_directions(each) for each in q])
         pin.forwardKinematics(self.model, self._data, q)
@@ -162,7 +169,7 @@ class RigidBody:
 
         A Jacobian's columns are velocity of the body's point at the origin, and angular velocity; base frame.
         """
-        model, data = self.model, self._data
+        (q,), model, data = self._floats(single=True, q=q), self.model, self._data
         pin.computeJointJacobians(model, data, q)
         still, reference = np.zeros((6, model.nv)), pin.ReferenceFrame.WORLD
         twists = [pin.getJointJacobian(model, data, joint, reference) for joint in range(1, model.njoints)]
@@ -174,6 +181,7 @@ class RigidBody:
         Returns:
             Shape (..., 3); of t tips, as a hand has them, shape (..., t, 3), in the order of `tips`.
         """
+        (q,) = self._floats(q=q)
         if q.ndim > 1:
             return np.array([self.tip_position(each) for each in q])
         pin.framesForwardKinematics(self.model, self._data, q)
@@ -181,7 +189,8 @@ class RigidBody:
 
     def jacobian(self, q: Array) -> Array:
         """Return J = dp/dtheta of (6) at q of shape (nq,): shape (3, n), or (t, 3, n) of t tips."""
-        reference, model, data = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, self.model, self._data
+        (q,), model, data = self._floats(single=True, q=q), self.model, self._data
+        reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         found = [pin.computeFrameJacobian(model, data, q, tip, reference) for tip in self.tips]
         # Of a single joint Pinocchio returns a vector.
         return self._of_tips([np.reshape(each, (6, -1))[:3] for each in found], 3, model.nv)
@@ -192,22 +201,23 @@ class RigidBody:
 
     def mass_matrix(self, q: Array) -> Array:
         """Return M(theta) by the composite rigid body algorithm, shape (n, n)."""
-        return np.array(pin.crba(self.model, self._data, q, pin.Convention.WORLD))
+        return np.array(pin.crba(self.model, self._data, *self._floats(single=True, q=q), pin.Convention.WORLD))
 
     def coriolis_matrix(self, q: Array, v: Array) -> Array:
         """Return C(theta, theta') with M' - 2 C skew-symmetric, shape (n, n)."""
-        return np.array(pin.computeCoriolisMatrix(self.model, self._data, q, v))
+        return np.array(pin.computeCoriolisMatrix(self.model, self._data, *self._floats(single=True, q=q, v=v)))
 
     def gravity_torque(self, q: Array) -> Array:
         """Return G(theta), shape (n,), N m."""
-        return np.array(pin.computeGeneralizedGravity(self.model, self._data, q))
+        return np.array(pin.computeGeneralizedGravity(self.model, self._data, *self._floats(single=True, q=q)))
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
         """Return M a + C v + G by recursive Newton-Euler, shape (n,), N m."""
-        return np.array(pin.rnea(self.model, self._data, q, v, a))
+        return np.array(pin.rnea(self.model, self._data, *self._floats(single=True, q=q, v=v, a=a)))
 
     def forward_dynamics(self, q: Array, v: Array, torque: Array) -> Array:
         """Return theta'' by the articulated body algorithm, shape (..., n), rad/s2."""
+        q, v, torque = self._floats(q=q, v=v, torque=torque)
         if q.ndim == 1:
             return np.array(pin.aba(self.model, self._data, q, v, torque))
         return np.array([self.forward_dynamics(*each) for each in zip(q, v, torque, strict=True)])
@@ -261,6 +271,7 @@ class RigidBody:
         With a base that moves, (..., 15) or more numbers of `base_motion`, energies are those of the motion in the
         world, where the base has no height; all else is as seen from the base.
         """
+        q, v = self._floats(q=q, v=v)
         if q.ndim > 1:
             bases = [None] * len(q) if base is None else base
             each = [self.kinematics(*row) for row in zip(q, v, bases, strict=True)]

@@ -19,8 +19,10 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finger_pin.description.caching import cached_property
+from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
 
@@ -50,6 +52,22 @@ def _of(*entries: Any) -> dict[str, Block]:
 
 # A block that is left out.
 _ZEROS: Any = None
+
+
+def as_floats(name: str, value: ArrayLike, size: int, *, single: bool = False) -> Array:
+    """Return an argument as floats of shape (..., size), or (size,) if ``single``.
+
+    Raises:
+        InputError: If it is not; ``name`` names the argument.
+    """
+    try:
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        found = np.empty(())
+    if found.ndim == 0 or found.shape[-1] != size or (single and found.ndim > 1):
+        shape = list(found.shape) if found.ndim else type(value).__name__
+        raise InputError(name, f"must be numbers of shape ({'' if single else '..., '}{size}{',' * single})", shape)
+    return found
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -16,6 +16,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import BLOCKS, State
 from finger_pin.simulation.contact_variables import last_touching
 from finger_pin.simulation.motor_variables import LOOP_VARIABLES
+from finger_pin.simulation.netcdf import require_samples
 from finger_pin.typing import Array
 
 
@@ -63,6 +64,7 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
     for dimension, names in (("joint", routing.joints), ("tendon", routing.tendons)):
         if dimension not in initial.coords or tuple(map(str, initial[dimension].values)) != names:
             raise InputError("initial", f"is a result of another finger: its {dimension}s must be {', '.join(names)}")
+    require_samples(initial)
     last, parts = initial.isel(time=-1), {}
     sizes = vars(finger.layout.unpack(np.zeros(finger.layout.size)))
     for part, name in ((part, block.variable) for part, block in BLOCKS.items() if block.variable):
@@ -100,8 +102,8 @@ def started(loop: ClosedLoop, initial: ArrayLike | xr.Dataset | None) -> ClosedL
     """
     if initial is None:
         return loop
-    samples = _last_samples(initial, loop.finger) if isinstance(initial, xr.Dataset) else None
-    return loop.started(packed_state(initial, loop.finger), samples)
+    packed = packed_state(initial, loop.finger)
+    return loop.started(packed, _last_samples(initial, loop.finger) if isinstance(initial, xr.Dataset) else None)
 
 
 def _last_samples(initial: xr.Dataset, finger: Finger) -> LoopMemory | None:

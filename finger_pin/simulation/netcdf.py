@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 from itertools import product
 from pathlib import Path
 
 import xarray as xr
 
+from finger_pin.exceptions import InputError
 from finger_pin.files import replacing, write_table
 from finger_pin.simulation.contact_variables import without_far_pairs
 from finger_pin.typing import Array
@@ -37,8 +39,21 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
             raise OSError(f"{Path(path).name}: {error}") from error
 
 
+def require_samples(result: xr.Dataset) -> None:
+    """Refuse a result that has no time, or no samples.
+
+    Raises:
+        InputError: If it has none.
+    """
+    if "time" not in result.coords:
+        raise InputError("result.time", "is missing; give a result of simulate")
+    if not result.sizes["time"]:
+        raise InputError("result.time", "must have at least one sample")
+
+
 def _columns(dataset: xr.Dataset) -> dict[str, Array]:
     """Return the signals by name, label and unit."""
+    require_samples(dataset)
     columns = {"time (s)": dataset["time"].values}
     for name, signal in dataset.items():
         if "time" not in signal.dims:
@@ -62,4 +77,6 @@ def load(path: str | Path) -> xr.Dataset:
         OSError: If there is no such file, or it cannot be read.
     """
     file = Path(path, "trajectory.nc") if Path(path).is_dir() else path
+    if Path(file).is_fifo():
+        raise OSError(errno.ESPIPE, "is a pipe, which may never end; give a file", str(file))
     return xr.load_dataset(file, engine="netcdf4")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import xarray as xr
 
 from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike
+from finger_pin.description.parametrised_scenario import split
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
@@ -70,6 +73,7 @@ def sweep(
         ExecutorError: If the executor cannot go on.
     """
     design = Grid(over) if isinstance(over, Mapping) else over
+    _refuse_varied(overrides or {}, design)
     base = BaseScenario.load(scenario, overrides, finger)
     chosen = metrics_of(base.scenario, metrics)
     for key, values in design.values.items():
@@ -82,3 +86,11 @@ def sweep(
         if output is not None:
             write(result, Path(output) / "sweep.nc")
     return checked(result, token.cancelled)
+
+
+def _refuse_varied(overrides: Mapping[str, Any], design: Design) -> None:
+    """Refuse an override of what a key of the design replaces: itself, or an entry of a finger, hand or motor."""
+    for name in (split(key)[0].removesuffix(".base") for key in design.values if split(key)[1] is None):
+        for entry in overrides:
+            if fnmatchcase(entry, name) or fnmatchcase(entry, f"{name}.*"):
+                raise InputError(entry, f"has no effect where {name} is varied", overrides[entry])

@@ -14,6 +14,7 @@ from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
 from finger_pin.simulation.accuracy import NOT_JUDGED
 from finger_pin.simulation.energy import entries
+from finger_pin.simulation.netcdf import require_samples
 from finger_pin.simulation.recording import custom_of, is_tracking
 from finger_pin.typing import Array
 from finger_pin.views.units import actuators_by_unit, joints_by_unit
@@ -31,6 +32,7 @@ def summarize(result: xr.Dataset) -> str:
     Args:
         result: Dataset of `simulate`, or the partial one that its exception carries.
     """
+    require_samples(result)
     head = [*_head(result), *_own(result), *_warnings(result)]
     tree = read_scene(result.attrs).finger.tree
     tracks = tree is None and is_tracking(result)

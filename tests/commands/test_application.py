@@ -1,5 +1,6 @@
 """One parser for all commands, as scripts, as a module, and in Python; and one list of public names."""
 
+import inspect
 import subprocess
 import sys
 import tomllib
@@ -142,4 +143,63 @@ def test_the_version_is_told_and_options_of_all_commands_are_listed(capsys):
 def test_a_bench_that_is_not_there_is_told_with_the_benches_that_ship(capsys):
     assert application.run("identify", ["transmision"]) == 2
     said = capsys.readouterr().err
-    assert 'bench = "transmision": no such bench; there are postures' in said and "did you mean transmission?" in said
+    assert (
+        'bench = "transmision": no such bench; there are fig6, postures' in said
+        and "did you mean transmission?" in said
+    )
+
+
+NEEDS = {"sweep": ["reversals", "--over", "controller.gain=1,2"], "identify": ["transmission"]}
+
+
+@pytest.mark.parametrize("command", application.COMMANDS, ids=NAMES)
+def test_an_option_that_another_one_makes_idle_is_refused_by_every_command_that_has_both(command, capsys):
+    name, options = command.__name__, inspect.signature(command).parameters
+    cases = []
+    if {"figures", "format"} <= {*options}:
+        cases.append((["--no-figures", "--format", "pdf"], "--format: has no effect"))
+    if "settings" in options:
+        twice = ["--set", "controller.gain=1", "--set", "controller.gain=2"]
+        cases.append((twice, "--set: controller.gain=2: an earlier one sets the same entry"))
+    for arguments, says in cases:
+        assert application.run(name, [*NEEDS.get(name, []), *arguments]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert says in line
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "says"),
+    [
+        ("simulate", ["reversals", "--mujoco", "hand.xml"], "SCENARIO: reversals: --mujoco takes its place"),
+        ("simulate", ["--duration", "1", "--set", "simulation.duration=2"], "--duration sets the same entry"),
+        ("sweep", [*NEEDS["sweep"], "--set", "controller.gain=3"], "controller.gain = 3: has no effect"),
+        ("sweep", [*NEEDS["sweep"], "--restart", "--retry-failed"], "--retry-failed: has no effect"),
+        ("sweep", ["hand", "--over", "finger.gravity[2]=1,2"], "there is a hand"),
+        (
+            "sweep",
+            ["reversals", "--over", "finger=ub,planar", "--set", "finger.joint_friction.viscous=0.1"],
+            "finger.joint_friction.viscous = 0.1: has no effect where finger is varied",
+        ),
+        ("self_locking", ["wound", "--format", "pdf"], "--format: has no effect"),
+        ("self_locking", ["wound", "--output", "here"], "--output: has no effect"),
+        ("force_capability", ["hand"], "is a hand; take one of its fingers"),
+    ],
+)
+def test_what_would_be_ignored_is_told_in_one_line(name, arguments, says, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert application.run(name, arguments) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert says in line and not any(tmp_path.iterdir())
+
+
+def test_the_force_script_takes_a_scenario_a_file_that_extends_one_and_their_finger_alike(
+    capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text("extends = 'reversals'\n[simulation]\nduration = 0.1\n")
+    monkeypatch.setattr("finger_pin.views.plots.save_figure", lambda *given: None)
+    printed = []
+    for given in ("ub_stand_in", "reversals", "mine.toml"):
+        assert application.run("force_capability", [given]) == 0
+        printed.append(capsys.readouterr().out)
+    assert "friction hindering" in printed[0] and printed[1:] == printed[:1] * 2

@@ -12,8 +12,10 @@ from finger_pin.commands.application import run
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    (tmp_path / "results").mkdir()
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return tmp_path / "here"
 
 
 def test_a_finger_is_written_as_urdf_mjcf_and_toml(here):
@@ -52,6 +54,7 @@ def test_the_signals_of_a_result_are_written_as_columns_with_their_units_to_the_
     [
         (["ub_stand_in", "ub.step"], "must end with"),
         (["ub_stand_in", "ub.csv"], "simulate it"),
+        (["../results", "x.csv", "--set", "controller.gain=2"], "--set: is for fingers, hands and scenarios"),
         (["hand", "hand.urdf"], "take one of its fingers"),
         (["fig7", "fig6.xml"], "reversals"),
     ],

@@ -234,3 +234,61 @@ def test_descriptions_are_printed_in_a_line():
     assert printed[0] == "<Scenario reversals: 8 s of <FingerDescription ub_stand_in: 4 joints, 5 tendons>>"
     assert "fingers thumb, index, middle, ring, little" in printed[1]
     assert max(map(len, printed)) < 120 and f"[{printed[2]}]" == repr([fp.load_finger("ub_stand_in")])
+
+
+@pytest.mark.parametrize("finger", list_fingers())
+@pytest.mark.parametrize("law", ["lugre", "dahl", "coulomb"])
+def test_the_law_of_every_shipped_finger_switches_and_what_the_new_one_does_not_read_stays_behind(finger, law):
+    switched = load_finger(finger, {"finger.joint_friction.law": law}).joint_friction
+    assert switched.law == law and switched.coulomb == load_finger(finger).joint_friction.coulomb
+    assert load_finger(finger, {"finger.joint_friction.viscous": 1.0, "finger.joint_friction.law": law})
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize(
+    ("scenario", "place", "choice", "value", "idle"),
+    [
+        ("reversals", "finger.joint_friction", "law", "coulomb", {"stiffness": 7.0}),
+        ("reversals", "finger.joint_friction", "law", "dahl", {"stiction": 7e-4}),
+        ("servo_position", "finger.actuators.M1", "drive", "tension", {"position_loop": {"proportional": 3.0}}),
+    ],
+)
+def test_what_is_stated_beside_a_choice_that_does_not_read_it_is_refused(
+    tmp_path, order, scenario, place, choice, value, idle
+):
+    (entry, number), file = *idle.items(), tmp_path / "s.toml"
+    given = {f"{place}.{choice}": value, f"{place}.{entry}": number}
+    assert load_scenario(scenario, {f"{place}.{choice}": value})
+    with pytest.raises(InputError, match="has no effect"):
+        load_scenario(scenario, dict([*given.items()][::order]))
+    file.write_text(f"extends = '{scenario}'\n{place}.{choice} = '{value}'\n")
+    assert load_scenario(file)
+    number = number if isinstance(number, float) else "{ proportional = 3.0 }"
+    file.write_text(f"{file.read_text()}{place}.{entry} = {number}\n")
+    with pytest.raises(InputError, match="has no effect"):
+        load_scenario(file)
+
+
+def test_none_takes_away_any_entry_that_is_inherited(tmp_path):
+    """What is left is what the base would be without the entry."""
+    base, top = tmp_path / "base.toml", tmp_path / "top.toml"
+    pull = "[controller.tensions]\nT3 = { kind = 'step', time = 0.0, height = 2.0 }\nT4 = { offset = 1.0 }\n"
+    table = "name = 'top'\nfinger = 'ub_stand_in'\n[simulation]\nduration = 0.1\n"
+    base.write_text(f"{table}rtol = 1e-3\n[controller]\nkind = 'tensions'\n{pull}")
+    whole = tomllib.loads(base.read_text())
+    for place in ("controller.tensions", "controller.tensions.T3", "simulation.rtol", "simulation"):
+        left = tomllib.loads(base.read_text())
+        *path, last = place.split(".")
+        inner, named = left, whole
+        for part in path:
+            inner, named = inner[part], named[part]
+        del inner[last]
+        top.write_text(f"extends = 'base.toml'\n{place} = 'none'\n")
+        expected = fp.description.loading.read_scenario(left)
+        assert load_scenario(top) == expected == load_scenario(base, {"name": "top", place: "none"}), place
+    for wrong in ("environment.fingertip_force_signal", "controller.sampling"):
+        top.write_text(f"extends = 'base.toml'\n{wrong} = 'none'\n")
+        with pytest.raises(InputError, match=f'{wrong} = "none"'):
+            load_scenario(top)
+    top.write_text("extends = 'hand'\n[hand.fingers]\nlittle = 'none'\n[reference]\njoints = 'none'\n")
+    assert [*load_scenario(top).hand.fingers] == ["thumb", "index", "middle", "ring"]

@@ -48,6 +48,11 @@ NUMBERS = [
 # A command line's --set on the scenario reversals, the entry that the message begins with, and what it says.
 NUMBER_OVERRIDES = [
     *((f"{key}={small}", key, ("must be above", "must be at least")) for key, _, small in NUMBERS),
+    *(
+        (f"{key}=1e-320", key, "must be at least 2.3e-308")
+        for key, _, small in NUMBERS
+        if small == 0.0 and "rtol" not in key
+    ),
     *((f"{key}=nan", key, "must be a finite number") for key, _, _ in NUMBERS),
     *((f"{key}=-inf", key, "must be a finite number") for key, _, _ in NUMBERS),
     *((f'{key}="1.0"', key, "must be a number") for key, _, _ in NUMBERS),

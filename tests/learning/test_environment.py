@@ -278,3 +278,21 @@ def test_wrong_actions_and_rewards_are_refused():
     environment.reset(seed=0)
     with pytest.raises(fp.InputError, match="there are joint_position, joint_velocity, action"):
         environment.step(PULLS[0])
+
+
+@pytest.mark.parametrize("wrong", ["a", None, [1.0], True, float("nan")])
+def test_what_is_no_number_is_refused_by_the_name_of_its_argument(wrong):
+    made = {
+        **{f"Sensor.{name}": lambda name=name: Sensor(**{name: wrong}) for name in vars(Sensor())},
+        **{name: lambda name=name: simple(**{name: wrong}) for name in ("delay", "period", "duration")},
+        **{each.__name__: lambda each=each: each(wrong, 2.0) for each in (Uniform, LogUniform, Normal)},
+        "action.delay": lambda: simple(randomise={"action.delay": Choice([wrong])}),
+    }
+    for name, make in made.items():
+        with pytest.raises(fp.InputError) as caught:
+            make()
+        assert caught.value.entry == name
+
+
+def simple(**task):
+    return Environment(FIG6, reward=nothing, **task)

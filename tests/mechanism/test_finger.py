@@ -1,5 +1,7 @@
 """The wired finger against a scalar re-implementation of the model page, and as a function that others call."""
 
+import inspect
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -169,10 +171,49 @@ def test_a_rigid_body_with_another_number_of_joints_is_refused(ub):
 
 
 def test_a_state_of_the_wrong_size_is_refused(finger):
-    with pytest.raises(ValueError, match="19 numbers, not 18"):
+    with pytest.raises(ValueError, match=r"x = \[18\]: must be numbers of shape \(\.\.\., 19\)"):
         finger.evaluate(np.zeros(18), np.zeros(4))
 
 
 def test_couplings_are_those_of_the_routing(finger):
     np.testing.assert_array_equal(finger.coupling, finger.routing.coupling)
     np.testing.assert_array_equal(finger.strand_coupling, finger.routing.strand_coupling)
+
+
+#: Arguments that are numbers, by name, and attributes that are their sizes.
+SIZES = {"q": 4, "v": 4, "a": 4, "torque": 4, "position": 4, "velocity": 4, "x": 19, "inputs": 4}
+
+
+@pytest.mark.parametrize("kind", [fp.Finger, type(fp.Finger("ub_stand_in").rigid_body)])
+def test_every_method_of_postures_and_states_takes_lists_and_refuses_other_sizes_in_one_line(kind):
+    finger, random = fp.Finger("ub_stand_in"), np.random.default_rng(3)
+    owner, seen = finger if kind is fp.Finger else finger.rigid_body, []
+    for name, method in inspect.getmembers(owner, inspect.ismethod):
+        needed = [each.name for each in inspect.signature(method).parameters.values() if each.default is each.empty]
+        names = [each for each in needed if each != "time"]
+        if name.startswith("_") or not names or not {*names} <= {*SIZES} or names[0] == "rigid_body":
+            continue
+        arrays = {each: 0.1 + 0.3 * random.random(SIZES[each]) for each in names}
+        time = {"time": 0.0} if "time" in needed else {}
+        given, wanted = (method(**time, **{k: f(v) for k, v in arrays.items()}) for f in (np.ndarray.tolist, np.copy))
+        for got, expected in zip(numbers(given), numbers(wanted), strict=True):
+            np.testing.assert_array_equal(got, expected)
+        for each in names:
+            for wrong in ([0.1] * (SIZES[each] + 1), [], "abcd", 0.3, None):
+                with pytest.raises(InputError, match=rf"^{each}\b.*must be numbers of shape \(") as caught:
+                    method(**time, **{**arrays, each: wrong})
+                assert "\n" not in str(caught.value)
+        seen.append(name)
+    expected = {"static_torque", "rhs", "evaluate", "excursion", "rest_state"}
+    expected = expected if kind is fp.Finger else {"mass_matrix", "jacobian", "tip_position", "forward_dynamics"}
+    assert expected <= {*seen}
+
+
+def numbers(found):
+    """Return the arrays of an answer, whatever it is; none of objects of Pinocchio."""
+    if hasattr(found, "rate"):
+        return [found.rate]
+    parts = (
+        vars(found).values() if hasattr(found, "__dict__") else found if isinstance(found, tuple | list) else [found]
+    )
+    return [each for each in parts if isinstance(each, np.ndarray)]

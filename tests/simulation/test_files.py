@@ -12,6 +12,8 @@ from finger_pin.description.loading import load_scenario
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.simulation.results import ResultFolder
+from finger_pin.views.summary import summarize
+from finger_pin.views.viewer import write_animation
 
 
 def contents(folder):
@@ -213,3 +215,40 @@ def test_a_disk_that_is_full_is_said_to_be_so(tmp_path, result):
 def test_a_result_is_loaded_from_its_folder(tmp_path, result):
     publish(tmp_path, result)
     assert fp.load(tmp_path).equals(result)
+
+
+@pytest.mark.parametrize("part", ["no time", "no samples"])
+def test_a_result_without_samples_is_told_so_by_all_that_read_one(tmp_path, result, part):
+    broken = result.isel(time=0, drop=True) if part == "no time" else result.isel(time=slice(0, 0))
+    fp.save(broken, tmp_path / "r.nc")
+    broken = fp.load(tmp_path / "r.nc")
+    doors = (
+        lambda: fp.save(broken, tmp_path / "r.csv"),
+        lambda: summarize(broken),
+        lambda: write_animation(broken, tmp_path / "r.html"),
+        lambda: fp.simulate("reversals", initial=broken),
+    )
+    for door in doors:
+        with pytest.raises(InputError, match=r"result\.time: (is missing|must have at least one sample)"):
+            door()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_that_nobody_writes_is_refused_and_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    empty = pytest.importorskip("mujoco").MjSpec()
+    doors = {
+        "s.toml": fp.load_scenario,
+        "f.toml": fp.load_finger,
+        "r.nc": fp.load,
+        "m.csv": lambda name: fp.load_scenario("reversals", {"reference.file": name}),
+        "h.xml": fp.from_mujoco,
+        "t.toml": lambda name: fp.from_mujoco(empty, tendons=name),
+    }
+    for name, door in doors.items():
+        os.mkfifo(name)
+        # What waits nevertheless is ended by the default action of the signal.
+        signal.alarm(60)
+        with pytest.raises((InputError, OSError), match="is a pipe"):
+            door(name)
+        signal.alarm(0)

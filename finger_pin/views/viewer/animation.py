@@ -18,6 +18,7 @@ from finger_pin.files import write_text
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.simulation.netcdf import require_samples
 from finger_pin.typing import Array
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
@@ -146,9 +147,8 @@ class Playback:
             InputError: If the result lacks something that is shown.
         """
         scene = Scene(finger or read_scene(result.attrs).finger)
+        require_samples(result)
         time = _variable(result, "time")
-        if len(time) == 0:
-            raise InputError("result.time", "must have at least one sample")
         frames = _frame_indices(time, rate)
         position = _variable(result, "joint_position")[frames]
         tension = _strand_tensions(scene, result, frames)
