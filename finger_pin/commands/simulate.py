@@ -62,7 +62,11 @@ def simulate(
     from finger_pin.simulation.recording import only
     from finger_pin.simulation.results import ResultFolder
 
-    loaded = load_scenario(scenario or "fig6", changed) if mujoco is None else _hand(mujoco, changed, quiet)
+    loaded = (
+        load_scenario("fig6" if scenario is None else scenario, changed)
+        if mujoco is None
+        else _hand(mujoco, changed, quiet)
+    )
     output = output or Path("results", default_name(loaded, settings, duration, method))
     if check:
         tightened(loaded)
