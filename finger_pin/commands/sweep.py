@@ -50,7 +50,7 @@ _Output = Annotated[
 
 
 def sweep(
-    scenario: ScenarioName = "fig6",
+    scenario: ScenarioName = "reversals",
     over: _Over = [],  # noqa: B006
     metric: Annotated[list[str], typer.Option(metavar="NAME", help="Metric of the runs; repeatable; see --list.")] = [],  # noqa: B006
     design: _Design = "grid",
@@ -71,9 +71,9 @@ def sweep(
 
     The same command again continues where an earlier one ended, however it ended. For example:
 
-    sweep fig6 --over controller.gain=0.5:2:7 --over finger.tendon_friction.coulomb=0.05,0.11,0.2
+    sweep reversals --over controller.gain=0.5:2:7 --over finger.tendon_friction.coulomb=0.05,0.11,0.2
 
-    sweep fig6 --design latin --samples 50 --over controller.gain=0.5:2 --over finger.tendon_friction.coulomb=0.02:0.3
+    sweep reversals --design latin --samples 50 --over controller.gain=0.5:2 --over finger.tendon_friction.drag=0:1
     """
     if listed:
         return print_text(listing())

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, field_serializer, field_validator, model_validator
 
 from finger_pin.description.by_finger import dump_set_fields
-from finger_pin.description.parameters import check_density
 from finger_pin.description.placement import PathSignal
 from finger_pin.description.signals import ForceSignal, of_axes
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
@@ -67,8 +66,6 @@ class Object(Shaped):
             raise problem("orientation", "must be a quaternion x, y, z, w that is not zero", self.orientation)
         if self.shape == "half_space" and self.mass is not None:
             raise problem("mass", "a half-space is fixed; leave it out", self.mass)
-        if self.mass is not None:
-            check_density(self.mass, sum(self.inertia))
         if self.frame == "world" and (self.mass is not None or self.path):
             raise problem("frame", "is for fixed objects: leave out mass and path", self.frame)
         if self.path is not None and self.mass is not None:

@@ -1,4 +1,4 @@
-"""Identification: six numbers of fig6 found in six of its signals, and what slopes of a run cost beside the run."""
+"""Identification: six numbers of reversals found in six of its signals, and what slopes of a run cost beside it."""
 
 from __future__ import annotations
 

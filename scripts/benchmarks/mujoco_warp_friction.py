@@ -72,7 +72,8 @@ def _stepping(model: Any, worlds: int, friction: dict[str, Any]) -> tuple[Callab
             took += clocked(launch)[0]
         return took / (jumps * every)
 
-    def launch() -> None:
+    def launch(captured: tuple[Any, ...] = (m, d)) -> None:
+        # A graph keeps addresses alone: what it was captured of has to live as long as it.
         for _ in range(every):
             warp.capture_launch(capture.graph)
         warp.synchronize()

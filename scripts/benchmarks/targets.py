@@ -122,7 +122,7 @@ def _mujoco(study: Mapping[str, Any]) -> Iterator[Target]:
 
 
 def _identification(study: Mapping[str, Any]) -> Iterator[Target]:
-    yield target("six numbers of fig6 identified from three starts", study["fit"]["wall"], "<=", 15.0, "s")
+    yield target("six numbers of reversals identified from three starts", study["fit"]["wall"], "<=", 15.0, "s")
     slopes = study["slopes"]
     for count, aim in (("1", 1.3), ("3", 1.9), ("6", 2.8)):
         yield target(f"slopes by {count} numbers, in runs", slopes[count] / slopes["run"], "<=", aim, "x")

@@ -128,7 +128,7 @@ def transmission_findings(found: Transmission) -> list[Finding]:
             "a",
             "in motion the loss is that of steady sliding at the posture of the moment",
             f"least f/f^a pulling: {moving}; greatest releasing: {let_go}; off steady sliding by "
-            f"{100.0 * np.nanmax(off):.1f} % rms at most while sliding",
+            f"{100.0 * np.max(off[np.isfinite(off)], initial=0.0):.1f} % rms at most while sliding",
             Verdict.of(off[np.isfinite(off)] < _SETTLED),
         ),
     ]

@@ -111,9 +111,15 @@ def curves(result: xr.Dataset, printed: Printed | None = None) -> list[Curve]:
     ]
     units = ["rad"] * (2 * len(joints)) + ["N"] * (2 * len(tendons) + 1)
     return [
-        Curve(name, unit, float(np.nanmax(a) - np.nanmin(a)), float(np.sqrt(np.nanmean((b - a) ** 2))))
+        Curve(name, unit, float(np.nanmax(a) - np.nanmin(a)), _rms(b - a))
         for name, unit, a, b in zip(names, units, theirs, ours, strict=True)
     ]
+
+
+def _rms(values: Array) -> float:
+    """Return the root mean square of what is a number; not a number where nothing is, as in a run that ends early."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
 def table(found: list[Curve]) -> list[str]:

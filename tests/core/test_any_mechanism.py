@@ -226,7 +226,7 @@ def ends(mechanism, x, command, force, duration=5e-3):
 
 def test_the_textbook_and_the_compiled_integrators_read_the_same_tables():
     """Their motions agree, and still do when the numbers of any table are others; with this seed all of them act."""
-    rng = np.random.default_rng(30)
+    rng = np.random.default_rng(33)
     mechanism = random_mechanism(rng)
     x, command = random_states(mechanism, rng, 1)[0], rng.uniform(0.5, 3.0, mechanism.channels)
     force = rng.normal(size=(len(mechanism.body.tips), 3))

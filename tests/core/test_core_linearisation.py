@@ -116,7 +116,7 @@ def held(case):
     return replace(still, loop=replace(case.loop, controller=Held(tuple(still.control.tension))))
 
 
-@pytest.fixture(scope="module", params=[*LOOPS, "fig6_held", "two_passive_pushed_held", "lugre_held"])
+@pytest.fixture(scope="module", params=[*LOOPS, "reversals_held", "two_passive_pushed_held", "lugre_held"])
 def examined(request, cases):
     """A loop, and the states at which its right-hand side is smooth nearby."""
     name = request.param

@@ -35,6 +35,8 @@ def description(hand):
     return fp.FingerDescription.model_validate(
         {
             "name": "allegro_index",
+            "tendon_friction": {"stiffness": 5e4},
+            "joint_friction": {"stiffness": 5.0},
             "joints": {name: {"range": [lower[i], upper[i]]} for name, i in zip(JOINTS, INDICES, strict=True)},
             "tendons": {
                 name: {

@@ -43,7 +43,7 @@ def table(pull, joints=3, duration=8.0, **friction):
                     }
                 }
             },
-            "tendon_friction": {"coulomb": MU, "stiction_ratio": 1.0, "place": "bends"} | friction,
+            "tendon_friction": {"coulomb": MU, "stiction_ratio": 1.0, "stiffness": 5e4, "place": "bends"} | friction,
             "joint_friction": {"coulomb": 0.0, "stiction": 0.0, "viscous": 0.0, "stiffness": 1e-3, "floor": 1e-12},
         },
         "controller": {"kind": "tensions", "minimum_tension": 0.0, "tensions": {"flexor": pull}},

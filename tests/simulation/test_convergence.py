@@ -156,7 +156,7 @@ def test_the_figure_shows_the_greatest_differences_and_where_the_runs_part(hunti
         (axes,) = plots.plot_convergence(checked).axes
         drawn = {line.get_label(): line.get_ydata() for line in axes.get_lines()}
         for joint, largest in zip(found.joints, found.largest, strict=True):
-            assert max(drawn[joint]) == largest
+            assert max(drawn[joint]) == pytest.approx(np.rad2deg(largest), rel=1e-12)
         written = [text.get_text() for text in axes.texts]
         assert written == ([] if found.converged else [f" parts at {found.parting_time:.3g} s"])
         names = {path.name for path in plots.draw_all(checked, tmp_path)}

@@ -188,6 +188,7 @@ SOMETIMES = {
     r".*bodies\.(centre|inertia)": "of a body that turns about one axis",
     r".*bodies\.(position|orientation)": "of a body that slides, and that no path passes",
     r".*bodies\.gravity_compensation": "without gravity",
+    r"controller\.gravity_compensation": "without gravity",
     r".*\.(bearing|tendons\.joints)": "that nothing loads",
     r"finger\.tendons\.(crossings\.)?(bends|curvature_offset)": "of a tendon without friction",
     r".*\.input_range": "limits that are not reached",

@@ -198,4 +198,4 @@ def test_what_is_prepared_and_what_is_stepped_print_in_one_line_what_they_are():
     prepared = fp.prepare("reversals", ["controller.gain"], ["joint_position"])
     assert repr(prepared) == "Prepared(reversals, controller.gain=1.0; records joint_position)"
     simulator = fp.Simulator("ub_stand_in", position=[0.0, 0.3, 0.25, 0.2])
-    assert repr(simulator) == "Simulator(ub at t = 0 s, theta = [0, 0.3, 0.25, 0.2] rad)"
+    assert repr(simulator) == "Simulator(ub_stand_in at t = 0 s, theta = [0, 0.3, 0.25, 0.2] rad)"

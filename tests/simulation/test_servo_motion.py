@@ -19,6 +19,7 @@ def test_the_fitted_xl330_moves_a_pendulum_through_a_spool_as_scipy_has_it():
     xl330_inertia = 1.895e-3
     swing = {"offset": 5.8, "amplitude": 5.5, "frequency": 1.0}
     made = finger("XL330-M288", link={**LINK, "mass": 0.15}, gravity=G, canal=0.11)
+    made = fp.Finger(made.description.updated(tendon_friction={"stiffness": 5e4}))
     weight, link_inertia = 0.15 * G * 0.03, 1e-5 + 0.15 * 0.03**2
     tensions = {"kind": "tensions", "tensions": {"flexor": swing}}
     result = fp.simulate(scenario(made, 1.0, controller=tensions))
