@@ -20,9 +20,6 @@ from finger_pin.description.recordings.columns import read_columns
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.typing import Array
 
-#: Steps of the reading, a hundredth of a point on the page: rad of angles, rad of errors 1 and 2 to 4, N of T1 to T5.
-READING = {"angle": 5e-4, "error": (5e-7, 5e-6, 5e-6, 5e-6), "tension": (4e-4, 4e-4, 6e-3, 4e-3, 4e-3)}
-
 
 @dataclass(frozen=True, eq=False)
 class Printed:
