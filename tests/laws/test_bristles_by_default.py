@@ -60,6 +60,7 @@ def test_a_cord_that_turns_often_delivers_the_capstan_law():
     """Round 1.5 turns at mu 0.35: exp(-0.35 x 3 pi) = 0.0369 arrives, of a pull that has slid by a millimetre."""
     keys = {
         "finger.tendon_friction.coulomb": 0.35,
+        "finger.tendon_friction.stiffness": "none",
         "finger.tendons.T1.curvature_offset": 3.0 * np.pi,
         "finger.joints.drum.spring.stiffness": 0.8,
         "controller.tensions.T1.height": 55.0,

@@ -47,7 +47,7 @@ def test_a_seed_gives_the_same_points_again_and_another_one_others():
         ("a.b=2:9:1", (2.0,)),
         ("a.b=Rodas4, Rodas5P", ("Rodas4", "Rodas5P")),
         ("a.b=true,false", (True, False)),
-        ("a.b=mine.toml,ub", ("mine.toml", "ub_stand_in")),
+        ("a.b=mine.toml,ub", ("mine.toml", "ub")),
     ],
 )
 def test_values_are_spelt_as_steps_or_as_a_list(text, values):

@@ -145,7 +145,7 @@ def test_every_design_of_the_front_is_a_scenario_that_gives_its_numbers(tmp_path
         scenario = fp.load_scenario(tmp_path / "front" / f"{row['design']}.toml")
         assert scenario.controller.gain == float(row["controller.gain (N m/rad)"])
         assert float(row["dear (N m/rad)"]) == 1.0 / scenario.controller.gain
-        assert scenario.name == f"fig6_front_{row['design']}"
+        assert scenario.name == f"reversals_front_{row['design']}"
 
 
 def test_designs_that_cannot_be_run_do_not_count_and_are_recorded_with_their_reason():

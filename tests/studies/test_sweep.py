@@ -260,10 +260,10 @@ def test_wrong_input_writes_nothing(tmp_path, over, options):
     assert not (tmp_path / "out").exists()
 
 
-def test_an_entry_that_is_left_out_may_be_swept_and_a_search_says_that_it_has_no_start():
-    """Bristles of `canal` state no stiffness."""
-    key, short = "finger.tendon_friction.stiffness", {"simulation.duration": 0.01}
-    study = fp.sweep("canal", {key: [1e4, 1e5]}, metrics=["losses"], overrides=short)
+def test_an_entry_that_is_left_out_may_be_swept_and_a_search_says_that_it_has_no_start(tmp_path):
+    key, short, path = "finger.tendon_friction.stiffness", {"simulation.duration": 0.01}, tmp_path / "unstated.toml"
+    path.write_text('extends = "canal"\n[finger.tendon_friction]\nstiffness = "none"\n')
+    study = fp.sweep(path, {key: [1e4, 1e5]}, metrics=["losses"], overrides=short)
     assert np.isfinite(study.losses.values).all()
     with pytest.raises(fp.InputError, match=f"{key}: is left out"):
-        fp.optimise("canal", [f"{key}=1e4:1e5"], minimise=["losses"], constraints=[], overrides=short)
+        fp.optimise(path, [f"{key}=1e4:1e5"], minimise=["losses"], constraints=[], overrides=short)

@@ -70,8 +70,8 @@ def test_every_figure_of_a_finger_takes_it(foreign):
     ]
     for figure in figures:
         figure.canvas.draw()
-    # The workspace is that of the fingertip of the model.
-    tip = 1e3 * foreign.rigid_body.tip_position(np.zeros(4))
+    # The workspace, in cm, is that of the fingertip of the model.
+    tip = 1e2 * foreign.rigid_body.tip_position(np.zeros(4))
     low, high = np.array([getattr(figures[0].axes[0], f"get_{axis}lim")() for axis in "xyz"]).T
     assert np.all((low < tip) & (tip < high))
 

@@ -71,7 +71,8 @@ def test_what_a_user_has_set_for_figures_is_above_the_style_and_sizes_follow_it(
     assert figure.get_figwidth() == 4.0
     angles = figure.axes[0]
     assert angles.yaxis.label.get_size() == 7.0
-    assert [line.get_color() for line in angles.lines] == ["#123456", "#abcdef", "#123456", "#abcdef"]
+    joints = ["#123456", "#abcdef", "#123456", "#abcdef"]
+    assert [line.get_color() for line in angles.lines] == [*joints, *4 * ["#ff0000"]]
     assert angles.lines[0].get_linewidth() == 3.0
     (delivered, planned) = figure.axes[2].lines
     assert (delivered.get_color(), planned.get_color()) == ("#123456", "#ff0000")
