@@ -85,11 +85,6 @@ OTHER_OVERRIDES = [
     ("finger.joint_friction.viscous=[1e-3]", "finger.joint_friction.viscous", "list of 4"),
     # Physics.
     ("finger.joints.proximal.link.mass=14.0", "finger.joints.proximal.link.mass", "is it in grams?"),
-    (
-        'environment.objects={ball={shape="sphere", radius=0.02, mass=5.0}}',
-        "environment.objects.ball.mass",
-        "denser than osmium",
-    ),
     ("finger.joint_friction.stiction=2e-4", "finger.joint_friction.stiction", "Coulomb coefficient 0.00025"),
     (
         "finger.joint_friction.stiction=[4e-4, 4e-4, 1e-4, 4e-4]",
