@@ -1,4 +1,4 @@
-"""Statics, without a run: self-locking, fingertip forces, equilibria, and the error of (17).
+"""Statics, without a run: self-locking, fingertip forces and equilibria.
 
 It reads descriptions, fingers, scenarios and results, and nothing of the simulation.
 """
@@ -9,9 +9,7 @@ from finger_pin.analysis.inverse_kinematics import TipPosture, inverse_kinematic
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
 from finger_pin.analysis.locking_margin import SelfLockingMargin, locking_advice, quick_margin, self_locking_margin
-from finger_pin.analysis.pin_wrench import PinWrench, pin_wrench
 from finger_pin.analysis.polytope import ForcePolytope, force_polytope
-from finger_pin.analysis.reaction import JointReactions, ReactionDifference, fingertip_loads, joint_reactions
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.analysis.spring_return import SpringReturn, spring_return
 from finger_pin.analysis.steady import SteadyState, steady_state
@@ -24,9 +22,6 @@ __all__ = [
     "Equilibrium",
     "ForcePolytope",
     "Friction",
-    "JointReactions",
-    "PinWrench",
-    "ReactionDifference",
     "RequiredTension",
     "SelfLockingMap",
     "SelfLockingMargin",
@@ -36,15 +31,12 @@ __all__ = [
     "closure_over_range",
     "critical_friction",
     "equilibrium",
-    "fingertip_loads",
     "force_polytope",
     "gear_shares",
     "inverse_kinematics",
-    "joint_reactions",
     "largest_force",
     "locking_advice",
     "locking_over_range",
-    "pin_wrench",
     "posed",
     "quick_margin",
     "self_locking_map",

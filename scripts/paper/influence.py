@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis import self_locking_margin
-from finger_pin.analysis.transmission import coupling_in_motion
 from finger_pin.description.routing import ForceClosure
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
@@ -36,6 +35,7 @@ from paper.runs import (
     with_minimum_tension,
     with_tendon_friction,
 )
+from paper.transmission import coupling_in_motion
 
 _SETTLING = 1.0
 _DURATION, _SAMPLES = 5.0, 2500

@@ -8,13 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.analysis.transmission import flexion_postures, transmission_efficiency
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.views.plots.axes_3d import flexion_plane
 from finger_pin.views.plots.panels import grid, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, cycle_colours, styled, thin
-from finger_pin.views.plots.workspace_surfaces import flexion_section
 from paper.posture import Transmission
+from paper.transmission import flexion_postures, transmission_efficiency
 
 _MILLI = 1e3
 _AXES = "xyz"
@@ -73,7 +73,7 @@ def _space(figure: Figure, axes: Axes, found: Transmission) -> None:
     worst = int(np.argmax(pulling.max(axis=0) - pulling.min(axis=0)))
     finger = Finger(found.scenario.finger)
     positions = flexion_postures(finger, _SIDE)
-    first, second = flexion_section(finger, samples=2).plane
+    first, second = flexion_plane(finger)
     tips = _MILLI * np.array(
         [finger.rigid_body.tip_position(theta) for theta in positions.reshape(-1, positions.shape[2])]
     )

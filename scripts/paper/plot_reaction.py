@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from finger_pin.analysis.reaction import JointReactions
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import trace
 from finger_pin.views.plots.panels import legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREEN, GREY, VERMILLION, Width, colour, styled, thin
+from paper.joint_reactions import JointReactions
 
 _PERCENT = 100.0
 _COLUMN = 4.6

@@ -17,7 +17,7 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.axes_3d import AXES, space
 from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, colour, styled, thin
-from finger_pin.views.plots.workspace_surfaces import fingertip_surface, flexion_section
+from paper.workspace_surfaces import fingertip_surface, flexion_section
 
 # The printed ticks are centimetres, whatever their labels say.
 _CENTI = 1e2

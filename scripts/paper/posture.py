@@ -6,18 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.analysis.transmission import (
+from finger_pin.description.scenario import Scenario
+from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.simulate import simulate
+from finger_pin.typing import Array
+from paper.runs import Progress
+from paper.transmission import (
     TransmissionEfficiency,
     TransmissionInMotion,
     transmission_efficiency,
     transmission_in_motion,
     workspace_postures,
 )
-from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.simulate import simulate
-from finger_pin.typing import Array
-from paper.runs import Progress
 
 #: Number of runs of the experiment.
 TRANSMISSION_RUNS = 1

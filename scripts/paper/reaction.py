@@ -14,8 +14,8 @@ from finger_pin.commands.options import Format, Output, Quiet, ScenarioName, Set
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from finger_pin.analysis import JointReactions, ReactionDifference
     from finger_pin.description.scenario import Scenario
+    from paper.joint_reactions import JointReactions, ReactionDifference
 
 FORCE = "environment.fingertip_force"
 AS_IT_IS = "as it is"
@@ -44,11 +44,11 @@ def reaction(
     sizes = numbers("--forces", forces) if forces else []
     import numpy as np
 
-    from finger_pin.analysis import fingertip_loads, joint_reactions
     from finger_pin.description.loading import load_scenario
     from finger_pin.files import write_table
     from finger_pin.simulation.simulate import simulate
     from finger_pin.views.plots import save_figure
+    from paper.joint_reactions import fingertip_loads, joint_reactions
     from paper.plot_reaction import plot_reaction
 
     loaded = load_scenario(scenario, changed)

@@ -8,12 +8,12 @@ import numpy as np
 from paper.plot_fig6 import plot_printed
 from paper.plot_friction_law import FASTEST, KINETIC, NORMAL, RATIO, RATIOS, STRIBECK_TOP
 from paper.printed import Printed, curves, table_ii
+from paper.workspace_surfaces import flexion_section
 
 from finger_pin.description.loading import load_finger, load_scenario
 from finger_pin.laws.bristle import friction_coefficient, steady_force
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
-from finger_pin.views.plots.workspace_surfaces import flexion_section
 from validation.check import Check, Picture, Section, compare
 
 TITLE = "Printed figures"

@@ -5,20 +5,20 @@ import pytest
 import xarray as xr
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from paper.joint_reactions import joint_reactions
 from paper.plot_workspace import plot_workspace
+from paper.transmission import transmission_efficiency, transmission_in_motion
 
 import finger_pin as fp
 from finger_pin.analysis import (
     Friction,
     critical_friction,
     force_polytope,
-    joint_reactions,
     largest_force,
     self_locking_map,
     self_locking_margin,
     tension_for_force,
 )
-from finger_pin.analysis.transmission import transmission_efficiency, transmission_in_motion
 from finger_pin.description.scene_metadata import scene_metadata
 from finger_pin.views import plots
 from finger_pin.views.viewer.animation import animation_page, posture_page

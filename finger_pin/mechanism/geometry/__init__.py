@@ -1,6 +1,5 @@
 """Paths of the tendons in space: parallel lanes and windings around the joints."""
 
-from finger_pin.mechanism.geometry.cuts import Cut, Groove
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
 from finger_pin.mechanism.geometry.lateral_offsets import joint_axes
 from finger_pin.mechanism.geometry.paths import LinkPoses, TendonGeometry, TendonPath, tendon_paths
@@ -9,8 +8,6 @@ from finger_pin.mechanism.geometry.winding import BASE_LEAD
 
 __all__ = [
     "BASE_LEAD",
-    "Cut",
-    "Groove",
     "LinkPoses",
     "Pulley",
     "TendonGeometry",

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from finger_pin.description.finger import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.from_pinocchio import turned_model
-from finger_pin.mechanism.geometry.cuts import Cut, Groove, cuts
 from finger_pin.mechanism.geometry.fingers import fingers_of_links, fingers_on_model, palm_of
 from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -57,6 +56,7 @@ class TendonGeometry:
     Attributes:
         description: Description that it was built from.
         model: Pinocchio model; the axis of every joint is the z axis of its frame.
+        pieces: Straight spans and arcs of every tendon, from the actuator on, by name.
         lanes: Offset of each tendon along the joint axes.
         pulleys: Winding surfaces whose radius is not zero.
         visuals: The solids.
@@ -98,7 +98,7 @@ class TendonGeometry:
         frames = [body.model.frames[tip] for tip in body.tips]
         self.tips = tuple((int(f.parentJoint), rotations[f.parentJoint].T @ f.placement.translation) for f in frames)
         pieces = {name: each for finger in fingers for name, each in finger.pieces.items()}
-        self._pieces = {name: pieces[name] for name in description.tendons}
+        self.pieces = {name: pieces[name] for name in description.tendons}
         self.pulleys = tuple(pulley for finger in fingers for pulley in finger.pulleys)
         self.visuals = (*own, *(visual for finger in fingers for visual in finger.visuals))
         self.widths = tuple(width for finger in fingers for width in finger.widths)
@@ -147,19 +147,14 @@ class TendonGeometry:
             poses: Of the links at this position, where they are at hand.
         """
         q = self._checked(joint_position)
-        loose = np.zeros((*q.shape[:-1], len(self._pieces))) if slack is None else np.asarray(slack, dtype=float)
+        loose = np.zeros((*q.shape[:-1], len(self.pieces))) if slack is None else np.asarray(slack, dtype=float)
         poses = self.poses(q) if poses is None else poses
         paths = []
-        for column, (name, pieces) in enumerate(self._pieces.items()):
+        for column, (name, pieces) in enumerate(self.pieces.items()):
             parts = [self._place(piece, q, loose[..., column, None], poses) for piece in pieces]
             distal = np.concatenate([piece.distal for piece in pieces])
             paths.append(TendonPath(name, np.concatenate(parts, axis=-2), distal))
         return tuple(paths)
-
-    def cuts(self, groove: Groove = Groove.DISTAL) -> tuple[Cut, ...]:
-        """Return the cuts of every tendon of a finger at the joints; see `cuts`."""
-        found = (cuts(self.model, name, pieces, groove) for name, pieces in self._pieces.items())
-        return tuple(cut for each in found for cut in each)
 
     def _place(self, piece: WoundSpan | Arc, q: Array, loose: Array, poses: LinkPoses) -> Array:
         link = piece.link if isinstance(piece, WoundSpan) else piece.joint

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 from matplotlib.figure import SubFigure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
+from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
 AXES = "xyz"
@@ -42,3 +44,15 @@ def space(part: SubFigure, corners: Array, unit: str) -> Axes3D:
     # Onto what lies flat one looks from higher up.
     axes.view_init(elev=20 if span[2] > 1.01 * _THINNEST * most else 40, azim=-55)
     return axes
+
+
+def flexion_plane(finger: Finger) -> tuple[int, int]:
+    """Return the two axes of the base frame that are most nearly across the axis of the last joint, at rest."""
+    limiter, model = finger.stroke_limiter, finger.rigid_body.model
+    data = model.createData()
+    pin.computeJointJacobians(model, data, np.clip(0.0, limiter.lower, limiter.upper))
+    twist = pin.getJointJacobian(model, data, model.njoints - 1, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+    # Of a single joint Pinocchio returns a vector.
+    normal = int(np.argmax(np.abs(twist.reshape(6, -1)[3:, -1])))
+    first, second = (axis for axis in range(3) if axis != normal)
+    return first, second

@@ -12,11 +12,10 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from finger_pin.analysis import Friction, force_polytope, largest_force, tension_for_force
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
-from finger_pin.views.plots.axes_3d import AXES, space
+from finger_pin.views.plots.axes_3d import AXES, flexion_plane, space
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, Width, colour, styled, thin
-from finger_pin.views.plots.workspace_surfaces import flexion_section
 
 _LABELS = {
     Friction.HELPING: "can hold, friction helps",
@@ -101,7 +100,7 @@ def plot_radius_sensitivity(
 
 
 def _section(axes: Axes, finger: Finger, position: Sequence[float] | Array, limit: float | tuple[float, ...]) -> None:
-    plane = flexion_section(finger, samples=2).plane
+    plane = flexion_plane(finger)
     across = finger.rigid_body.jacobian(np.asarray(position, dtype=float))[plane, :]
     # The joint's torque changes its sign where the force points at its axis: on either side of it, within its friction
     # circle, lies a step of what the finger can push.

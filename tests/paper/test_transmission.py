@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 import xarray as xr
-
-import finger_pin as fp
-from finger_pin.analysis.transmission import (
+from paper.transmission import (
     coupling_in_motion,
     flexion_postures,
     transmission_efficiency,
     transmission_in_motion,
     workspace_postures,
 )
+
+import finger_pin as fp
 from finger_pin.description.routing import ForceClosure
 
 

@@ -15,6 +15,7 @@ from enum import Enum
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
 from finger_pin.typing import Array
 
@@ -51,7 +52,18 @@ class Cut:
     direction: Array
 
 
-def cuts(model: pin.Model, tendon: str, pieces: Sequence[WoundSpan | Arc], groove: Groove) -> Iterator[Cut]:
+def tendon_cuts(geometry: TendonGeometry, groove: Groove = Groove.DISTAL) -> tuple[Cut, ...]:
+    """Return the cuts of every tendon of a finger at the joints, tendon by tendon.
+
+    Args:
+        geometry: The wound tendons of a finger.
+        groove: Link that the grooves are part of.
+    """
+    tendons = geometry.pieces.items()
+    return tuple(cut for name, pieces in tendons for cut in _cuts(geometry.model, name, pieces, groove))
+
+
+def _cuts(model: pin.Model, tendon: str, pieces: Sequence[WoundSpan | Arc], groove: Groove) -> Iterator[Cut]:
     """Yield the cuts of a wound tendon, joint by joint.
 
     Args:

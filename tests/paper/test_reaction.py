@@ -5,13 +5,15 @@ import csv
 import numpy as np
 import pinocchio as pin
 import pytest
+from paper.joint_reactions import fingertip_loads, joint_reactions
+from paper.pin_wrench import pin_wrench
 from paper.plot_reaction import plot_reaction
 from paper.reaction import reaction
+from paper.tendon_cuts import Groove, tendon_cuts
 
 import finger_pin as fp
-from finger_pin.analysis import fingertip_loads, joint_reactions, pin_wrench
 from finger_pin.commands.application import run_function
-from finger_pin.mechanism.geometry import Groove, TendonGeometry
+from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.simulation.simulate import simulate
 
 FORCE = np.array([0.4, -0.7, 0.5])
@@ -103,7 +105,7 @@ def test_without_tendons_the_pin_changes_the_momentum_of_what_it_carries_and_bea
 def test_a_tendon_between_pulleys_pulls_along_their_common_tangent():
     """In `planar` the distal flexor runs from a radius of 2.0 to one of 5.5 mm, 45 mm apart, on the same side."""
     geometry = TendonGeometry(fp.load_finger("planar"))
-    (cut,) = (each for each in geometry.cuts() if each.tendon == "flexor_distal" and each.joint == 2)
+    (cut,) = (each for each in tendon_cuts(geometry) if each.tendon == "flexor_distal" and each.joint == 2)
     tilt = np.arcsin((5.5 - 2.0) / 45.0)
     np.testing.assert_allclose(cut.direction, [np.cos(tilt), np.sin(tilt), 0.0], atol=1e-9)
     # On its pulley, across the direction: r to the left of it, seen along the path.
@@ -112,7 +114,7 @@ def test_a_tendon_between_pulleys_pulls_along_their_common_tangent():
 
 def test_tendons_that_a_cut_crosses_are_those_that_load_the_joint_in_17(finger):
     crossed = np.zeros_like(finger.routing.loads)
-    for cut in TendonGeometry(finger.description).cuts():
+    for cut in tendon_cuts(TendonGeometry(finger.description)):
         crossed[cut.joint - 1, finger.routing.strand(cut.tendon, distal=cut.distal)] += 1.0
     np.testing.assert_array_equal(crossed, finger.routing.loads)
 

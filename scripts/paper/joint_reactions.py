@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from finger_pin.analysis.pin_wrench import pin_wrench
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.finger import one_finger
 from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.geometry import Groove
 from finger_pin.typing import Array
+from paper.pin_wrench import pin_wrench
+from paper.tendon_cuts import Groove
 
 _MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 

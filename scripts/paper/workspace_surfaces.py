@@ -11,6 +11,7 @@ import pinocchio as pin
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
+from finger_pin.views.plots.axes_3d import flexion_plane
 
 _PARALLEL = 1e-6
 
@@ -60,15 +61,13 @@ def flexion_section(finger: Finger, samples: int = 61, *, coupled: bool = True) 
     parallel = [j for j in range(len(held)) if np.linalg.norm(np.cross(axes[j], axes[-1])) < _PARALLEL]
     moving = [j for j in _constraint(finger).free if j in parallel]
     patches = _patches(finger, moving, held, samples, matrix)
-    normal = int(np.argmax(np.abs(axes[-1])))
-    first, second = (axis for axis in range(3) if axis != normal)
     low, high = finger.stroke_limiter.lower, finger.stroke_limiter.upper
     poses = []
     for share in (0.0, 0.5, 1.0):
         pose = held.copy()
         pose[moving] = (1.0 - share) * held[moving] + share * high[moving]
         poses.append(_skeleton(finger, np.clip(matrix @ pose, low, high)))
-    return Section(patches, (first, second), np.array(poses))
+    return Section(patches, flexion_plane(finger), np.array(poses))
 
 
 def _matrix(finger: Finger, coupled: bool) -> Array:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from closed_kinematics import A1, A2, A3, A4, equation_1
 from paper.plot_workspace import plot_workspace
+from paper.workspace_surfaces import fingertip_surface, flexion_section
 
 from finger_pin.description.loading import load_finger
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.views import plots
-from finger_pin.views.plots.workspace_surfaces import fingertip_surface, flexion_section
 
 
 @pytest.fixture(scope="module")

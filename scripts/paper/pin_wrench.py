@@ -13,7 +13,7 @@ Assumptions:
 - A tendon has the tension f of (12) wherever it crosses a joint, since (12) puts its friction before the joints. What a
   canal does to the link that it is in happens within what is cut free, and so does the friction of a passive tendon,
   which acts on the link of its lumped mass. Tendons have no mass here, lumped masses included.
-- Grooves are part of the distal or of the proximal link (`geometry.cuts.Groove`). A pulley that turns on the pin counts
+- Grooves are part of the distal or of the proximal link (`tendon_cuts.Groove`). A pulley that turns on the pin counts
   with the link that holds the pin: friction is then that of the pin in the other link.
 - Joint friction and stroke limiters are couples about the axis, as in (18). So the moment of the pin about its axis is
   -(tau^f + tau^r), which checks directions and points of attack of all forces at once.
@@ -29,8 +29,9 @@ import pinocchio as pin
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.geometry import Groove, TendonGeometry
+from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.typing import Array
+from paper.tendon_cuts import Groove, tendon_cuts
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,7 +92,7 @@ def pin_wrench(
     origin, force = links.translation[:, 1:], fingertip_force[..., None, :]
     moment = links.moment - np.cross(links.tip[:, None] - origin, force)
     tendons = np.zeros_like(moment)
-    for cut in geometry.cuts(groove):
+    for cut in tendon_cuts(geometry, groove):
         j, turn = cut.joint - 1, links.rotation[:, cut.link]
         pull = strands[:, routing.strand(cut.tendon, distal=cut.distal), None] * (turn @ cut.direction)
         tendons[:, j] += pull
