@@ -37,6 +37,25 @@ def test_the_version_is_the_newest_of_the_changes_and_the_one_to_cite():
     assert f"version: {version}\n" in (root / ".github" / "CITATION.cff").read_text(encoding="utf-8")
 
 
+def test_public_modules_stand_on_the_page_and_those_of_the_contract_are_among_them():
+    page = (PACKAGE / "README.md").read_text(encoding="utf-8")
+    section = page.partition("## What others may build on\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| .* \| (`.*`) \|$", section, re.MULTILINE)
+    public = {f"finger_pin.{name}" for row in rows for name in re.findall(r"`([\w.]+)`", row)}
+    assert public <= set(MODULES) | {name.removesuffix(".__init__") for name in MODULES}
+    linter = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    (contract,) = (each for each in linter["contracts"] if each["name"] == "Upper rooms build on public modules")
+    imports = (each.split(" -> ") for each in contract["ignore_imports"])
+    ignored = {module for importer, module in imports if importer == "finger_pin.**"}
+    assert {name for name in ignored if not name.startswith("finger_pin.analysis.")} <= public
+    # What the package itself exports of its lower rooms is public.
+    upper = {name.split(".")[1] for name in contract["source_modules"]}
+    stub = (PACKAGE / "__init__.pyi").read_text(encoding="utf-8")
+    exported = {name for name in re.findall(r"^from \.(\w+\.[\w.]+) import", stub, re.MULTILINE)}
+    lower = {f"finger_pin.{name}" for name in exported if name.split(".")[0] not in upper}
+    assert {name for name in lower if not name.startswith("finger_pin.analysis.")} <= public
+
+
 def names_of(path):
     """Return the names that a file defines, those of classes with their class."""
     found = set()

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from finger_pin.analysis.equilibrium import equilibrium
-from finger_pin.analysis.steady import steady_state
+from finger_pin.analysis import equilibrium, steady_state
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import as_inputs
 from finger_pin.mechanism.finger import Finger

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from finger_pin.analysis.steady import steady_state
+from finger_pin.analysis import steady_state
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import At, Recording, check_pulling

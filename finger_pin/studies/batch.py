@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from finger_pin.analysis.locking_margin import locking_advice
+from finger_pin.analysis import locking_advice
 from finger_pin.cancellation import CancelToken
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.trajectory import Stop
