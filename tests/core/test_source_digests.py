@@ -3,6 +3,7 @@
 import math
 import re
 import tomllib
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -12,6 +13,9 @@ import pytest
 import finger_pin as fp
 from finger_pin.core.jit import digests
 from finger_pin.core.jit.digests import Undigestible, source_digest
+
+# Parsing all files takes a second.
+syntax = cache(digests._syntax)
 
 
 def spring(law, **known):
@@ -86,20 +90,46 @@ def test_what_a_later_process_could_not_recognise_has_no_digest(thing):
         spring("def force(x):\n    return THING", THING=thing)
 
 
-def test_a_changed_file_of_the_core_or_below_is_compiled_anew_and_one_above_is_not(monkeypatch):
-    kept, own = Path.read_bytes, digests._package_digest.__wrapped__
+@pytest.fixture
+def digest_with(monkeypatch, tmp_path):
+    """Return a function that gives the digest of the package with the text of files in a room changed."""
+    monkeypatch.setenv("FINGER_PIN_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(digests, "_syntax", syntax)
+    unchanged = Path.read_bytes
 
-    def changed_in(room):
+    def digest(room, change):
         def read(path):
-            return kept(path) + (b"# changed" if f"finger_pin/{room}" in path.as_posix() else b"")
+            text = unchanged(path)
+            if f"finger_pin/{room}" in path.as_posix():
+                changed = change(text)
+                assert changed != text
+                return changed
+            return text
 
         monkeypatch.setattr(Path, "read_bytes", read)
-        return own()
+        return digests._package_digest.__wrapped__()
 
-    found = {
-        room: changed_in(room) for room in ("nowhere", "core/jit", "laws/bristle.py", "mujoco", "files.py", "views")
-    }
+    return digest
+
+
+def test_changed_code_of_the_core_or_below_is_compiled_anew_and_of_a_room_above_is_not(digest_with):
+    rooms = ("nowhere", "core/jit/calls.py", "laws/bristle.py", "mujoco/registration.py", "files.py", "views")
+    found = {room: digest_with(room, lambda text: text + b"x = 1\n") for room in rooms}
     assert len(set(found.values())) == 5 and found["nowhere"] == found["views"]
+    assert digest_with("laws/bristle.py", lambda text: text.replace(b"scale=1e-2", b"scale=2e-2")) not in found.values()
+
+
+def test_a_changed_comment_or_docstring_of_the_core_compiles_nothing(digest_with):
+    unchanged = digest_with("nowhere", None)
+    for change in (
+        lambda text: b"# A word.\n\n" + text,
+        lambda text: re.sub(rb"(?m)^(.*),$", rb"\1,  # A word.", text),
+        lambda text: re.sub(rb'((^|def .*:\n    )""")', rb"\1A word. ", text),
+    ):
+        assert digest_with("laws/bristle.py", change) == unchanged
+    # The docstring of a function that is compiled itself is one of its constants.
+    law = 'def force(x):\n    """Return {0}."""\n    return (x, "{1}")[0]'
+    assert spring(law.format("a", "b")) == spring(law.format("c", "b")) != spring(law.format("a", "c"))
 
 
 def test_every_room_that_the_core_may_import_is_part_of_the_digest():

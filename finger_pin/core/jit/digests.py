@@ -1,16 +1,20 @@
 """Digest of all that a compiled function depends on: compiled code is kept on disk as long as it is the same.
 
-Of this package it is the text of all files that the core may import. Of a function from elsewhere, such as a law in a
-user's script, it is the code object that numba compiles, and the values that the function takes for constants: those of
-its closure, its defaults and its globals, and all functions among them. The code object is hashed as it is, and nothing
-in it is read but names: unlike the text of the file, it is what was imported, and tells two lambdas of a line apart.
+Of this package it is the code of all files that the core may import, without comments and docstrings. Of a function
+from elsewhere, such as a law in a user's script, it is the code object that numba compiles, and the values that the
+function takes for constants: those of its closure, its defaults and its globals, and all functions among them. Unlike
+the text of the file, the code object is what was imported, and tells two lambdas of a line apart.
 """
 
 from __future__ import annotations
 
+import ast
+import dis
 import hashlib
+import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -19,7 +23,10 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
+import platformdirs
 from numba.extending import is_jitted
+
+from finger_pin.files import write_text
 
 #: The core, its sibling, and the rooms below them, which are all that they may import.
 ROOMS = ("core", "description", "exchange", "laws", "mechanism", "mujoco", "references")
@@ -42,14 +49,42 @@ def source_digest(function: FunctionType) -> str:
     return _hashed(f"{_package_digest()} {_function(function, ())}")[:16]
 
 
+def cache_root() -> Path:
+    """Return the folder of compiled code; it may not be writable."""
+    return Path(os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin"))
+
+
 @cache
 def _package_digest() -> str:
-    """Return a digest of the package's files and of the versions that compile them."""
+    """Return a digest of the package's code and of the versions that compile it."""
     root = Path(__file__).parents[2]
-    found = hashlib.sha256(f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
-    for path in sorted([*root.glob("*.py"), *(each for room in ROOMS for each in (root / room).rglob("*.py"))]):
-        found.update(f"{path.relative_to(root)}\n".encode() + path.read_bytes())
-    return found.hexdigest()
+    paths = sorted([*root.glob("*.py"), *(each for room in ROOMS for each in (root / room).rglob("*.py"))])
+    texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in paths}
+    versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
+    # Parsing takes a second: of files that are the same to the byte the digest is kept.
+    kept = cache_root() / f"source-{_hashed(f'{versions} {texts}')}"
+    with suppress(OSError):
+        if len(digest := kept.read_text()) == 64:
+            return digest
+    digest = _hashed(f"{versions} { {name: _syntax(text) for name, text in texts.items()} }")
+    with suppress(OSError):
+        write_text(kept, digest)
+    return digest
+
+
+def _syntax(text: bytes) -> str:
+    """Return the syntax tree of a module without comments, positions and docstrings."""
+    tree = ast.parse(text)
+    _drop_docstrings(tree)
+    return ast.dump(tree)
+
+
+def _drop_docstrings(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> None:
+    strings = [each for each in node.body if isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant)]
+    node.body = [each for each in node.body if each not in strings]
+    for each in node.body:
+        if isinstance(each, ast.ClassDef | ast.FunctionDef):
+            _drop_docstrings(each)
 
 
 def _hashed(text: str) -> str:
@@ -71,9 +106,9 @@ def _function(function: FunctionType, above: tuple[FunctionType, ...]) -> str:
 
 
 def _code(code: CodeType) -> str:
-    constants = [
-        _code(each) if isinstance(each, CodeType) else _described(each, frozenset(), ()) for each in code.co_consts
-    ]
+    # Nobody loads the docstring, which is a constant all the same.
+    loaded = [each.argval for each in dis.get_instructions(code) if each.opcode in dis.hasconst]
+    constants = [_code(each) if isinstance(each, CodeType) else _described(each, frozenset(), ()) for each in loaded]
     signature = (code.co_argcount, code.co_flags, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return _hashed(f"{code.co_code.hex()} {signature} {constants}")
 

@@ -3,7 +3,7 @@
 Numba keeps code beside the file that a function stands in, under the function's name, as long as that file is the
 same. It sees neither what a function calls in other files nor which globals it was given: so functions are handed to
 it under a name that has a digest of all that they reach (`digests`), as if they stood in an empty file of the cache's
-folder.
+folder. Of processes that ask for the same at once one compiles, and the others wait.
 Where no folder can be written, everything is compiled anew in each process. What takes its time is said once, as a
 warning of the logger ``finger_pin``, which Python prints on standard error unless logging is set up otherwise.
 """
@@ -15,17 +15,18 @@ import logging
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from pickle import UnpicklingError
 from types import FunctionType
 from typing import Any, TypeVar
 
+import filelock
 import numba
-import platformdirs
 
-from finger_pin.core.jit.digests import Undigestible, source_digest
+from finger_pin.core.jit.digests import Undigestible, cache_root, source_digest
 from finger_pin.description.caching import cached_property
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -35,6 +36,8 @@ _LOGGER = logging.getLogger("finger_pin")
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 # Arrays are free to pass only where calls are inlined; nobody calls these functions from outside.
 _INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
+# How long to wait for a process that compiles the same, s; one that has ended, however, is not waited for.
+_PATIENCE = 300.0
 
 
 def njit_inline(function: _Function) -> _Function:
@@ -112,21 +115,18 @@ def address_of(signature: str, function: Callable[..., Any], announced: bool = T
     made: Any
     with _lock:
         named = _named(function)
-        if announced and not (named and _is_kept(named)):
+        kept = named is not None and _is_kept(named)
+        if announced and not kept:
             _announce()
         try:
-            made = numba.cfunc(signature, cache=named is not None, **_OPTIONS)(named or function)
+            with nullcontext() if kept or named is None else _exclusively(named):
+                made = numba.cfunc(signature, cache=named is not None, **_OPTIONS)(named or function)
         except (OSError, EOFError, UnpicklingError) as error:
             reason = getattr(error, "strerror", None) or repr(error)
             _say(f"the compile cache {cache_root()} cannot be used: {reason}; the next run compiles again")
             made = numba.cfunc(signature, **_OPTIONS)(function)
         _living.append(made)
         return made.address  # type: ignore[no-any-return]
-
-
-def cache_root() -> Path:
-    """Return the folder of compiled code; it may not be writable."""
-    return Path(os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin"))
 
 
 def cache_place() -> Path | None:
@@ -154,6 +154,22 @@ def _named(function: FunctionType) -> FunctionType | None:
     named = FunctionType(code, function.__globals__, name, function.__defaults__, function.__closure__)
     named.__qualname__ = name
     return named
+
+
+@contextmanager
+def _exclusively(named: FunctionType) -> Iterator[None]:
+    """Let one process at a time compile a function that is to be kept; numba finds it on disk in those that waited."""
+    lock = filelock.FileLock(cache_root() / f"{named.__name__.rpartition('-')[2]}.lock", timeout=_PATIENCE)
+    # Where files cannot be locked, each process compiles for itself.
+    with suppress(OSError, NotImplementedError):
+        lock.acquire()
+    try:
+        yield
+    finally:
+        if lock.is_locked:
+            with suppress(OSError):
+                Path(lock.lock_file).unlink()
+            lock.release()
 
 
 def _is_kept(named: FunctionType) -> bool:
