@@ -2,9 +2,13 @@
 
 import ast
 import re
+import subprocess
+import sys
 import tomllib
 from graphlib import TopologicalSorter
 from pathlib import Path
+
+import pytest
 
 from finger_pin.version import installing
 
@@ -35,6 +39,48 @@ def test_the_version_is_the_newest_of_the_changes_and_the_one_to_cite():
     changes = (PACKAGE / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.findall(r"^## (.*)$", changes, re.MULTILINE)[0] == version
     assert f"version: {version}\n" in (root / ".github" / "CITATION.cff").read_text(encoding="utf-8")
+
+
+# Names who changes the process: other libraries do, too, and are not ours to judge.
+IMPORTING = """
+import atexit, gc, importlib, os, pkgutil, sys
+
+def watched(change):
+    def recorded(*arguments, **options):
+        frame = sys._getframe(1)
+        while frame.f_globals["__name__"] in ("os", "_collections_abc"):
+            frame = frame.f_back
+        if frame.f_globals["__name__"].startswith("finger_pin"):
+            print(frame.f_globals["__name__"], change.__name__, arguments)
+        return change(*arguments, **options)
+    return recorded
+
+for place, names in (
+    (gc, ("set_threshold", "freeze", "unfreeze", "enable", "disable", "set_debug")),
+    (atexit, ("register", "unregister")),
+    (type(os.environ), ("__setitem__", "__delitem__")),
+    (os, ("putenv", "unsetenv")),
+):
+    for name in names:
+        setattr(place, name, watched(getattr(place, name)))
+before, count = gc.get_threshold(), 0
+import finger_pin
+for module in pkgutil.walk_packages(finger_pin.__path__, "finger_pin.", onerror=lambda name: None):
+    if module.name.endswith("__main__"):
+        continue
+    try:
+        importlib.import_module(module.name)
+    except (ImportError, finger_pin.InputError):
+        continue  # an extra is not installed
+    count += 1
+assert gc.get_threshold() == before and gc.get_freeze_count() == 0 and count > 300, (gc.get_threshold(), count)
+"""
+
+
+@pytest.mark.slow
+def test_no_import_changes_the_process():
+    done = subprocess.run([sys.executable, "-c", IMPORTING], capture_output=True, text=True, timeout=200)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 def test_public_modules_stand_on_the_page_and_those_of_the_contract_are_among_them():

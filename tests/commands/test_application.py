@@ -108,6 +108,19 @@ def test_every_public_name_can_be_had_and_nothing_is_imported_that_is_not_asked_
         _ = fp.simulat
 
 
+def test_a_command_sets_up_its_process_before_it_imports_numpy_and_overrules_no_variable():
+    code = (
+        "import gc, os, sys\n"
+        "os.environ.pop('OPENBLAS_NUM_THREADS', None); os.environ['OMP_NUM_THREADS'] = '3'\n"
+        "from finger_pin.commands.application import run\n"
+        "early = {'numpy', 'pydantic'} & set(sys.modules)\n"
+        "assert gc.get_threshold()[0] < 10_000 and run(None, ['--version']) == 0\n"
+        "print(early, gc.get_threshold()[0], os.environ['OPENBLAS_NUM_THREADS'], os.environ['OMP_NUM_THREADS'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[1] == "set() 2000000 1 3"
+
+
 @pytest.mark.parametrize(
     ("variants", "name"),
     [
