@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Self
 
+#: Asked between steps; once it is true, the work ends there.
+Stop = Callable[[], bool]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -22,7 +24,7 @@ class CancelToken:
         cancelled: Whether `cancel` was called, or Ctrl-C was pressed.
     """
 
-    def __init__(self, stop: Callable[[], bool] | None = None) -> None:
+    def __init__(self, stop: Stop | None = None) -> None:
         """Take a caller's own condition, which is asked too, until it is true."""
         self.cancelled, self._stop, self._stopped = False, stop, False
         self._caught: list[int] = []

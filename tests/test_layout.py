@@ -134,6 +134,29 @@ def test_every_equation_of_the_paper_has_its_place_in_the_code():
         assert set(re.findall(r"`([\w.]+)`", names)) <= names_of(path), (number, file, names)
 
 
+# Columns of arrays and names of outcomes: no thresholds.
+INDICES = {f"continuous.{name}" for name in ("NOTHING", "MISSED_BY_CULLING", "_SHARE", "_GAP", "_NORMAL", "_FAR")}
+
+
+def test_every_threshold_of_events_and_collision_has_a_name_and_stands_in_the_notes_with_its_value():
+    notes = (PACKAGE / "core" / "stepping" / "NOTES.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+\.\w+)` \| (\S+) \| (.+?) \| (?:derived|chosen).* \|$", notes, re.MULTILINE)
+    constants = {}
+    for path in (each for room in ("events", "collision") for each in (PACKAGE / "core" / room).glob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in (each for each in tree.body if isinstance(each, ast.Assign)):
+            (target,), value = node.targets, node.value
+            pairs = zip(target.elts, value.elts, strict=True) if isinstance(target, ast.Tuple) else [(target, value)]
+            constants |= {f"{path.stem}.{n.id}": v.value for n, v in pairs if isinstance(v, ast.Constant)}
+        for function in (each for each in tree.body if isinstance(each, ast.FunctionDef | ast.ClassDef)):
+            numbers = [each.value for each in ast.walk(function) if isinstance(each, ast.Constant)]
+            # Coefficients of formulas are quarters.
+            assert all(4.0 * each == int(4.0 * each) for each in numbers if isinstance(each, float)), path
+    assert {name: float(value) for name, value, _ in rows} == {
+        name: value for name, value in constants.items() if name not in INDICES
+    }
+
+
 def test_extras_are_installed_as_one_place_says():
     root = PACKAGE.parent
     extras = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]

@@ -28,7 +28,7 @@ from finger_pin.commands.study import conduct
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.core.stepping.trajectory import Stop
+    from finger_pin.cancellation import Stop
     from finger_pin.studies.records import Progress
 
 _Over = Annotated[

@@ -6,13 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from finger_pin.cancellation import CancelToken
+from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.commands.console import noted, print_text, runs_bar, talks
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.core.stepping.trajectory import Stop
     from finger_pin.studies.records import Progress
 
 

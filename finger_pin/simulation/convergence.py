@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.cancellation import Stop
 from finger_pin.control.interface import Controller
 from finger_pin.control.user_controllers import Samples
-from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning

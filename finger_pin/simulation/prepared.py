@@ -9,9 +9,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.stepper import TABLEAUS
-from finger_pin.core.stepping.trajectory import Stop, Trajectory
+from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.parametrised_scenario import ParametrisedScenario

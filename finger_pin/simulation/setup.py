@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled_control
 from finger_pin.control.interface import LoopController
 from finger_pin.control.position_drive import PositionDrives, given_voltages, wound_spools
@@ -17,7 +18,7 @@ from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.stepping.trajectory import Stop, Trajectory, Watch
+from finger_pin.core.stepping.trajectory import Trajectory, Watch
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError

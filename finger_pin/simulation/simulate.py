@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import Controller
 from finger_pin.control.sampling import sampling_settings
 from finger_pin.control.user_controllers import Columns, Samples, with_columns
-from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.exceptions import ScenarioWarning
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger

@@ -12,9 +12,8 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis import locking_advice
-from finger_pin.cancellation import CancelToken
+from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping.trajectory import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario

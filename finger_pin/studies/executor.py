@@ -25,8 +25,7 @@ from typing import Any, TypeVar
 
 import cloudpickle
 
-from finger_pin.cancellation import CancelToken
-from finger_pin.core.stepping.trajectory import Stop
+from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.core.threads import usable_cores
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError, Interrupted, ScenarioWarning

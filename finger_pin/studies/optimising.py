@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.core.stepping.trajectory import Stop
+from finger_pin.cancellation import Stop
 from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_table, write_text

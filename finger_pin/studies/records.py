@@ -13,8 +13,7 @@ from typing import Any
 
 import joblib
 
-from finger_pin.cancellation import CancelToken
-from finger_pin.core.stepping.trajectory import Stop
+from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.description.loading import to_toml
 from finger_pin.exceptions import FingerPinError
 from finger_pin.studies.executor import FailedTask, compile_for, open_executor, run_tasks

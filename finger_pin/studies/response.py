@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from finger_pin.core.stepping.trajectory import Stop
+from finger_pin.cancellation import Stop
 from finger_pin.description.caching import cached_property
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario

@@ -10,7 +10,7 @@ from typing import Any
 
 import xarray as xr
 
-from finger_pin.core.stepping.trajectory import Stop
+from finger_pin.cancellation import Stop
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.description.parametrised_scenario import split
 from finger_pin.exceptions import InputError

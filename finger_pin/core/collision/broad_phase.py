@@ -15,10 +15,13 @@ from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, nji
 from finger_pin.core.path_tables import COLUMNS, Paths, PathWork
 from finger_pin.core.tables import Tables
 
-# A gap is known so well, m; and a pair is active where so many steps as the last one might close it.
-KNOWN, _AHEAD = 1e-9, 3.0
-# Bristles bent by less, m, are straight: a ten thousandth of the diameter of an atom.
-_STRAIGHT = 1e-14
+# Derivations and origins: core/stepping/NOTES.md.
+# Accuracy to which gaps are computed, m: `mechanism/gaps/nearest.py` flattens distances by as much (`INSIDE`).
+GAP_ACCURACY = 1e-9
+# Steps as far as the last one that a culled pair stays open for, 1: the next one may be longer.
+_STEPS_AHEAD = 3.0
+# Greatest deflection of bristles that count as straight, m: a ten thousandth of the diameter of an atom.
+_STRAIGHT_DEFLECTION = 1e-14
 
 
 @njit_always_inline
@@ -134,14 +137,14 @@ def record_end_gaps(tables: Tables, own: PathWork) -> None:
     paths = tables.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and own.culled[paths.row[e]] == 0:
-            own.ahead[e], own.far[e] = own.out[e, 0] - KNOWN, distance(paths, e, own)
+            own.ahead[e], own.far[e] = own.out[e, 0] - GAP_ACCURACY, distance(paths, e, own)
 
 
 @njit_always_inline
 def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
     for m in range(k + 1, k + COLUMNS):
-        if not abs(states[tables.state[m]]) < _STRAIGHT:
+        if not abs(states[tables.state[m]]) < _STRAIGHT_DEFLECTION:
             return False
     for m in range(k + 1, k + COLUMNS):
         states[tables.state[m]] = rows[RATE, m] = 0.0
@@ -160,7 +163,7 @@ def update_culling(tables: Tables, rows: Matrix, own: PathWork, states: Vector) 
         k = paths.row[e]
         if paths.columns[e] == 1:
             continue
-        near = not own.ahead[e] > _AHEAD * own.path[e]
+        near = not own.ahead[e] > _STEPS_AHEAD * own.path[e]
         if own.culled[k]:
             own.clear[e] = own.ahead[e]
             own.far[e] += own.path[e]

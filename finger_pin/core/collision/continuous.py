@@ -14,7 +14,14 @@ from typing import TypeAlias
 
 import numpy as np
 
-from finger_pin.core.collision.broad_phase import KNOWN, bound_step_motion, distance, path_of, set_culled, widened
+from finger_pin.core.collision.broad_phase import (
+    GAP_ACCURACY,
+    bound_step_motion,
+    distance,
+    path_of,
+    set_culled,
+    widened,
+)
 from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
@@ -26,11 +33,16 @@ from finger_pin.core.tables import END, FIRST, KINK, Tables
 _Coefficients: TypeAlias = tuple[float, float, float, float, float]
 # Of a step in which all touches have been seen, and of one in which a culled pair may have closed.
 NOTHING, MISSED_BY_CULLING = 2.0, 1.0
-# To this distances are computed, m; and bodies that part are followed until they are so far out, or have moved by so
-# many times their distance.
-_ROUNDING, _OUT, _TIMES = 1e-13, 1e-6, 4.0
-# The moment of a meeting is found by so many halvings, and is before the end.
-_HALVINGS, _BEFORE = 10, 0.999
+# Derivations and origins: core/stepping/NOTES.md.
+# Rounding of a gap, m: 450 times the spacing of doubles at a distance of a metre.
+_GAP_ROUNDING = 1e-13
+# Greatest path, m and in parts of the depths at its ends, on which bodies that overlap do not part and meet again.
+MIN_PARTING_PATH, PARTING_PATH_PER_DEPTH = 1e-6, 4.0
+# Least cosine of the angle between the normals at two moments, 1, at which the bound by the chord is tried: 60 degrees.
+_MIN_NORMAL_COSINE = 0.5
+# Bisections for the moment of a meeting: to 2^-10 of the interval; and its latest share, 1: the end
+# itself would be no other try.
+_MEETING_BISECTIONS, _MAX_MEETING_SHARE = 10, 0.999
 # What is seen at a moment, in this order: the share of the step, the gap, its normal, how far the core of one body is.
 _SHARE, _GAP, _NORMAL, _FAR = 0, 1, 2, 5
 
@@ -100,18 +112,18 @@ def _clear(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> b
     """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
     path, bend = _bounds(tables, own, e, one, two)
     if one[_GAP] < 0.0 or two[_GAP] < 0.0:
-        return path < _TIMES * (abs(one[_GAP]) + abs(two[_GAP])) + _OUT
-    if path < one[_GAP] + two[_GAP] + _ROUNDING:
+        return path < PARTING_PATH_PER_DEPTH * (abs(one[_GAP]) + abs(two[_GAP])) + MIN_PARTING_PATH
+    if path < one[_GAP] + two[_GAP] + _GAP_ROUNDING:
         return True
     tilt, size = 0.0, 0.0
     for i in range(_NORMAL, _NORMAL + 3):
         tilt += (one[i] - two[i]) * (one[i] - two[i])
         size += one[i] * two[i]
-    if not size > 0.5:
+    if not size > _MIN_NORMAL_COSINE:
         return False
     # Of the plane across the first normal the second tells, as far as it is the same.
     slant = np.sqrt(tilt) * (max(one[_FAR], two[_FAR]) + tables.paths.extents[e]) if tilt > 0.0 else 0.0
-    return bend + slant + KNOWN < min(one[_GAP], two[_GAP])
+    return bend + slant + GAP_ACCURACY < min(one[_GAP], two[_GAP])
 
 
 @njit_inline
@@ -135,13 +147,13 @@ def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: V
     """Return the time just after bodies have met that are apart at one moment and not at another."""
     looks = model.work.paths.looks
     early, late, middle = one[_SHARE], two[_SHARE], looks[LOOKS - 1]
-    for _ in range(_HALVINGS):
+    for _ in range(_MEETING_BISECTIONS):
         _look(integration, model, e, 0.5 * (early + late), middle)
         if middle[_GAP] < 0.0:
             late = middle[_SHARE]
         else:
             early = middle[_SHARE]
-    return min(late, _BEFORE)
+    return min(late, _MAX_MEETING_SHARE)
 
 
 @njit_inline
@@ -154,7 +166,7 @@ def _scan(integration: Integration, model: Model, e: int, seen: bool) -> float:
     looks = own.looks
     _look(integration, model, e, 1.0, looks[1])
     _look(integration, model, e, 0.0, looks[0])
-    own.ahead[e] = looks[1, _GAP] - KNOWN
+    own.ahead[e] = looks[1, _GAP] - GAP_ACCURACY
     parted, met, depth = looks[0, _GAP] >= 0.0, NOTHING, 1
     while depth > 0:
         one, two = looks[0], looks[depth]
@@ -209,7 +221,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
                 woken = True
         else:
             start, end = own.clear[e], own.out[e, 0]
-            own.ahead[e] = end - KNOWN - path
+            own.ahead[e] = end - GAP_ACCURACY - path
             if min(start, end) >= 0.0 and path < start + end:
                 continue
             if max(start, end) < 0.0 and rows[SIDE, k] > 0.0:

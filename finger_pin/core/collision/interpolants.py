@@ -11,6 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import comb
 
+from finger_pin.core.collision.broad_phase import GAP_ACCURACY
+from finger_pin.core.collision.continuous import MIN_PARTING_PATH, PARTING_PATH_PER_DEPTH
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.stepping.trajectory import Meeting
 from finger_pin.core.tables import build_tables
@@ -20,8 +22,16 @@ from finger_pin.typing import Array
 #: Maps times, shape (m,), to packed states, shape (m, size): a polynomial within a step.
 Interpolant = Callable[[Array], Array]
 # The highest degree of an interpolant, that of LSODA.
-_DEGREE = 12
-_KNOWN, _ROUNDING, _OUT, _TIMES, _HALVINGS, _LEAST = 1e-9, 1e-11, 1e-6, 4.0, 12, 1e-12
+_MAX_DEGREE = 12
+# Rounding of a gap, m: 15 times what the inverse that makes Bernstein coefficients of values, of row sums up to 2,900,
+# makes of the spacing of doubles at a metre.
+_GAP_ROUNDING = 1e-11
+# Bisections for the moment of a meeting: to 2^-12 of the interval.
+_MEETING_BISECTIONS = 12
+# Least interval that is halved, in parts of the time or s, whichever is more, as in `step_events`.
+_MIN_INTERVAL = 1e-12
+# Part of the step before its end, 1, over which a gap is compared with that at the end to see whether it closes.
+_APPROACH_SHARE = 1e-3
 
 
 def meetings(mechanism: Mechanism) -> Meeting | None:
@@ -40,9 +50,9 @@ class _Meetings:
         self._pieces = [(e, piece) for e, piece in enumerate(pieces) if piece.shape.columns > 1]
         self._clear = np.zeros(len(pieces))
         self._time = -np.inf
-        nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)
-        powers = np.arange(_DEGREE + 1)
-        basis = comb(_DEGREE, powers) * nodes[:, None] ** powers * (1.0 - nodes[:, None]) ** (_DEGREE - powers)
+        nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(_MAX_DEGREE + 1) / _MAX_DEGREE)
+        powers = np.arange(_MAX_DEGREE + 1)
+        basis = comb(_MAX_DEGREE, powers) * nodes[:, None] ** powers * (1.0 - nodes[:, None]) ** (_MAX_DEGREE - powers)
         self._nodes, self._to_control = nodes, np.linalg.inv(basis)
 
     def __call__(self, start: float, end: float, interpolate: Interpolant) -> float | None:
@@ -56,7 +66,7 @@ class _Meetings:
             if not ahead[e] > 0.0:
                 ahead[e], found = self._scan(e, start, end, interpolate)
                 first = min(first, found)
-        if first < end - _LEAST * max(1.0, abs(end)):
+        if first < end - _MIN_INTERVAL * max(1.0, abs(end)):
             return first
         self._clear, self._time = ahead, end
         return None
@@ -65,7 +75,7 @@ class _Meetings:
         """Return bounds of the paths of each piece's bodies against each other, shape (E,), m."""
         paths, charts = self._paths, self._charts
         packed = self._to_control @ interpolate(start + (end - start) * self._nodes)
-        control = np.zeros((_DEGREE + 1, self._bodies))
+        control = np.zeros((_MAX_DEGREE + 1, self._bodies))
         kept = charts.cores < self._bodies
         control[:, charts.cores[kept]] = packed[:, charts.plain[kept]]
         steps = np.diff(control, axis=0)
@@ -115,13 +125,13 @@ class _Meetings:
         def clear(one: tuple[float, float], two: tuple[float, float]) -> bool:
             path = self._ways(one[0], two[0], interpolate)[e]
             if min(one[1], two[1]) < 0.0:
-                return bool(path < _TIMES * (abs(one[1]) + abs(two[1])) + _OUT)
-            return bool(path < one[1] + two[1] + _ROUNDING)
+                return bool(path < PARTING_PATH_PER_DEPTH * (abs(one[1]) + abs(two[1])) + MIN_PARTING_PATH)
+            return bool(path < one[1] + two[1] + _GAP_ROUNDING)
 
         one, looks = (start, gap(start)), [(end, gap(end))]
-        last, parted, met, shortest = looks[0][1], one[1] >= 0.0, np.inf, _LEAST * max(1.0, abs(end))
+        last, parted, met, shortest = looks[0][1], one[1] >= 0.0, np.inf, _MIN_INTERVAL * max(1.0, abs(end))
         if max(one[1], last) < 0.0:
-            return last - _KNOWN, np.inf
+            return last - GAP_ACCURACY, np.inf
         while looks:
             two = looks[-1]
             if two[0] - one[0] > shortest and not clear(one, two):
@@ -130,14 +140,14 @@ class _Meetings:
                 continue
             if two[1] >= 0.0:
                 if np.isfinite(met):
-                    return last - _KNOWN, met
+                    return last - GAP_ACCURACY, met
                 parted = True
             elif parted and not np.isfinite(met):
                 early, met = one[0], two[0]
-                for _ in range(_HALVINGS):
+                for _ in range(_MEETING_BISECTIONS):
                     middle = 0.5 * (early + met)
                     early, met = (early, middle) if gap(middle) < 0.0 else (middle, met)
             one = looks.pop()
         # What is inside at the end, and still approaches, is felt from there on.
-        felt = last < gap(end - 1e-3 * (end - start))
-        return last - _KNOWN, np.inf if felt else met
+        felt = last < gap(end - _APPROACH_SHARE * (end - start))
+        return last - GAP_ACCURACY, np.inf if felt else met

@@ -17,11 +17,17 @@ from finger_pin.core.stepping.interpolation import between, cut
 from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 
-# A step after a kink that is rejected costs as much as two that grow.
-_SHARE = 0.25
-# A step that is cut ends behind the kink by so much of its length at most, and costs so many tolerances; so many ends
-# are tried.
-_BEHIND, _WANTED, _TRIALS = 0.02, 0.5, 6
+# Derivations and origins: core/stepping/NOTES.md.
+# Safety factor of the maximum step after an event, 1: a rejected step costs as much as the two in which it grows back.
+_EVENT_STEP_SAFETY = 0.25
+# Floor of the relative cost of an event, 1, so that nothing is divided by zero.
+_MIN_EVENT_COST = 1e-300
+# Greatest distance of a step's end behind the kink, in parts of the way to the kink.
+_MAX_OVERSHOOT = 0.02
+# Branch error at that end that is aimed at, in tolerances: half of what would be rejected.
+_TARGET_BRANCH_ERROR = 0.5
+# Ends that are tried, 1; without one the step is repeated shorter.
+_MAX_END_TRIALS = 6
 
 
 @CompiledFunction
@@ -124,8 +130,8 @@ def max_step_after_event(h: float, share: float, cost: float, rtol: float, table
     cost (t / h)^2 / (2 (1 - share)) tolerances; an impact, which turns a speed back, y^2 / 2 of that speed, and so at
     most y^2 / (2 rtol) tolerances. Of a slower one the difference tells, but for speeds of a few tolerances.
     """
-    radians = _SHARE * (rtol / tableau.radian) ** (1.0 / tableau.order)
-    return h * radians * np.sqrt((1.0 - share) / max(rtol * cost, 1e-300))
+    radians = _EVENT_STEP_SAFETY * (rtol / tableau.radian) ** (1.0 / tableau.order)
+    return h * radians * np.sqrt((1.0 - share) / max(rtol * cost, _MIN_EVENT_COST))
 
 
 @njit_always_inline
@@ -166,9 +172,9 @@ def locate_event(
     """
     x, state, end, count = integration.x, model.state, integration.end, 0
     copy(state, end)
-    low, behind = 0.0, min(_BEHIND * share, _WANTED * (1.0 - share) / cost)
+    low, behind = 0.0, min(_MAX_OVERSHOOT * share, _TARGET_BRANCH_ERROR * (1.0 - share) / cost)
     at = share + behind
-    for _ in range(_TRIALS):
+    for _ in range(_MAX_END_TRIALS):
         between(x, end, integration.dense, at, state)
         call_at(model.evaluate, integration.model, time + at * h)
         count += 1
@@ -180,7 +186,7 @@ def locate_event(
                 copy(end, state)
                 cut(x, state, integration.dense, at)
                 return at, share, cost, count
-            behind = min(behind, _WANTED * (1.0 - share) * at / cost)
+            behind = min(behind, _TARGET_BRANCH_ERROR * (1.0 - share) * at / cost)
         else:
             low = at
         at = min(max(low, share * at) + behind, 1.0)

@@ -20,14 +20,23 @@ from finger_pin.core.model import Model
 from finger_pin.core.stepping.integration import Integration
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 
-# A step is taken as a whole if what is misled in it is so much of the tolerance at most. One that is cut ends a little
-# behind the reversal, so that the next one begins on the other side: by so much at least, by so much if it can be.
-_MOST, _LEAST, _WANTED = 0.18, 0.018, 0.08
-# The speed is looked at so often in a step, and so many ends of a step are tried.
-_LOOKS, _TRIALS = 8, 8
-# Bristles bent by so many times what they can bear bend no further, but for so much of their tolerance; what that is at
-# no less than so slow a speed, m/s.
-_BEYOND, _BENT, _SLOW = 2.0, 0.1, 1e-9
+# Derivations and origins: core/stepping/NOTES.md.
+# Greatest reversal error of a step that is taken as a whole, in tolerances: beside an error of 1 it adds 1.6 %.
+_MAX_REVERSAL_ERROR = 0.18
+# Least reversal error of a step that is cut, in tolerances, a tenth of the greatest: above zero, so that the next step
+# begins on the other side; and the one that is aimed at, between both.
+_MIN_REVERSAL_ERROR, _TARGET_REVERSAL_ERROR = 0.018, 0.08
+# Samples of the speed in a step, 1: twice the degree of its interpolant.
+_SPEED_SAMPLES = 8
+# Ends that are tried, 1: the first ones by the square law of a single reversal, then by bisection.
+_MAX_END_TRIALS, _SQUARE_LAW_TRIALS = 8, 3
+# Greatest ratio of a bristle's deflection to its limit at which it may bend further, 1: by (9a) the ratio does not pass
+# 1 while the limit is constant.
+_MAX_LOAD_RATIO = 2.0
+# Growth of an overloaded deflection that passes as an error of the step, in tolerances.
+_MAX_OVERLOAD_GROWTH = 0.1
+# Least speed at which a deflection's limit is asked for, m/s, where it is a quotient of two rates proportional to it.
+_MIN_SLIDING_SPEED = 1e-9
 
 
 @njit_inline
@@ -37,17 +46,17 @@ def before_reversal(integration: Integration, model: Model, h: float) -> float:
     By how much bristles are misled in that is filled into ``integration.end``.
     """
     share, high, cost, low, below = 1.0, 1.0, 0.0, 0.0, 0.0
-    for trial in range(1 + _TRIALS):
+    for trial in range(1 + _MAX_END_TRIALS):
         if trial > 0:
             # Behind the first reversal it grows as the square, and more where others follow.
-            way = np.sqrt((_WANTED - below) / (cost - below)) if trial < 4 else 0.5
+            way = np.sqrt((_TARGET_REVERSAL_ERROR - below) / (cost - below)) if trial <= _SQUARE_LAW_TRIALS else 0.5
             share = low + way * (high - low)
         found, turned = _misled(integration, model, h, share)
-        if found > _MOST:
+        if found > _MAX_REVERSAL_ERROR:
             high, cost = share, found
             if trial == 0:
                 low = turned
-        elif trial == 0 or found >= _LEAST:
+        elif trial == 0 or found >= _MIN_REVERSAL_ERROR:
             break
         else:
             low, below = share, found
@@ -91,17 +100,17 @@ def _way_back(integration: Integration, model: Model, k: int, share: float) -> A
     if 4.0 * min(start, end) >= abs(one) + abs(two) + abs(three):
         return way, fastest, turned
     before = start
-    for i in range(1, _LOOKS + 1):
-        s = share * i / _LOOKS
+    for i in range(1, _SPEED_SAMPLES + 1):
+        s = share * i / _SPEED_SAMPLES
         after = (1.0 - s) * start + s * (end + (1.0 - s) * (one + s * (two + s * three)))
         low, high = min(before, after), max(before, after)
         if low < 0.0:
             # Of a straight line between two looks what is below zero.
             way += 0.5 * low * low / (high - low) if high > 0.0 else -0.5 * (low + high)
             left = after / (after - before) if after < 0.0 < before else 1.0
-            fastest, turned = min(fastest, low), min(turned, share * (i - left) / _LOOKS)
+            fastest, turned = min(fastest, low), min(turned, share * (i - left) / _SPEED_SAMPLES)
         before = after
-    return way / _LOOKS, branch * fastest, turned
+    return way / _SPEED_SAMPLES, branch * fastest, turned
 
 
 @njit_always_inline
@@ -130,8 +139,11 @@ def bristles_over_limit(integration: Integration, model: Model) -> bool:
             for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
                 c = 2 * width + tables.state[k]
                 more = abs(state[c]) - abs(x[c])
-                if more > _BENT * (integration.atol[c] + integration.rtol * abs(state[c])) and x[c] * state[c] > 0.0:
-                    if bristle_load_ratio(model, g, k, np.sign(x[c])) > _BEYOND:
+                if (
+                    more > _MAX_OVERLOAD_GROWTH * (integration.atol[c] + integration.rtol * abs(state[c]))
+                    and x[c] * state[c] > 0.0
+                ):
+                    if bristle_load_ratio(model, g, k, np.sign(x[c])) > _MAX_LOAD_RATIO:
                         return True
     return False
 
@@ -141,7 +153,7 @@ def bristle_load_ratio(model: Model, g: int, k: int, way: float) -> float:
     """Return the ratio of a row's bristle deflection to its limit at its speed in a direction of sliding."""
     rows, parameters, law = model.work.rows, model.tables.parameters, model.tables.laws[g, 0]
     branch, speed, bent = rows[SIDE, k], rows[SPEED, k], rows[STATE, k]
-    rows[SIDE, k], rows[SPEED, k] = way, way * max(abs(speed), _SLOW)
+    rows[SIDE, k], rows[SPEED, k] = way, way * max(abs(speed), _MIN_SLIDING_SPEED)
     call_value(law, rows, parameters, k, k + 1)
     rate = rows[RATE, k]
     rows[STATE, k] = 0.0

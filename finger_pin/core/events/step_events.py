@@ -22,8 +22,15 @@ from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping.integration import INTEGRATION, LEFT_BRANCH, Events, Integration
 from finger_pin.core.stepping.interpolation import cut, interpolant
 
-# What a step that is cut at a kink keeps of its length at least and at most, and one that holds what runs away.
-_SHORTEST, _LONGEST, _SHORTENED = 0.1, 0.9, 0.25
+# Derivations and origins: core/stepping/NOTES.md.
+# Least and greatest length of another try that is to end at a kink, in parts of the step.
+_MIN_RETRY_SHARE, _MAX_RETRY_SHARE = 0.1, 0.9
+# Length of that try over the share at which the row leaves its branch, 1: it ends behind the kink, as cut steps do.
+_RETRY_OVERSHOOT = 1.02
+# Length of another try after a step that held an overloaded bristle, in parts of the step.
+_OVERLOAD_RETRY_SHARE = 0.25
+# Least length of a step that is cut, in parts of the time or s, whichever is more: 4,500 times the spacing of doubles.
+_MIN_CUT_STEP = 1e-12
 
 
 def step_events(contacts: bool) -> Events:
@@ -45,8 +52,8 @@ def cut_step(address: int, h: float) -> int:
         if before < share:
             memory.max_next_step_size[0], share = np.inf, 1.0
         part *= before
-        if bristles_over_limit(integration, model) and part * h > 1e-12 * max(1.0, abs(memory.time[0])):
-            kept = _SHORTENED * part
+        if bristles_over_limit(integration, model) and part * h > _MIN_CUT_STEP * max(1.0, abs(memory.time[0])):
+            kept = _OVERLOAD_RETRY_SHARE * part
     memory.taken_share[0], memory.retry_share[0], memory.left_share[0] = part, kept, share
     memory.errors_alike[0] = 1.0 * (share < 1.0 or memory.outcome[0] == LEFT_BRANCH or again)
     if kept == 1.0 and integration.events.detect:
@@ -103,7 +110,7 @@ def _kept_at_kinks(integration: Integration, model: Model, h: float, outcome: in
     memory, time = integration.memory, integration.memory.time[0]
     share, dear, part = left_share(model.tables, model.work.rows, integration.kinks), False, 1.0
     # Of a step as short as this nothing can be cut, but the next one must still not be too long.
-    long = h > 1e-12 * max(1.0, abs(time))
+    long = h > _MIN_CUT_STEP * max(1.0, abs(time))
     if share < 1.0:
         # A row was held on a side that it has left: what that cost is an error too.
         memory.evaluations[0] += 2
@@ -121,7 +128,7 @@ def _kept_at_kinks(integration: Integration, model: Model, h: float, outcome: in
         memory.evaluations[0] += 4
         share = midpoint_violation(integration, model, time, h)
         dear = share < 1.0
-    return part, min(_LONGEST, max(_SHORTEST, 1.02 * share)) if dear and long else 1.0, share
+    return part, min(_MAX_RETRY_SHARE, max(_MIN_RETRY_SHARE, _RETRY_OVERSHOOT * share)) if dear and long else 1.0, share
 
 
 @njit_always_inline

@@ -12,7 +12,6 @@ from finger_pin.core.stepping.repetition import Steps
 from finger_pin.typing import Array
 
 Watch = Callable[[float, Array], None]
-Stop = Callable[[], bool]
 #: Maps the start and the end of a step and its interpolant to when bodies meet that it does not show there; else None.
 Meeting = Callable[[float, float, Callable[[Array], Array]], float | None]
 
