@@ -65,6 +65,11 @@ def test_authors_are_those_to_cite():
     assert re.findall(r"^  - name: (.*)$", cited, re.MULTILINE) == [each["name"] for each in PROJECT["authors"]]
 
 
+def test_licences_to_cite_are_those_of_the_metadata():
+    cited = (ROOT / ".github" / "CITATION.cff").read_text("utf-8")
+    assert re.findall(r"^ *license: (.*)$", cited, re.MULTILINE) == PROJECT["license"].split(" AND ")
+
+
 def test_exceptions_for_types_are_of_modules_that_there_are():
     listed = [name for each in CONFIG["tool"]["mypy"]["overrides"] for name in each["module"]]
     for name in [name for name in listed if name.startswith("finger_pin.")]:

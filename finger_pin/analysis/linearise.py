@@ -1,17 +1,18 @@
 """Linearisation at a state: A, B, C, D, E of x' = f(x, u, p), y = h(x, u, p), or of the map over a step.
 
-Derivatives are differences of sixth order of the compiled evaluation, whose rounding they come near. At a kink, such as
-that of friction at rest, they are the mean of both sides, as the exact slopes of the laws are.
+Derivatives are differences of sixth order of the compiled evaluation, whose rounding they come near. Near a kink, such
+as where sliding reverses, they are of third order and from the state's side alone. At a kink, such as that of friction
+at rest, they are the mean of both sides, as the exact slopes of the laws are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import held_control
@@ -24,13 +25,17 @@ from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import as_finger, as_inputs, as_packed
+from finger_pin.mechanism.coerce import as_finger, as_inputs, as_packed, input_names
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
-# Central differences of sixth order: where to look, in steps, and weights.
-_OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
-_WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+# Differences: where to look, in steps; weights of sixth order, and from 0 on of third and of second order.
+_OFFSETS = np.arange(-3.0, 4.0)
+_CENTRAL = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
+_FORWARD = np.array([-11.0, 18.0, -9.0, 2.0]) / 6.0, np.array([-1.5, 2.0, -0.5, 0.0])
+# Slopes that differ by more than so much of them, or of the value's rounding, are apart; steps are divided so often,
+# and by so much, until one side has no kink.
+_APART, _ROUNDING, _TRIALS, _SHORTER = 1e-4, 1e-13, 4, 10.0
 # Steps: of the scale of a state, of an input in N or V, of the size of a parameter.
 _OF_STATES, _OF_INPUTS, _OF_PARAMETERS = 1e-4, 1e-3, 1e-4
 # What part of these for a map.
@@ -57,9 +62,9 @@ def linearise(
     Args:
         finger_or_scenario: The finger or its description; or a scenario with one (and objects), its name, or the path
             of its file.
-        state: Packed state x, shape (n,), the state by name, or angles of rest, rad.
+        state: Packed state x, shape (n,), the state by name, as `by_state` has it or by blocks, or angles of rest, rad.
         inputs: u, shape (m,): tensions of the actuated tendons, N, of a motor in position drive its voltage, V, then
-            the inputs of a tree's actuators; or by name, where those left out are 0.
+            the inputs of a tree's actuators; or by name, as `input` has it, where those left out are 0.
         dt: Without it f is differentiated; with it, s, the map x -> x(dt) with the inputs held.
         parameters: Dotted keys of numbers of the scenario.
 
@@ -67,6 +72,8 @@ def linearise(
         ``A`` (state, by_state), ``B`` (state, input), ``C`` (output, by_state), ``D`` (output, input), ``E`` (state,
         parameter) and ``F`` (output, parameter), in SI; ``rate``, which is x' or x(dt), and ``output_value``. Outputs
         are angles, velocities, tensions, the fingertip's position and the motors' currents at the state.
+        ``side_by_state``, ``side_of_input`` and ``side_of_parameter`` say where a kink is near: 1 where derivatives
+        hold above the number, -1 where below; 0 elsewhere, and at a kink, where they are the mean of both.
 
     Raises:
         InputError: If state or inputs have a wrong size, free objects are among the coordinates, ``dt`` is not
@@ -86,13 +93,15 @@ def linearise(
     x = as_packed(finger, state, "state")
     u = as_inputs(finger, inputs)
     change = _rate if dt is None else _over(finger, x, u, dt)
-    maps: tuple[_Map, _Map] = (change, _outputs)
+
+    def both(other: Finger, at: Array, inputs: Array) -> Array:
+        return np.concatenate([change(other, at, inputs), _outputs(other, at, inputs)])
+
     # The map is smooth on its steps, but curved where a kink is on the way: there steps are small.
     part = 1.0 if dt is None else _OF_MAPS
-    states, given = part * _OF_STATES * finger.layout.scales(), part * np.full(len(u), _OF_INPUTS)
-    by_state = [_slopes(partial(_at_state, m, finger, u), x, states) for m in maps]
-    by_input = [_slopes(partial(m, finger, x), u, given) for m in maps]
-    by_parameter = [np.zeros((len(each), 0)) for each in by_state]
+    by_state = _slopes(lambda each: both(finger, each, u), x, part * _OF_STATES * finger.layout.scales())
+    by_input = _slopes(lambda each: both(finger, x, each), u, np.full(len(u), part * _OF_INPUTS))
+    by_parameter = np.zeros((len(by_state[0]), 0)), np.zeros(0, int)
     if parameters:
         assert scenario is not None
         family = ParametrisedScenario(scenario, tuple(parameters))
@@ -101,34 +110,55 @@ def linearise(
                 raise InputError(key, "must be a single number of the scenario", value)
         values = np.array(family.values, dtype=float)
         sizes = part * _OF_PARAMETERS * np.where(values == 0.0, 1.0, np.abs(values))
-        by_parameter = [_slopes(partial(_at_values, m, family, x, u), values, sizes, least=values == 0.0) for m in maps]
-    return _dataset(finger, maps, (x, u), (by_state, by_input, by_parameter), list(parameters), dt)
-
-
-def _at_state(map_: _Map, finger: Finger, u: Array, x: Array) -> Array:
-    return map_(finger, x, u)
-
-
-def _at_values(map_: _Map, family: ParametrisedScenario, x: Array, u: Array, values: Array) -> Array:
-    return map_(_built(family.with_values(values.tolist())), x, u)
+        by_parameter = _slopes(
+            lambda each: both(_built(family.with_values(each.tolist())), x, u), values, sizes, least=values == 0.0
+        )
+    return _dataset(finger, both(finger, x, u), (by_state, by_input, by_parameter), list(parameters), dt)
 
 
 def _built(scenario: Scenario) -> Finger:
     return Finger(scenario.finger, objects=scenario.environment.objects)
 
 
-def _slopes(of: Callable[[Array], Array], at: Array, steps: Array, least: Array | None = None) -> Array:
-    """Return the derivatives of a vector by a vector, shape (k, n); one-sided at the least value allowed."""
-    columns = []
+def _slopes(
+    of: Callable[[Array], Array], at: Array, steps: Array, least: Array | None = None
+) -> tuple[Array, NDArray[np.int_]]:
+    """Return the derivatives of a vector by a vector, shape (k, n), and from which sides they are, shape (n,).
+
+    At the least value that is allowed they are from above, and 0 is said.
+    """
+    value = of(at)
+    columns, sides = np.zeros((len(value), len(at))), np.zeros(len(at), int)
     for k, step in enumerate(steps):
-        moved = at + np.outer(_OFFSETS, step * (np.arange(len(at)) == k))
+
+        def line(offsets: Array, k: int = k) -> Array:
+            return np.array([of(at + each * (np.arange(len(at)) == k)) if each else value for each in offsets])
+
         if least is not None and least[k]:
-            # Forward, of second order.
-            ends = [of(at + way * step * (np.arange(len(at)) == k)) for way in (0.0, 1.0, 2.0)]
-            columns.append((-1.5 * ends[0] + 2.0 * ends[1] - 0.5 * ends[2]) / step)
+            columns[:, k] = _FORWARD[0] @ line(step * _OFFSETS[3:]) / step
         else:
-            columns.append(np.tensordot(_WEIGHTS, np.array([of(each) for each in moved]), axes=1) / step)
-    return np.stack(columns, axis=1)
+            columns[:, k], sides[k] = _slope(line, value, step)
+    return columns, sides
+
+
+def _slope(line: Callable[[Array], Array], value: Array, step: float) -> tuple[Array, int]:
+    """Return the derivative along a line, and the side it is from: 1 above, -1 below, 0 both."""
+    centrals = []
+    for h in step / _SHORTER ** np.arange(_TRIALS):
+        values = line(h * _OFFSETS)
+        central = _CENTRAL @ values / h
+        above, below = [weights @ values[3:] / h for weights in _FORWARD], [-w @ values[3::-1] / h for w in _FORWARD]
+
+        def alike(first: Array, second: Array, h: float = h) -> bool:
+            tolerance = _APART * np.maximum(abs(first), abs(second)) + _ROUNDING * np.max(abs(value)) / h
+            return bool((abs(first - second) <= tolerance).all())
+
+        centrals.append(central)
+        if alike(above[0], below[0]):
+            return central, 0
+        if (side := alike(*above) - alike(*below)) != 0:
+            return (above if side > 0 else below)[0], side
+    return centrals[0], 0
 
 
 def _rate(finger: Finger, x: Array, u: Array) -> Array:
@@ -177,37 +207,29 @@ def _output_names(finger: Finger, count: int) -> list[str]:
     return [*names, *(f"motor_current.{motor}" for motor in motors)]
 
 
-def _input_names(finger: Finger) -> list[str]:
-    routing = finger.routing
-    kinds = np.where(routing.winched, "tendon_winding", "tendon_command")
-    names = [f"{kind}.{tendon}" for kind, tendon in zip(kinds, routing.tendons, strict=False)]
-    for motor, channel in zip(finger.actuators.names, finger.actuators.channels, strict=True):
-        if channel in finger.actuators.voltages:
-            names[channel] = f"motor_voltage.{motor}"
-    return [*names, *(f"input.{k}" for k in range(len(names), finger.mechanism.channels))]
-
-
 def _dataset(
     finger: Finger,
-    maps: tuple[_Map, _Map],
-    at: tuple[Array, Array],
-    found: tuple[list[Array], list[Array], list[Array]],
+    value: Array,
+    slopes: Sequence[tuple[Array, NDArray[np.int_]]],
     parameters: list[str],
     dt: float | None,
 ) -> xr.Dataset:
-    (a, c), (b, d), (e, f) = found
-    whose = {"A": ("state", "by_state"), "B": ("state", "input"), "C": ("output", "by_state"), "D": ("output", "input")}
-    whose |= {"E": ("state", "parameter"), "F": ("output", "parameter")}
-    blocks = dict(zip(whose, (a, b, c, d, e, f), strict=True))
-    variables = {name: (whose[name], blocks[name], {"units": "SI"}) for name in whose}
-    values = {"rate": ("state", maps[0](finger, *at)), "output_value": ("output", maps[1](finger, *at))}
     names = list(finger.layout.names)
+    variables: dict[str, Any] = {
+        "rate": ("state", value[: len(names)]),
+        "output_value": ("output", value[len(names) :]),
+    }
+    kinds = (("A", "C", "by_state"), ("B", "D", "input"), ("E", "F", "parameter"))
+    for (first, second, whose), (columns, sides) in zip(kinds, slopes, strict=True):
+        variables[first] = (("state", whose), columns[: len(names)], {"units": "SI"})
+        variables[second] = (("output", whose), columns[len(names) :], {"units": "SI"})
+        variables["side_by_state" if whose == "by_state" else f"side_of_{whose}"] = (whose, sides)
     coordinates = {
         "state": names,
         "by_state": names,
-        "input": _input_names(finger),
-        "output": _output_names(finger, len(c)),
+        "input": input_names(finger),
+        "output": _output_names(finger, len(value) - len(names)),
         "parameter": parameters,
     }
     kind = "x' = f(x, u, p)" if dt is None else f"x(t + {dt:g} s) with the inputs held"
-    return xr.Dataset({**variables, **values}, coordinates, {"of": kind, "finger": finger.description.name})
+    return xr.Dataset(variables, coordinates, {"of": kind, "finger": finger.description.name})

@@ -14,6 +14,8 @@ from finger_pin.core.islands import find_islands
 from finger_pin.core.jit import Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import COLUMNS, PathWork, build_path_work
 from finger_pin.core.tables import Tables
+from finger_pin.core.threads import physical_memory
+from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
 
 # Layers of work.spatial, one motion or force vector per body, and of work.square.
@@ -255,9 +257,17 @@ class Linear(NamedTuple):
 
 
 def build_linear(tables: Tables, control: InputTable) -> Linear:
-    """Allocate the linearisation of tables."""
+    """Allocate the linearisation of tables.
+
+    Raises:
+        InputError: If so many bodies can touch that it cannot fit into the machine's memory.
+    """
     count, width, states = len(tables.state), len(tables.prescribed), len(tables.state_row)
     wide = 2 * width + states + 1
+    if (needed := 8.0 * wide * max(count, wide)) > (present := physical_memory()):
+        pairs, most = tables.contact_rows // COLUMNS, present / 2**30
+        allowed = f"{pairs} pairs of bodies can touch, which needs {needed / 2**30:.3g} GiB of memory, of {most:.3g}"
+        raise InputError("contacts", f"{allowed}; let fewer bodies touch")
     linear = Linear(
         mass=np.zeros((width, width)),
         by_position=np.zeros((width, width)),

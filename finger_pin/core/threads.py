@@ -1,4 +1,4 @@
-"""Threads, for tasks that hold no lock of Python."""
+"""Threads, for tasks that hold no lock of Python; and the memory of the machine."""
 
 from __future__ import annotations
 
@@ -78,3 +78,8 @@ def pool() -> ThreadPoolExecutor:
 if hasattr(os, "register_at_fork"):
     # A forked process has none of the threads.
     os.register_at_fork(after_in_child=pool.cache_clear)
+
+
+def physical_memory() -> float:
+    """Return the size of the machine's memory, bytes; infinite where the system does not tell."""
+    return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else inf

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -64,12 +64,16 @@ def with_parameters_of(finger: Finger, known: Scenario, other: Scenario) -> Fing
     return finger.changed(other.finger, objects)
 
 
-def as_packed(finger: Finger, state: State | ArrayLike, name: str) -> Array:
+def as_packed(finger: Finger, state: State | Mapping[str, float] | ArrayLike, name: str) -> Array:
     """Return a packed state, shape (size,), from one, from the state by name, or from theta, shape (n,), of rest.
 
+    Numbers may be named as `StateLayout.names` has them; those left out are those of rest at the angles.
+
     Raises:
-        InputError: If it has another size, or a number is not finite; ``name`` names the argument.
+        InputError: If it has another size, a name that is none, or a number is not finite; ``name`` names the argument.
     """
+    if isinstance(state, Mapping):
+        return _packed_by_name(finger, state, name)
     given = finger.layout.pack(state) if isinstance(state, State) else state
     try:
         found = np.array(given, dtype=float)
@@ -83,6 +87,36 @@ def as_packed(finger: Finger, state: State | ArrayLike, name: str) -> Array:
     return found if found.shape == (size,) else finger.rest_state(found)
 
 
+def _packed_by_name(finger: Finger, given: Mapping[str, float], name: str) -> Array:
+    names = finger.layout.names
+    _refuse_unknown(given, names, name, "state")
+    values = finite_vector(name, np.array([*given.values()], dtype=float), len(given))
+    angles = [given.get(f"joint_position[{joint}]", 0.0) for joint in finger.routing.joints]
+    x = finger.rest_state(np.array(angles, dtype=float))
+    x[[names.index(each) for each in given]] = values
+    return x
+
+
+def _refuse_unknown(
+    given: Mapping[str, float], names: Sequence[str], name: str, what: str, others: Sequence[str] = ()
+) -> None:
+    for each in given:
+        if each not in names:
+            allowed = f"no such {what}; there are {', '.join(names)}{suggestion(each, [*names, *others])}"
+            raise InputError(f"{name}.{each}", allowed)
+
+
+def input_names(finger: Finger) -> list[str]:
+    """Return the names of inputs with their kinds, as linearisations have them."""
+    routing = finger.routing
+    kinds = np.where(routing.winched, "tendon_winding", "tendon_command")
+    names = [f"{kind}.{tendon}" for kind, tendon in zip(kinds, routing.tendons, strict=False)]
+    for motor, channel in zip(finger.actuators.names, finger.actuators.channels, strict=True):
+        if channel in finger.actuators.voltages:
+            names[channel] = f"motor_voltage.{motor}"
+    return [*names, *(f"input.{k}" for k in range(len(names), finger.mechanism.channels))]
+
+
 def as_inputs(finger: Finger, given: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
     """Return inputs u, shape (u,), from a sequence or from a table by name, 0 if left out.
 
@@ -92,11 +126,12 @@ def as_inputs(finger: Finger, given: Mapping[str, float] | ArrayLike, name: str 
     """
     if not isinstance(given, Mapping):
         return np.array(finite_vector(name, np.asarray(given, dtype=float), finger.mechanism.channels))
-    for each in given:
-        if each not in finger.input_names:
-            hint = suggestion(each, finger.input_names)
-            allowed = f"no such input; there are {', '.join(finger.input_names)}{hint}"
-            raise InputError(f"{name}.{each}", allowed)
-    values = np.zeros(finger.mechanism.channels)
-    values[: len(finger.input_names)] = [given.get(each, 0.0) for each in finger.input_names]
-    return np.array(finite_vector(name, values, len(values)))
+    with_kinds = input_names(finger)
+    names = [*finger.input_names, *with_kinds[len(finger.input_names) :]]
+    short = dict(zip(with_kinds, names, strict=True))
+    named = {short.get(each, each): value for each, value in given.items()}
+    _refuse_unknown(named, names, name, "input", with_kinds)
+    if len(named) < len(given):
+        raise InputError(name, "must name an input once", list(given))
+    values = np.array([named.get(each, 0.0) for each in names], dtype=float)
+    return np.array(finite_vector(name, values, finger.mechanism.channels))

@@ -45,8 +45,8 @@ def require_samples(result: xr.Dataset) -> None:
     Raises:
         InputError: If it has none.
     """
-    if "time" not in result.coords:
-        raise InputError("result.time", "is missing; give a result of simulate")
+    if "time" not in result.coords or "time" not in result.dims:
+        raise InputError("result.time", "is missing; give a result of simulate, with more than one instant")
     if not result.sizes["time"]:
         raise InputError("result.time", "must have at least one sample")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cache
@@ -13,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.threads import physical_memory
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.scene_metadata import scene_metadata
@@ -153,7 +153,7 @@ def check_memory(settings: SimulationSettings, finger: Finger) -> None:
     # Every signal of a result, and what it is computed from: measured, 3.5 kB a sample of fig6 and 19 kB of pinch.
     rows = sum(table.count for table in finger.mechanism.rows)
     needed = samples * 8.0 * (25 * rows + 3 * finger.layout.size)
-    present = float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else np.inf
+    present = physical_memory()
     if needed > present:
         allowed = (
             f"{samples:.3g} samples need about {needed / 2**30:.3g} GiB of memory, of which there are "

@@ -40,15 +40,12 @@ def plot_controllers(
     title(panels[0], "(a) tracking error")
     legend(over_time, panels[0].get_lines())
     left, right = bars.subplots(1, 2, sharey=True)
-    _bars(left, rows, [row.error for row in rows], VERMILLION, "rms error (deg)", ".3f")
-    left.barh(
-        range(len(rows)),
-        [row.passive_error for row in rows],
-        color=colour(ORANGE),
-        height=0.66,
-        label="of which passive stretch",
-    )
-    _bars(right, rows, [row.peak_tension for row in rows], BLUE, "peak command (N)", ".2f")
+    errors, stretches = [row.error for row in rows], [row.passive_error for row in rows]
+    # Two errors do not add up to the whole: a bar each.
+    _bars(left, errors, VERMILLION, "rms error (deg)", ".3f", "of the motion", (-0.2, 0.36))
+    _bars(left, stretches, ORANGE, "rms error (deg)", ".3f", "by passive stretch alone", (0.2, 0.36))
+    left.set_xlim(0.0, 1.3 * max(errors + stretches))
+    _bars(right, [row.peak_tension for row in rows], BLUE, "peak command (N)", ".2f")
     title(left, "(b) after the first second")
     left.set_yticks(range(len(rows)), [row.name for row in rows])
     left.invert_yaxis()
@@ -56,12 +53,22 @@ def plot_controllers(
     return figure
 
 
-def _bars(axes: Axes, rows: Sequence[Comparison], values: Sequence[float], look: str, label: str, form: str) -> None:
-    axes.barh(range(len(rows)), values, color=colour(look), height=0.66, label="all of it")
+def _bars(
+    axes: Axes,
+    values: Sequence[float],
+    look: str,
+    label: str,
+    form: str,
+    name: str = "",
+    place: tuple[float, float] = (0.0, 0.66),
+) -> None:
+    """Draw a bar for each row, at a place beside its line and of a height."""
+    lines = np.arange(len(values)) + place[0]
+    axes.barh(lines, values, color=colour(look), height=place[1], label=name)
     axes.set_xlabel(label)
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", length=0)
     most = max(values)
     axes.set_xlim(0.0, 1.3 * most)
-    for index, value in enumerate(values):
-        axes.text(value + 0.02 * most, index, f"{value:{form}}", va="center", fontsize="small")
+    for line, value in zip(lines, values, strict=True):
+        axes.text(value + 0.02 * most, line, f"{value:{form}}", va="center", fontsize="small")

@@ -87,6 +87,10 @@ def test_what_cannot_be_linearised_is_refused(drum):
         ((scenario, x, [4.0], -1.0), "must be above 0"),
         ((fp.Finger("planar"), np.zeros(9), np.ones(3), None, ["finger.gravity"]), "are those of a scenario"),
         ((scenario, x, [4.0], None, ["finger.gravity"]), "must be a single number"),
+        ((scenario, {"joint_position[drums]": 0.4}, [4.0]), r"did you mean joint_position\[drum\]"),
+        ((scenario, {"joint_position[drum]": np.nan}, [4.0]), "must be 1 finite number"),
+        ((scenario, x, {"tendon_comand.T1": 4.0}), "no such input; .*did you mean"),
+        ((scenario, x, {"tendon_command.T1": 4.0, "T1": 3.0}), "must name an input once"),
     ):
         with pytest.raises(fp.InputError, match=said):
             fp.linearise(*arguments)
@@ -98,3 +102,24 @@ def test_a_posture_or_a_state_by_name_stands_for_the_packed_state():
     packed = fp.linearise(finger, x, pulls)
     assert fp.linearise(finger, angles, pulls).equals(packed)
     assert fp.linearise(finger, finger.layout.unpack(x), pulls).equals(packed)
+    whole = dict(zip(map(str, packed.by_state.values), x, strict=True))
+    inputs = dict(zip(map(str, packed.input.values), pulls, strict=True))
+    assert fp.linearise(finger, whole, inputs).equals(packed)
+    # What is left out is at rest at the angles.
+    part = {name: value for name, value in whole.items() if name.startswith("joint_position")}
+    assert fp.linearise(finger, part, dict(zip(finger.input_names, pulls, strict=True))).equals(packed)
+
+
+@pytest.mark.parametrize("speed", [1e-6, -1e-6, 1e-3, -1e-3, 0.0])
+def test_near_a_reversal_derivatives_are_those_of_the_side_of_the_state_and_it_is_named(speed):
+    """F' = s0 (r w - F |r w| / L), L = tanh(mu phi / 2) (2 f^a - F): the slope over w bends at 0, by F / L."""
+    frictionless = {"coulomb": 0.0, "stiction": 0.0, "viscous": 0.0}
+    changed = {"tendon_friction.coulomb": 0.2, "tendons.T1.curvature_offset": 2.5, "joint_friction": frictionless}
+    scenario = fp.load_scenario("canal", {f"finger.{key}": value for key, value in changed.items()})
+    state = {"joint_position[drum]": 0.4, "joint_velocity[drum]": speed, "tendon_stiction[T1]": 0.5}
+    found = fp.linearise(scenario, state, {"tendon_command.T1": 4.0})
+    level = np.tanh(0.2 * 2.5 / 2.0) * (2.0 * 4.0 - 0.5)
+    slope = found.A.sel(state="tendon_stiction[T1]", by_state="joint_velocity[drum]")
+    np.testing.assert_allclose(slope, 5e4 * 0.02 * (1.0 - 0.5 / level * np.sign(speed)), rtol=1e-5)
+    assert found.side_by_state.sel(by_state="joint_velocity[drum]") == np.sign(speed)
+    assert not found.side_by_state.drop_sel(by_state="joint_velocity[drum]").any()

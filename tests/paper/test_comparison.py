@@ -81,6 +81,12 @@ def test_the_figure_shows_the_errors_and_the_bars(runs, rows):
     figure = plot_controllers(short, list(rows.values()))
     error = np.rad2deg(short["paper"].tracking_error.values)
     np.testing.assert_allclose(figure.axes[2].lines[0].get_ydata(), error[:, 2])
+    # Rms errors do not add up, so that no bar lies on another.
+    below, *others = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[4].patches)
+    for above in others:
+        assert above[0] > below[1]
+        below = above
+    assert len(others) == 2 * len(rows) - 1
     widths = [bar.get_width() for bar in figure.axes[5].patches]
     np.testing.assert_allclose(widths, [row.peak_tension for row in rows.values()])
 

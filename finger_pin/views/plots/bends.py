@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.exceptions import InputError
-from finger_pin.views.plots.lines import names, series, trace
+from finger_pin.views.plots.lines import names, series, times, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, Width, styled, thin
 
@@ -31,7 +31,7 @@ def plot_bends(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     """
     if "wrap_tension" not in result:
         raise InputError("result", 'has no tendon that rubs at several places, as with tendon_friction.place = "bends"')
-    bends, time = names(result, "wrap"), result["time"].values
+    bends, time = names(result, "wrap"), times(result)
     tendons = [name for name in names(result, "tendon") if any(each.startswith(f"{name}.") for each in bends)]
     height = max(4.2, 1.9 * len(tendons))
     figure, (left, right) = sheet([(6.4, height), (5.2, height)], width, titles)

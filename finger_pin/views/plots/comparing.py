@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.recording import is_tracking
-from finger_pin.views.plots.lines import names, trace
+from finger_pin.views.plots.lines import names, times, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, styled, thin
 
@@ -44,8 +44,8 @@ def compare(
     joints, tendons = names(first, "joint"), names(first, "tendon")
     height = max(6.6, 1.3 * max(len(joints), len(tendons)))
     figure, parts = sheet([(4.8, height)] * 3, width, titles)
-    start = min(result["time"].values[0] for result in (first, second))
-    end = max(result["time"].values[-1] for result in (first, second))
+    start = min(times(result)[0] for result in (first, second))
+    end = max(times(result)[-1] for result in (first, second))
     tracks, degrees = is_tracking(first) or is_tracking(second), 180.0 / np.pi
     columns = (
         (joints, "°", f"(a) joint angles{', reference dashed' if tracks else ''}", "joint_position", "joint", degrees),
@@ -58,7 +58,7 @@ def compare(
         panels = stack(part, [labelled(name, unit) for name in rows])
         title(panels[0], text)
         for result, label, colour in zip((first, second), labels, (BLUE, VERMILLION), strict=True):
-            time = result["time"].values
+            time = times(result)
             drawn = {variable: {"label": label, "color": colour, "linewidth": thin()}}
             if variable == "tracking_error" and not is_tracking(result):
                 continue

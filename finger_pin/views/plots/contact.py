@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from finger_pin.exceptions import InputError
-from finger_pin.views.plots.lines import names, series, shade, trace
+from finger_pin.views.plots.lines import names, series, shade, times, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, SKY, VERMILLION, Width, colour, styled, thin
 
@@ -49,7 +49,7 @@ def plot_contact(result: xr.Dataset, *, width: Width = None, titles: bool = True
     cone, others = _right(right, below)
     for index, (axes, name) in enumerate(zip(panels, shown, strict=False)):
         contact = result.sel(contact=name)
-        time = result["time"].values
+        time = times(result)
         level = contact["contact_level"].values
         shade(axes, time, np.zeros(len(time)), level, color=SKY, alpha=0.35, label="most that friction can be")
         trace(axes, time, contact["contact_normal_force"].values, label="normal force", color=BLUE, linewidth=thin())
@@ -102,7 +102,7 @@ def _cone(axes: Axes, contact: xr.Dataset, name: str, look: str) -> None:
 
 
 def _moved(axes: Axes, result: xr.Dataset) -> None:
-    time, objects, along = result["time"].values, names(result, "object"), names(result, "axis")
+    time, objects, along = times(result), names(result, "object"), names(result, "axis")
     place = result["object_position"].transpose("object", "axis", "time").values
     moved = place - place[..., :1]
     if len(objects) > _MOST_ALONG:

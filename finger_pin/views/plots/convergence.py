@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.typing import Array
-from finger_pin.views.plots.lines import names, series
+from finger_pin.views.plots.lines import names, series, times
 from finger_pin.views.plots.panels import legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import GREY, Width, colour, limit_line, styled
 from finger_pin.views.units import joints_by_unit, shown_unit
@@ -33,7 +33,7 @@ def plot_convergence(result: xr.Dataset, *, width: Width = None, titles: bool = 
     (axes,) = stack(part, [f"greatest difference ({' or '.join(dict.fromkeys(shown))})"])
     values = np.abs(np.array(factors) * result["convergence_difference"].transpose("time", "joint").values)
     reached = np.isfinite(values).all(axis=1)
-    time, values = result["time"].values[reached], np.maximum(values[reached], _LEAST)
+    time, values = times(result)[reached], np.maximum(values[reached], _LEAST)
     for index, name in enumerate(names(result, "joint")):
         axes.plot(*_envelope(time, values[:, index]), label=name, **series(index))
     logarithmic(axes)

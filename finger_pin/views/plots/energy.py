@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import entries
 from finger_pin.typing import Array
-from finger_pin.views.plots.lines import shade, trace
+from finger_pin.views.plots.lines import shade, times, trace
 from finger_pin.views.plots.panels import labelled, legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import (
     BLACK,
@@ -55,7 +55,7 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
-    time = result["time"].values
+    time = times(result)
     stored, coming, lost = (entries(result, kind) for kind in (STORED, SUPPLIED, LOST))
     supplied, total = (np.sum([each.values for each in kind.values()], axis=0) for kind in (coming, stored))
     intake = float(np.max(np.abs(supplied) + np.maximum(total[0] - total, 0.0)))
@@ -100,7 +100,7 @@ def _balance(
 
 
 def _residual(axes: Axes, result: xr.Dataset, scale: float) -> None:
-    time, residual = result["time"].values, result["energy_residual"].values
+    time, residual = times(result), result["energy_residual"].values
     share = np.abs(residual) / (scale or 1.0)
     worst = float(np.max(share))
     if worst > 0.0:

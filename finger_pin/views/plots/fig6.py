@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from finger_pin.simulation.recording import is_tracking
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
-from finger_pin.views.plots.lines import bundle, names, passive_proximal, trace
+from finger_pin.views.plots.lines import bundle, names, passive_proximal, times, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, styled, thin
 
@@ -77,19 +77,19 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
 
 
 def _joints(axes: Axes, result: xr.Dataset, variable: str) -> None:
-    time, values = result["time"].values, np.rad2deg(result[variable].transpose("time", "joint").values)
+    time, values = times(result), np.rad2deg(result[variable].transpose("time", "joint").values)
     bundle(axes, time, values, names(result, "joint"), range(values.shape[1]))
 
 
 def _references(axes: Axes, result: xr.Dataset) -> Line2D:
     """Draw theta^d of all joints, and return a line that stands for them."""
-    time, values = result["time"].values, np.rad2deg(result["joint_reference"].transpose("time", "joint").values)
+    time, values = times(result), np.rad2deg(result["joint_reference"].transpose("time", "joint").values)
     look: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": thin(0.7)}
     return [trace(axes, time, column, label="reference θᵈ", **look) for column in values.T][-1]
 
 
 def _tensions(panels: list[Axes], result: xr.Dataset) -> None:
-    time = result["time"].values
+    time = times(result)
     planned = result["tendon_command"].transpose("time", "tendon").values
     delivered = result["tendon_tension"].transpose("time", "tendon").values
     proximal = passive_proximal(result)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
 from finger_pin.typing import Array
-from finger_pin.views.plots.lines import names, series, trace
+from finger_pin.views.plots.lines import names, series, times, trace
 from finger_pin.views.plots.panels import sheet, stack, title
 from finger_pin.views.plots.style import Width, styled
 from finger_pin.views.units import actuators_by_unit, joints_by_unit, shown_unit
@@ -40,7 +40,7 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
             title(axes[0], text)
             for each, (_, panel) in zip(axes, panels, strict=True):
                 for index, (name, values) in enumerate(panel.items()):
-                    trace(each, result["time"].values, values, label=name, **series(index))
+                    trace(each, times(result), values, label=name, **series(index))
                 each.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="x-small", frameon=False)
     return figure
 

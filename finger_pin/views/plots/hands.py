@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
-from finger_pin.views.plots.lines import bundle, names
+from finger_pin.views.plots.lines import bundle, names, times
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import Width
 
@@ -68,6 +68,4 @@ def plot_by_finger(result: xr.Dataset, columns: Sequence[Column], width: Width, 
 
 def _lines(axes: Axes, part: xr.Dataset, kind: str, looks: list[str], values: Array) -> dict[str, Line2D]:
     labels = names(part, kind)
-    return dict(
-        zip(labels, bundle(axes, part["time"].values, values, labels, list(map(looks.index, labels))), strict=True)
-    )
+    return dict(zip(labels, bundle(axes, times(part), values, labels, list(map(looks.index, labels))), strict=True))

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from finger_pin.simulation.netcdf import require_samples
 from finger_pin.typing import Array
 from finger_pin.views.plots.style import DASHES, colour, cycle_colours
 
@@ -23,6 +24,16 @@ _LINE = 0.005
 def names(result: xr.Dataset, coordinate: str) -> list[str]:
     """Return the names along a coordinate of a result."""
     return [str(name) for name in result[coordinate].values]
+
+
+def times(result: xr.Dataset) -> Array:
+    """Return the sample times of a result, s, shape (m,).
+
+    Raises:
+        InputError: If it has none.
+    """
+    require_samples(result)
+    return result["time"].values
 
 
 def passive_proximal(result: xr.Dataset) -> dict[str, Array]:

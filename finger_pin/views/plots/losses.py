@@ -8,7 +8,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from finger_pin.typing import Array
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
-from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
+from finger_pin.views.plots.lines import names, passive_proximal, shade, times, trace
 from finger_pin.views.plots.panels import cut_spikes, flatten_rounding, labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, styled, thin
 
@@ -47,7 +47,7 @@ def plot_losses(result: xr.Dataset, finger: str | None = None, *, width: Width =
 
 
 def _tendons(part: SubFigure, result: xr.Dataset) -> None:
-    time, tendons = result["time"].values, names(result, "tendon")
+    time, tendons = times(result), names(result, "tendon")
     entering = "spool_tension" if "spool_tension" in result else "tendon_command"
     before = result[entering].transpose("time", "tendon").values
     after = result["tendon_tension"].transpose("time", "tendon").values
@@ -62,7 +62,7 @@ def _tendons(part: SubFigure, result: xr.Dataset) -> None:
 
 
 def _joints(part: SubFigure, result: xr.Dataset) -> None:
-    time, joints = result["time"].values, names(result, "joint")
+    time, joints = times(result), names(result, "joint")
     command, torque, friction = (
         1e3 * result[name].transpose("time", "joint").values
         for name in ("joint_torque_command", "joint_torque", "joint_friction")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from finger_pin.analysis import SelfLockingMap, critical_friction
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.typing import Array
-from finger_pin.views.plots.lines import series
+from finger_pin.views.plots.lines import series, times
 from finger_pin.views.plots.panels import grid, heading, legend, plain, sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin
 
@@ -86,7 +86,7 @@ def plot_runaway(results: dict[str, xr.Dataset], *, width: Width = None, titles:
     figure, (part,) = sheet([(7.5, 5.6)], width, titles)
     top, bottom = part.subplots(2, 1, sharex=True)
     for index, (label, result) in enumerate(results.items()):
-        time = result["time"].values
+        time = times(result)
         top.plot(time, result["tendon_command"].max("tendon").values, label=label, **series(index))
         error = np.rad2deg(np.max(np.abs(result["tracking_error"].transpose("time", "joint").values), axis=1))
         bottom.plot(time, error, label=label, **series(index))

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
-from finger_pin.views.plots.lines import names, series, shade, trace
+from finger_pin.views.plots.lines import names, series, shade, times, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, Width, colour, styled, thin
 
@@ -65,7 +65,7 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     title(current, "(c) current")
     for index, name in enumerate(actuators):
         values = result["motor_current"].sel(motor=name).values
-        trace(current, result["time"].values, values, label=name, linewidth=thin(), **series(index))
+        trace(current, times(result), values, label=name, linewidth=thin(), **series(index))
     current.legend(loc="upper right", ncols=4)
     _power(power, result)
     legend(right, power.get_legend_handles_labels()[0])
@@ -95,7 +95,7 @@ def _loop(axes: Axes, result: xr.Dataset, motor: str, finger: FingerDescription,
 
 
 def _tension(axes: Axes, result: xr.Dataset, tendon: str) -> None:
-    time = result["time"].values
+    time = times(result)
     pulled = result["spool_tension"].sel(tendon=tendon).values
     trace(axes, time, pulled, label="at the spool", color=BLUE, linewidth=thin())
     delivered = result["tendon_tension"].sel(tendon=tendon).values
@@ -104,7 +104,7 @@ def _tension(axes: Axes, result: xr.Dataset, tendon: str) -> None:
 
 
 def _power(axes: Axes, result: xr.Dataset) -> None:
-    time = result["time"].values
+    time = times(result)
     level = np.zeros(len(time))
     for label, (lost, look) in _LOST.items():
         above = level + sum(result[f"power_{name}"].values for name in lost)
