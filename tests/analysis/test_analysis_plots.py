@@ -44,6 +44,7 @@ def test_runs_are_drawn_with_their_largest_tension():
     np.testing.assert_allclose(bottom.lines[0].get_ydata(), np.rad2deg(np.abs(run["tracking_error"]).max("joint")))
 
 
+@pytest.mark.slow
 def test_section_lies_in_the_polytope_and_friction_orders_it(finger):
     figure = plot_force_polytope(finger, POSTURE, 10.0)
     polytope, plane = force_polytope(finger, POSTURE, 10.0), figure.axes[-1]
@@ -54,6 +55,7 @@ def test_section_lies_in_the_polytope_and_friction_orders_it(finger):
     assert np.all(np.linalg.norm(hindering, axis=1) <= np.linalg.norm(helping, axis=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, position", [("planar", [0.4, 0.9]), ("ub_stand_in", [0.0, 0.0, 0.0, 0.0])])
 def test_sets_that_are_flat_in_space_are_drawn_by_their_section(name, position):
     assert plot_force_polytope(fp.Finger(fp.load_finger(name)), position, 10.0).axes[-1].lines

@@ -57,6 +57,7 @@ def some_forces(polytope, number):
     return number.normal(size=(5, polytope.basis.shape[1])) @ polytope.basis.T
 
 
+@pytest.mark.slow
 @FEW
 @given(fingers(), st.integers(0, 10**6))
 def test_forces_of_any_finger_agree_with_each_other(description, seed):
@@ -106,6 +107,7 @@ def still(finger, samples=3):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [1, 4])
 @settings(FEW, max_examples=1)
 @given(data=st.data())

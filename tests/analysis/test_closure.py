@@ -103,6 +103,7 @@ def test_statics_of_a_posed_finger_are_those_of_its_arms_there():
     assert critical.coefficient == pytest.approx(-upper, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_motors_pull_tendons_along_paths_through_spools_and_stretch():
     table = finger_table(limit=0.3)
     table["actuators"] = {
@@ -156,6 +157,7 @@ def test_locking_over_the_range_is_worst_where_an_arm_is_shortest():
     assert critical.coefficient == pytest.approx(np.abs(hinge.coupling_at(posture)).min(), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_controller_holds_tensions_at_the_minimum_and_follows_its_reference():
     moving = scenario({"amplitude": 0.2, "frequency": 1.0}, limit=0.3)
     controller = fp.control.build_controller(moving)
@@ -170,6 +172,7 @@ def test_the_controller_holds_tensions_at_the_minimum_and_follows_its_reference(
     assert np.abs(result.energy_residual).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_servos_in_position_drive_turn_a_hinge_by_the_lengths_of_its_paths():
     """L by the law of cosines; with the arms of the middle posture spools would stand 0.095 rad from where they do."""
     driven = scenario({"offset": 0.25}, limit=0.5).model_dump(exclude_none=True)

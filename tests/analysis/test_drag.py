@@ -29,6 +29,7 @@ def planar(drag, pins=0.0, dry=0.0):
     return fp.Finger(fp.load_finger("planar", {f"finger.{key}": value for key, value in keys.items()}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("drag", "dry"), [(0.0, 0.0), (0.5, 0.0), (20.0, 0.0), (0.5, [4e-3, 2e-3])])
 def test_a_finger_that_pushes_has_to_pull_as_much_more_as_drag_takes_and_nothing_where_a_tendon_is_idle(drag, dry):
     """Strands pull f = J^T E + s dry + l (1, 1, 1), none below zero with the least l.

@@ -38,6 +38,7 @@ def test_the_matrices_are_those_of_the_equations_written_out(drum):
     np.testing.assert_allclose(found.C.sel(output="fingertip_position.y")[0], 0.04 * np.cos(0.4), rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_the_map_over_a_step_is_the_matrix_exponential_at_rest(drum):
     scenario, x = drum
     lin = fp.linearise(scenario, x, [4.0], parameters=[STIFFNESS])
@@ -96,6 +97,7 @@ def test_what_cannot_be_linearised_is_refused(drum):
             fp.linearise(*arguments)
 
 
+@pytest.mark.slow
 def test_a_posture_or_a_state_by_name_stands_for_the_packed_state():
     finger, angles, pulls = fp.Finger("ub_stand_in"), [0.0, 0.3, 0.3, 0.2], [1.0, 1.0, 4.4, 3.1]
     x = finger.rest_state(np.array(angles))

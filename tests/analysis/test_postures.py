@@ -53,6 +53,7 @@ def test_a_finger_rests_where_its_weight_balances_the_tensions_and_stays_there()
     np.testing.assert_allclose(state.position, theta, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_finger_with_a_passive_tendon_rests_and_what_cannot_is_told():
     finger = fp.Finger("ub_stand_in")
     found = equilibrium(finger, [1.0, 1.0, 1.2, 0.3], position=[0.0, 0.8, 0.8, 0.5], fingertip_force=[0.0, 0.02, 0.0])

@@ -67,6 +67,7 @@ def test_gears_that_lose_nothing_by_load_move_no_margin_and_others_narrow_it():
     assert margins[0] == pytest.approx(alone, rel=1e-2) and margins[1] < 0.9 * alone
 
 
+@pytest.mark.slow
 def test_weaker_motors_have_a_narrower_margin():
     """Without limits it is that of the gears; at 0.15 A the dry friction of the gears takes a seventh of the torque."""
     scenarios = [fp.load_scenario("servo", {f"{EVERY}.maximum_current": current}) for current in (0.15, 0.3, 1.47)]

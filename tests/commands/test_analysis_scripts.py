@@ -81,6 +81,7 @@ def test_a_finger_without_passive_tendon_is_refused_before_anything_is_written(r
     assert [each.name for each in tmp_path.iterdir()] == ["s"]
 
 
+@pytest.mark.slow
 def test_one_conclusion_is_written_as_figure_and_table_and_shown(run, tmp_path):
     scenario = tmp_path / "short.toml"
     scenario.write_text('extends = "reversals"\n[simulation]\nduration = 0.5\n')
@@ -94,6 +95,7 @@ def test_one_conclusion_is_written_as_figure_and_table_and_shown(run, tmp_path):
     assert run("conclusions", scenario, "--only", "a", "--output", "quiet", "--quiet") == (0, "", [])
 
 
+@pytest.mark.slow
 def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_figures(run, tmp_path, monkeypatch):
     monkeypatch.setattr("finger_pin.commands.self_locking.SHARES", (0.5,))
     scenario = tmp_path / "short.toml"
@@ -106,6 +108,7 @@ def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_fi
     assert {each.stem for each in (tmp_path / "out").iterdir()} == {"critical_friction", "map", "runs"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "arguments"), [("conclusions", ("--only", "a", "--quiet")), ("force_capability", ())])
 def test_a_folder_that_cannot_be_made_is_told_in_one_line(run, tmp_path, name, arguments):
     (tmp_path / "file").write_text("")

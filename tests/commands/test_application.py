@@ -92,6 +92,7 @@ def test_the_package_runs_as_a_module_and_by_the_name_that_is_installed_and_list
     assert getattr(sys.modules[module], name) is application.run
 
 
+@pytest.mark.slow
 def test_every_public_name_can_be_had_and_nothing_is_imported_that_is_not_asked_for():
     assert len(fp.__all__) <= 44
     for name in fp.__all__:
@@ -205,6 +206,7 @@ def test_what_would_be_ignored_is_told_in_one_line(name, arguments, says, capsys
     assert says in line and not any(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_force_script_takes_a_scenario_a_file_that_extends_one_and_their_finger_alike(
     capsys, tmp_path, monkeypatch
 ):

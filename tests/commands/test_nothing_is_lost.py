@@ -46,6 +46,7 @@ def whole(folder: Path) -> float:
     return fp.load_scenario(folder / "scenario.toml").simulation.duration
 
 
+@pytest.mark.slow
 def test_a_run_killed_at_any_moment_leaves_whole_results(started, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert application.run("simulate", ["s.toml", "--output", "out", "--no-figures", "--quiet"]) == 0
@@ -57,6 +58,7 @@ def test_a_run_killed_at_any_moment_leaves_whole_results(started, tmp_path, monk
         assert whole(tmp_path / "out") in (0.005, 0.01)
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_a_real_run_ends_it_with_a_trajectory(started, tmp_path):
     # At rest a thousand seconds are over in no time.
     (tmp_path / "s.toml").write_text('extends = "reversals"\n', encoding="utf-8")

@@ -45,6 +45,7 @@ TOO_STIFF = {
 }
 
 
+@pytest.mark.slow
 def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_try_and_saves_what_it_has(
     run, here, quick
 ):
@@ -190,6 +191,7 @@ def test_output_that_cannot_be_printed_is_told_in_one_line_and_results_are_kept(
     assert set(contents(here / "out")) >= ALL
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 def test_a_disk_that_fills_up_in_a_real_run_is_told_in_one_line(here):
     import resource

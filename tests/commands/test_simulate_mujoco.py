@@ -3,6 +3,7 @@
 import shutil
 
 import numpy as np
+import pytest
 import xarray as xr
 
 from finger_pin.commands.application import run_function
@@ -15,6 +16,7 @@ HAND = """<mujoco><compiler angle="radian"/><worldbody><site name="base" pos="0 
 <actuator><position name="servo" joint="finger:joint" kp="1" ctrlrange="0 1"/></actuator></mujoco>"""
 
 
+@pytest.mark.slow
 def test_a_mujoco_hand_is_simulated_and_its_scenario_runs_again(tmp_path, capsys):
     (tmp_path / "one.xml").write_text(HAND)
     output = tmp_path / "out"

@@ -8,6 +8,7 @@ from test_files import contents
 from wrong_inputs import FILES, OTHER_OVERRIDES, PLANAR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "entry", "says"), OTHER_OVERRIDES, ids=[text[:50] for text, _, _ in OTHER_OVERRIDES])
 def test_a_wrong_value_ends_with_one_line_and_leaves_everything_as_it_was(run, here, text, entry, says):
     (here / "results" / "reversals").mkdir(parents=True)

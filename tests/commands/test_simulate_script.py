@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from harness import ALL, SCRIPT
 from test_files import contents
 from wrong_inputs import PLANAR
@@ -14,6 +15,7 @@ from finger_pin.commands.options import overrides
 from finger_pin.description.loading import load_scenario
 
 
+@pytest.mark.slow
 def test_a_run_writes_all_results_and_says_where(run, here):
     code, out, lines = run("s.toml", "--output", "out")
     assert (code, lines) == (0, [])
@@ -76,6 +78,7 @@ def test_without_figures_those_of_an_earlier_run_are_gone_and_the_animation_is_n
     assert set(contents(here / "out")) == ALL
 
 
+@pytest.mark.slow
 def test_figures_come_in_the_format_that_was_asked_for(run, here):
     assert run("s.toml", "--output", "out", "--format", "svg")[0] == 0
     assert {Path(name).suffix for name in contents(here / "out") if name.startswith("figures/")} == {".svg"}
@@ -177,6 +180,7 @@ def test_wrong_options_are_told_without_importing_anything_heavy(here):
     assert done.stdout == "2 set()\n"
 
 
+@pytest.mark.slow
 def test_a_run_without_figures_does_not_import_what_draws_them(here):
     code = (
         "import sys\n"

@@ -13,6 +13,8 @@ import subprocess
 import sys
 import types
 
+import pytest
+
 MODULES = {"fcntl", "grp", "posix", "pty", "pwd", "resource", "syslog", "termios", "tty"}
 OF_OS = (
     "chown fork forkpty getgid getloadavg getpgid getsid getuid killpg mkfifo nice register_at_fork sched_getaffinity "
@@ -22,6 +24,7 @@ OF_SIGNAL = "SIGALRM SIGCHLD SIGHUP SIGKILL SIGPIPE SIGQUIT SIGUSR1 alarm pthrea
 SWEEP = ["sweep", "reversals", "--over", "controller.gain=1,2", "--set", "simulation.duration=0.02", "--workers", "2"]
 
 
+@pytest.mark.slow
 def test_all_modules_are_imported_and_a_run_its_page_and_a_sweep_are_published(tmp_path):
     done = subprocess.run([sys.executable, __file__], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -132,6 +132,7 @@ def test_tendon_feedforward_without_stribeck_and_viscous_parts_is_the_capstan_la
     assert command[2] == planned[2] and command[4] == planned[4]
 
 
+@pytest.mark.slow
 def test_a_steadily_sliding_tendon_delivers_exactly_what_was_planned():
     """The finger's own law (9), integrated at constant velocity until its bristles have settled, is the judge."""
     scenario = reversals(FEEDFORWARD, SHARP)
@@ -166,6 +167,7 @@ def settled_states(finger, position, velocity, command, halves):
     return finger.layout.pack(state)
 
 
+@pytest.mark.slow
 def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction():
     """On the reference at the desired velocity, with every bristle settled: theta'' = - M^-1 C theta', and p5'' = 0."""
     scenario = reversals(CONSISTENT, FEEDFORWARD, JOINTS, SHARP)
@@ -272,6 +274,7 @@ def test_commands_of_a_batch_are_those_of_each_row_for_other_fingers_too(finger,
         np.testing.assert_allclose(batch.torque[index], single.torque, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_continuous_compensated_controller_is_what_a_finely_sampled_one_converges_to():
     overrides = {"simulation.duration": 0.05, "finger.joint_friction.viscous": 0.02}
     continuous = fp.simulate(reversals(CONSISTENT, FEEDFORWARD, JOINTS, overrides))

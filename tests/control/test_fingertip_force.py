@@ -48,6 +48,7 @@ def test_the_wanted_force_follows_its_signal_and_the_scenario_s_clock():
     assert {0.0, 1.0} <= set(late.knots(1e-6).tolist())
 
 
+@pytest.mark.slow
 def test_friction_keeps_part_of_a_force_that_rises_and_lets_go_of_one_that_falls():
     """It opposes the joints' motion, which a stiff plate hardly allows; compensation knows the desired motion alone."""
     pulse = {"kind": "points", "times": [0.1, 0.6, 1.1], "values": [0.0, 2.0, 0.0]}

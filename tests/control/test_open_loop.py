@@ -20,6 +20,7 @@ def pulled(**entries):
     return fp.load_scenario("reversals", SHORT | {"controller": {"kind": "tensions", "tensions": PULLS}} | entries)
 
 
+@pytest.mark.slow
 def test_commands_are_the_signals_and_a_tendon_without_one_is_held_at_its_minimum():
     result = fp.simulate(pulled(**{"controller.minimum_tension": 3.0}))
     time = result.time.values
@@ -29,6 +30,7 @@ def test_commands_are_the_signals_and_a_tendon_without_one_is_held_at_its_minimu
     assert float(abs(result.energy_residual).max()) < 1e-5 * float(abs(result.energy_exchanged_actuators).max())
 
 
+@pytest.mark.slow
 def test_signals_and_their_samples_make_the_same_motion():
     times = np.linspace(0.0, 0.02, 3)
     scenario = pulled(**{"controller.tensions.T2": {"offset": 3.0}})
@@ -37,6 +39,7 @@ def test_signals_and_their_samples_make_the_same_motion():
     np.testing.assert_allclose(given.joint_position, fp.simulate(scenario).joint_position, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_short_pulse_is_not_stepped_over():
     """1 N for 1 ms on a finger at rest: the actuator's work shows it, and the sum rule of (18) at its peak."""
     pulse = {"kind": "samples", "times": [0.0105, 0.011, 0.0115], "values": [0.0, 1.0, 0.0]}
@@ -67,6 +70,7 @@ def test_a_negative_sample_of_tension_is_refused():
         fp.simulate(fp.load_scenario("reversals"), controller=([0.0, 1.0], [[1.0, 1.0, 1.0, -1e-3]] * 2))
 
 
+@pytest.mark.slow
 def test_the_force_at_the_fingertip_is_the_constant_and_what_varies():
     signal = {"z": {"kind": "ramp", "time": 0.0, "duration": 0.02, "height": -0.4}, "x": {"offset": 0.1}}
     entries = {"environment.fingertip_force": [0.0, 0.2, 0.1], "environment.fingertip_force_signal": signal}
@@ -83,6 +87,7 @@ def test_the_force_at_the_fingertip_is_the_constant_and_what_varies():
     assert float(abs(result.energy_residual).max()) < 1e-5 * float(abs(result.energy_exchanged_actuators).max())
 
 
+@pytest.mark.slow
 def test_a_force_by_samples_replaces_that_of_the_scenario():
     forces = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.1]])
     given = fp.simulate(fp.load_scenario("reversals", SHORT), fingertip_force=([0.0, 1.0], forces))
@@ -90,6 +95,7 @@ def test_a_force_by_samples_replaces_that_of_the_scenario():
     np.testing.assert_allclose(given.joint_position, told.joint_position, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_reference_by_samples_is_followed_and_followers_are_filled_in():
     times = np.linspace(0.0, 0.02, 21)
     theta = np.column_stack([0.1 * times, 0.3 + times, 0.5 - times])
@@ -112,11 +118,13 @@ def test_the_clock_of_all_signals_starts_where_the_scenario_says():
     np.testing.assert_allclose(loop.controller.signal.at(0.3)[0], early.controller.signal.at(2.3)[0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_open_loop_tensions_need_no_force_closure():
     scenario = pulled(**{"finger.tendons.T4.crossings.proximal.radius": 0.0053})
     assert fp.simulate(scenario).sizes["time"] == 21
 
 
+@pytest.mark.slow
 def test_a_varying_force_beside_a_sampled_controller_varies_between_its_samples_too():
     force = {"offset": 0.1, "amplitude": 0.2, "frequency": 40.0}
     settings = {"environment.fingertip_force_signal.z": force, "controller.sampling.period": 5e-3}

@@ -36,6 +36,7 @@ def fixed(tension, torque=(0.0,) * 4):
     return Own(lambda time, position: ControlSignals(np.array(torque), np.array(tension)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [None, 1e-3])
 def test_a_controller_that_only_knows_one_time_is_asked_time_by_time(period):
     """`if`, `float` and `max` of one time would all fail on an array of times."""
@@ -52,6 +53,7 @@ def test_a_controller_that_only_knows_one_time_is_asked_time_by_time(period):
     assert held.max() > 0.1
 
 
+@pytest.mark.slow
 def test_the_tensions_alone_are_an_answer_of_all_tendons_or_of_the_actuated_ones():
     """The torque that goes with them is H_c^T f of the actuated tendons: 8, 8, 6.3 and 5.3 mm."""
     for size in (4, 5):
@@ -105,6 +107,7 @@ def undisturbed(method, period):
     return fp.simulate(scenario(**settings), controller=Own(lambda time, position: PULL), control_period=period)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Rodas5P", "LSODA", "sampled"])
 @pytest.mark.parametrize(
     ("answer", "said"),
@@ -134,6 +137,7 @@ class Path:
         return ReferenceSignals(np.array(self.position), np.array(self.velocity))
 
 
+@pytest.mark.slow
 def test_a_reference_is_asked_one_time_at_a_time():
     result = fp.simulate(scenario(), reference=Path([0.0, 0.5, 0.5, 0.346]))
     np.testing.assert_array_equal(result.joint_reference, np.broadcast_to([0.0, 0.5, 0.5, 0.346], (21, 4)))
@@ -157,6 +161,7 @@ def test_a_wrong_reference_is_refused_in_one_line(reference, said):
     assert caught.value.entry == "reference"
 
 
+@pytest.mark.slow
 def test_a_result_of_one_s_own_controller_says_so_and_its_folder_promises_no_repetition(tmp_path):
     given = {"controller": fixed(PULL), "reference": Path([0.0, 0.5, 0.5, 0.346])}
     result, plain = fp.simulate(scenario(), **given), fp.simulate(scenario())
@@ -172,6 +177,7 @@ def test_a_result_of_one_s_own_controller_says_so_and_its_folder_promises_no_rep
         assert ("alone it gives another motion" in head) != promised
 
 
+@pytest.mark.slow
 def test_a_result_of_one_s_own_is_not_checked_against_the_scenario_s_controller():
     result = fp.simulate(scenario(), controller=fixed(PULL))
     with pytest.raises(InputError, match="had controller of its own: give the same here"):

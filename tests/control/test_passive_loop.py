@@ -71,6 +71,7 @@ def test_the_minimum_of_the_other_tendons_is_kept_where_the_wish_is_less():
     assert planned(controller).min() == pytest.approx(1.0, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_it_brings_the_delivered_tension_to_the_wish_where_friction_and_other_minima_do_not():
     """The finger is held still against gravity: T5 comes to carry 5 N within 1 %; without the loop it does not."""
     motion = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}

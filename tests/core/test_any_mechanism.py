@@ -20,6 +20,8 @@ from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
 
+pytestmark = pytest.mark.slow
+
 #: Sixth-order central differences: where to look, in steps, and weights.
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0

@@ -79,6 +79,7 @@ def test_a_function_without_a_lasting_identity_runs_all_the_same_and_is_not_kept
     assert code_in(folder) == []
 
 
+@pytest.mark.slow
 def test_only_core_jit_imports_the_compiler():
     """The rest of the package would depend on a version of it, or keep code that does not hold."""
     root = Path(fp.__file__).parent
@@ -172,6 +173,7 @@ def test_code_that_a_broken_disk_has_cut_short_is_compiled_anew(folder, said):
     assert said()[1:] and said()[1].startswith(f"the compile cache {folder} cannot be used: ")
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_named_and_costs_nothing_else(folder):
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))\n"
@@ -195,6 +197,7 @@ def double(address, number):
 """
 
 
+@pytest.mark.slow
 def test_of_processes_that_start_at_once_on_an_empty_folder_one_compiles_and_a_later_one_finds_the_code(
     folder, tmp_path
 ):
@@ -216,6 +219,7 @@ def test_of_processes_that_start_at_once_on_an_empty_folder_one_compiles_and_a_l
     assert (later.stdout, later.stderr) == ("True 43 1\n", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", [1, 2], ids=["the first file", "the last one"])
 def test_a_process_that_is_killed_as_it_puts_code_in_place_leaves_none_that_is_broken(folder, file):
     """The cache writes two files for a function: what code there is, and the code."""
@@ -234,6 +238,7 @@ def test_a_process_that_is_killed_as_it_puts_code_in_place_leaves_none_that_is_b
         assert done.stdout == f"{kept} 43\n"
 
 
+@pytest.mark.slow
 def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
     """With servos, whose laws read loads as NumPy's `load` is called, with objects, and several fingers."""
     code = (
@@ -246,6 +251,7 @@ def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
     assert (done.stdout, done.stderr) == ("", "")
 
 
+@pytest.mark.slow
 def test_importing_the_core_compiles_nothing(tmp_path):
     environment = os.environ | {"FINGER_PIN_CACHE_DIR": str(tmp_path)}
     code = "import finger_pin.core.evaluation.signals, finger_pin.core.stepping.rosenbrock"

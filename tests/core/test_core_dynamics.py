@@ -41,6 +41,7 @@ def parts(value):
     return vars(value) | {name: getattr(value, name) for name in computed}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_the_state_rate_of_the_closed_loop_is_the_readable_one(cases, name):
     """By kind of state; the passive tendon's acceleration is a difference of forces that cancel to 1e-4 of them."""

@@ -131,6 +131,7 @@ def extracted(case: Case, time, x, g):
     return g * np.eye(len(x)) - np.linalg.inv(case.solve(time, x, g)[1][:, :-1])
 
 
+@pytest.mark.slow
 def test_every_block_of_the_jacobian_is_that_of_differences(examined):
     case, found = examined
     for time, x, jacobian, _ in found:

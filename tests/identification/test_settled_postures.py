@@ -56,6 +56,7 @@ def test_springs_come_from_settled_postures_as_linear_regression_has_them(tmp_pa
     assert np.all((result.lower.values < [*SPRING.values()]) & ([*SPRING.values()] < result.upper.values))
 
 
+@pytest.mark.slow
 def test_drawn_in_and_let_out_tell_the_spring_and_the_friction_of_the_canal():
     """The drum rests at k q = r T exp(-mu phi) after drawing in and r T exp(mu phi) after letting out, written out."""
     pull, way = np.tile([2.0, 4.0, 6.0], 2), np.repeat([1.0, -1.0], 3)

@@ -63,6 +63,7 @@ def test_tension_on_a_sticking_tendon_is_damped_by_sigma_1_and_the_normal_force_
     assert np.abs(speed[:2]).min() > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", ["reversals", "stick_slip"])
 def test_a_motion_with_the_options_agrees_between_integrators_and_closes_its_energy_account(scenario):
     results = [

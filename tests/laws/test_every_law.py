@@ -25,6 +25,7 @@ def along(function, row, name):
     return [np.imag(np.broadcast_to(each, COUNT)) / STEP for each in stepped]
 
 
+@pytest.mark.slow
 def test_compiled_laws_allocate_no_memory(monkeypatch):
     """Numba makes arrays of numbers where `np.where` chooses between them, half as much again of a servo's cost."""
     compiled = {}

@@ -90,6 +90,7 @@ def test_below_its_level_coulomb_friction_creeps_where_bristles_hold():
     np.testing.assert_allclose(joints.friction, share * 2e-3 * joints.reaction, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_compiled_and_the_readable_path_agree_on_every_law(own):
     drag = {"drag": 2e-3}
     for law, more in (("lugre", drag), ("dahl", drag), ("coulomb", drag), ("laws_of_mine:SOFT", {})):

@@ -127,6 +127,7 @@ def test_the_fingertip_is_where_the_whole_hand_has_it(finger, hand, posture):
         np.testing.assert_allclose(finger.rigid_body.tip_position(rows), expected, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_along_the_motion_the_whole_hand_needs_just_the_torques_that_the_finger_reports(finger, hand, posture, motion):
     times, x, _ = motion
     data = hand.createData()

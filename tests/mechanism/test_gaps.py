@@ -29,6 +29,7 @@ def half_rounding(p):
     return 0.5 * (p[:, 0] + p[:, 8])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "part"), PAIRS)
 def test_distances_are_those_of_coal_on_ten_thousand_random_pairs(shape, part):
     """550 of each kind; of what reaches into the other body's core but for points, coal alone knows how deep it is.

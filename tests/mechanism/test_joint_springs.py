@@ -40,6 +40,7 @@ def test_springs_enter_the_equation_of_motion_as_a_torque_against_the_joint(spru
         np.testing.assert_allclose(sprung.evaluate(x, command).spring_torque, torque, rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_link_on_a_spring_swings_with_the_period_of_a_torsion_pendulum(network):
     """Free of gravity, tension and friction but for the floors of law (9): omega^2 = k / (I + m c^2)."""
     length, mass, inertia = 0.05, 0.012, 3e-6

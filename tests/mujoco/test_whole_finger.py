@@ -13,6 +13,7 @@ from finger_pin.mujoco import add_friction, friction
 DURATION = 0.06
 
 
+@pytest.mark.slow
 def test_the_paper_s_finger_in_mujoco_nears_our_motion_at_the_first_order_of_its_step(monkeypatch):
     monkeypatch.setattr(mujoco_motion, "DURATION", DURATION)
     settings = {"duration": DURATION, "rtol": 1e-9, "atol_scale": 1e-10, "sample_rate": 1000.0}

@@ -47,6 +47,7 @@ def steps_of(table, tolerance):
         return fp.simulate(fp.Scenario.model_validate(table)).attrs["solver_steps"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limiter", [{"stiffness": 500.0, "damping": 100.0}, {"stiffness": 5e4, "damping": 10.0}])
 @pytest.mark.parametrize("pull", [0.3, 0.9])
 def test_a_looser_tolerance_never_costs_more_where_a_joint_creeps_out_of_its_limiter(limiter, pull):
@@ -64,6 +65,7 @@ def test_a_loop_that_diverges_is_stopped_with_the_speed_that_says_so():
         fp.simulate(fp.Scenario.model_validate(table))
 
 
+@pytest.mark.slow
 def test_the_estimated_error_of_the_main_job_has_the_size_of_its_error_and_is_in_the_summary(fig6_runs):
     result = fig6_runs["Rodas5P"]
     tight = {"simulation.duration": 0.1, "simulation.rtol": 1e-10, "simulation.atol_scale": 1e-10}

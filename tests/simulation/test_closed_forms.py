@@ -8,6 +8,7 @@ from validation import closed_forms, symmetry
 from validation.closed_forms import SLIDING, one_joint, slide
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1, 2])
 @pytest.mark.parametrize("micro", [0.0, 2.0])
 @pytest.mark.parametrize(("velocity", "sign"), [(1e-3, -1.0), (-1e-3, 1.0)])
@@ -18,12 +19,14 @@ def test_pulling_and_releasing_lose_tension_by_the_capstan_law(velocity, sign, e
     assert closed_forms.capstan_tension(velocity) == pytest.approx(5.0 * math.exp(sign * 0.3 * 1.3), rel=1e-15)
 
 
+@pytest.mark.slow
 def test_the_hysteresis_loop_of_a_tendon_is_twice_the_tension_times_sinh_wide():
     """Back and forth under constant actuator force: tensions f exp(-mu_e phi) and f exp(mu_e phi)."""
     pulled, released = closed_forms.hysteresis()
     assert released.tension - pulled.tension == pytest.approx(2.0 * 5.0 * math.sinh(0.3 * 1.3), rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1.0, 1.5, 2.0])
 def test_a_tendon_breaks_away_at_rho_times_its_sliding_friction_for_its_normal_force(ratio):
     """Friction over normal force: rho mu^d far below the Stribeck velocity, mu^d far above it."""

@@ -20,6 +20,8 @@ from finger_pin.views.plots.saving import draw_all, figures_of
 from finger_pin.views.summary import summarize
 from finger_pin.views.viewer import write_animation, write_video
 
+pytestmark = pytest.mark.slow
+
 SERVO = {"motor": "XL330-M288", "spool_radius": 0.005}
 FAR, NEAR, BESIDE = ({"shape": "sphere", "radius": 0.008, "position": [0.3, 0.3, z]} for z in (-0.4, -0.3, 0.0))
 SWING = {"amplitude": 0.003, "frequency": 5.0}

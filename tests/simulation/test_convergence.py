@@ -15,6 +15,8 @@ from finger_pin.simulation.convergence import tightened
 from finger_pin.views import plots
 from finger_pin.views.summary import summarize
 
+pytestmark = pytest.mark.slow
+
 SHORT = {"simulation.duration": 0.3}
 #: A stiff loop on joints with twice the friction at which this finger would lock itself, and six times its own.
 HUNTING = {

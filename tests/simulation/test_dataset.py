@@ -45,6 +45,7 @@ def result(request, fig6_runs):
     return fig6_runs[request.param]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTERFACE)
 def test_the_dataset_has_every_variable_of_the_interface(result, name):
     dims, unit = INTERFACE[name]

@@ -65,6 +65,7 @@ def test_the_account_of_the_hard_case_closes():
     assert float(abs(result.energy_residual).max()) < 1e-5 * float(result.energy_exchanged_actuators.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Rodas5P", "Rodas4", "BDF"])
 def test_the_residual_shrinks_with_the_tolerance(method):
     residuals = []
@@ -212,6 +213,7 @@ def double_pendulum(_, y):
     return [w1, rate2, e1, e2 - e1]
 
 
+@pytest.mark.slow
 def test_with_everything_off_the_planar_finger_is_a_double_pendulum_that_keeps_its_energy():
     finger = fp.Finger(fp.load_finger("planar", OFF))
     start = finger.rest_state(np.array([0.3, 0.5]))

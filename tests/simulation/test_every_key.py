@@ -238,6 +238,7 @@ def tried(scenario, part):
         yield key, next(each for each in ("acts", "nothing", "refused") if each in found), path
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("part", PARTS)
 def test_every_number_acts_is_refused_or_has_a_reason_to_do_nothing(part):

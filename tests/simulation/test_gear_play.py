@@ -16,6 +16,7 @@ def loose(gap, **actuator):
     return finger(motor, opposed=True, drive="position", pretension=3.0, **actuator)
 
 
+@pytest.mark.slow
 def test_a_spool_behind_play_moves_between_cords_and_flanks_as_scipy_has_it():
     """J_s s'' = T - r (f1 - f2), J_r m'' = tau - T; T from flanks of 10 sigma_0 that only push, J_s a 1e-4 of J."""
     gap, flank, rebound, spool = 0.05, 500.0, 1.0, 1e-4 * INERTIA

@@ -33,6 +33,7 @@ def in_the_world(result, name):
     return place, turned * Rotation.from_quat(result.object_orientation.sel(object=name).values)
 
 
+@pytest.mark.slow
 def test_the_table_stays_behind_and_the_cylinder_is_lifted_off_it_by_ten_centimetres(grasp):
     height = in_the_world(grasp, "cylinder")[0][:, 2]
     assert height[LIFTED] - height[0] == pytest.approx(0.1, abs=1e-3)
@@ -76,6 +77,7 @@ def test_friction_alone_carries_the_cylinder_once_it_is_lifted(grasp):
     assert holding == {"thumb", "index", "middle", "ring", "little"}
 
 
+@pytest.mark.slow
 def test_without_friction_the_cylinder_stays_on_the_table():
     slippery = run(**{"environment.objects.cylinder.surface.friction": 0.0})
     height = in_the_world(slippery, "cylinder")[0][:, 2]

@@ -62,6 +62,7 @@ def test_the_account_of_a_hand_is_the_sum_of_its_fingers(scenario, result):
     assert float(abs(result.energy_residual).max()) < 1e-5 * exchanged
 
 
+@pytest.mark.slow
 def test_the_textbook_evaluation_gives_the_signals_of_the_compiled_hand(scenario, result):
     """Radau on NumPy and Pinocchio, for a hundredth of a second."""
     short = fp.load_scenario("hand", {"simulation.duration": 0.002, "simulation.method": "Radau"})

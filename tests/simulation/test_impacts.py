@@ -9,6 +9,7 @@ import finger_pin as fp
 from finger_pin.views.summary import summarize
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "seed"), [("drops", 11), ("pinch", 9)])
 def test_the_estimate_carries_what_an_impact_multiplies(family, seed):
     """Nearly all of their error comes from kinks: contacts that close and open, stick and slip."""

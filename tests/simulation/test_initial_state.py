@@ -81,6 +81,7 @@ FEATURES = {
 CASES = {name: (name, {}, "velocity") for name in list_scenarios()} | FEATURES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "overrides", "block"), CASES.values(), ids=CASES)
 def test_every_number_of_the_state_is_read_from_a_result(name, overrides, block):
     """Against the packed state of the integrator itself."""
@@ -97,6 +98,7 @@ def test_every_number_of_the_state_is_read_from_a_result(name, overrides, block)
     np.testing.assert_allclose(found, x, rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("feature", ["passive tendon's hysteresis", "elastic tendons' hysteresis", "position loops"])
 @pytest.mark.parametrize("parts", [(0.05, 0.05), (0.0505, 0.0495)], ids=["aligned", "between samples"])
 def test_two_runs_one_after_the_other_are_one(feature, parts):

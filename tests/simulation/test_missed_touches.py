@@ -58,6 +58,7 @@ def test_a_ball_dropped_on_a_shelf_bounces_back_to_where_it_came_from(tolerance)
     assert height == pytest.approx(expected, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stiffness", "mass", "tolerance"), [(1e9, 1e-3, 1e-3), (1e4, 1e-12, 1e-6)])
 def test_no_impact_is_swallowed_however_short(stiffness, mass, tolerance):
     """Without gravity meanwhile m v dv = -k d (1 + c v) dd, so that v / c - ln(1 + c v) / c^2 is as before."""

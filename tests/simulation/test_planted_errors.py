@@ -50,6 +50,7 @@ def loop():
     return ClosedLoop.from_scenario(fp.load_scenario("reversals", settings))
 
 
+@pytest.mark.slow
 def test_the_account_of_the_loop_to_be_tampered_with_closes(loop):
     assert share_left_open(loop) < 1e-5
 
@@ -114,6 +115,7 @@ def wrong_command(monkeypatch):
     monkeypatch.setattr(controller_block, "proportional_torque", lambda gain, reference, q: gain * (q - reference))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "plant",
     [
