@@ -33,6 +33,7 @@ def found(data, parameters=BOUNDS, **more):
     return fp.identify("canal", parameters=parameters, **given)
 
 
+@pytest.mark.slow
 def test_sixty_real_readings_give_the_published_friction_and_reject_the_capstan_alone():
     """E. Broge's readings: a straight line through them has 0.7496 F - 0.559 N and leaves 0.189 N rms."""
     result = fp.identify("transmission")
@@ -82,6 +83,7 @@ def test_intervals_without_profiles_are_those_of_the_variance_of_a_regression(re
     assert "those of slopes at the estimate" in summarize_identification(result)
 
 
+@pytest.mark.slow
 def test_95_percent_intervals_hold_the_truth_that_often():
     rng, held = np.random.default_rng(11), []
     for _ in range(40):
@@ -144,6 +146,7 @@ def test_wrong_benches_are_refused_in_one_line(change, said):
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 def test_weights_on_a_servo_tell_what_its_gears_lose_either_way():
     """Written out by hand: 12 mN m, 4.6 mN m s/rad, 0.22 lifting, 0.08 letting down, a noise of 4 mA."""
     result = fp.identify("weights", starts=1)
@@ -155,6 +158,7 @@ def test_weights_on_a_servo_tell_what_its_gears_lose_either_way():
     assert np.diff(result.law_bic)[0] > 50.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", ["soft_l1", "huber", "cauchy", "arctan"])
 def test_outliers_count_less_under_a_loss_that_is_robust(loss):
     clean = readings(np.random.default_rng(9))
@@ -191,6 +195,7 @@ def test_a_loss_that_is_none_is_refused():
         found(readings(np.random.default_rng(9)), loss="square")
 
 
+@pytest.mark.slow
 def test_the_current_and_the_angle_of_a_servo_against_a_spring_tell_the_same():
     """Integrated apart from the package: 12 mN m, 4.6 mN m s/rad, 0.22 in, 0.08 out; noise 1 mrad, 4096 steps."""
     result = fp.identify("winding", starts=1)
@@ -200,6 +205,7 @@ def test_the_current_and_the_angle_of_a_servo_against_a_spring_tell_the_same():
     assert np.diff(result.law_bic)[0] > 50.0
 
 
+@pytest.mark.slow
 def test_few_searches_that_agree_are_said_before_the_numbers(tmp_path):
     result = found(readings(np.random.default_rng(2)), starts=3)
     assert (result.attrs["searches"], result.attrs["searches_alike"]) == (3, 3)
@@ -211,6 +217,7 @@ def test_few_searches_that_agree_are_said_before_the_numbers(tmp_path):
     assert page.index("Do not trust these intervals") < page.index("estimate")
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path):
     data, asked, before = readings(np.random.default_rng(2)), [], []
     whole = found(data, starts=3, stop=lambda: bool(before.append(0)))
@@ -242,6 +249,7 @@ def test_a_search_that_is_interrupted_goes_on_from_where_it_was(tmp_path):
     assert np.abs(reached[0] / whole.estimate.values - 1.0).max() > 0.01
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page_and_a_scenario_with_the_numbers_found(tmp_path, capsys):
     folder = tmp_path / "out"
     assert run("identify", ["transmission", "--output", str(folder), "--starts", "1"]) == 0

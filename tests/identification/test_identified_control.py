@@ -59,6 +59,7 @@ def test_what_a_finger_under_control_tells_to_a_hundredth_has_nearly_the_interva
         assert np.all(np.abs(end - line).values < 0.1 * width)
 
 
+@pytest.mark.slow
 def test_profiles_follow_a_likelihood_that_errors_of_runs_do_not_make_jump():
     """Every run has steps of its own; over a part of an interval so small the likelihood is a straight line."""
     entries, data = under_control(4.0)
@@ -73,6 +74,7 @@ def test_profiles_follow_a_likelihood_that_errors_of_runs_do_not_make_jump():
     assert jumps[1] < max(0.5 * jumps[0], 0.01)
 
 
+@pytest.mark.slow
 def test_coulomb_and_stiction_of_joints_are_found_together_though_their_bounds_overlap():
     base = fp.load_scenario("reversals", {"simulation.duration": 1.0, "simulation.sample_rate": 100.0})
     truth = {JOINT_COULOMB: 4e-4, JOINT_STICTION: 7e-4}

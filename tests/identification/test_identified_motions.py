@@ -45,6 +45,7 @@ MOTION = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [{}, {"window": 1.0}, {"start": "found"}], ids=["whole", "windows", "start found"])
 def test_a_recorded_motion_gives_the_friction_that_it_was_made_with(more):
     truth = {COULOMB: 0.15, DRAG: 0.5}
@@ -67,6 +68,7 @@ def test_a_finger_of_ones_own_is_identified_with_the_rows_that_it_has():
     np.testing.assert_allclose(result.noise, [0.03, 2e-3], rtol=0.2)
 
 
+@pytest.mark.slow
 def test_estimates_from_motions_scatter_about_the_truth_as_their_intervals_say():
     truth, rows = np.array([0.15, 0.5]), []
     for seed in range(100, 112):
@@ -80,6 +82,7 @@ def test_estimates_from_motions_scatter_about_the_truth_as_their_intervals_say()
     assert np.all(np.abs(away.mean(axis=0)) < 3.0 / np.sqrt(12.0))
 
 
+@pytest.mark.slow
 def test_two_recordings_with_gaps_share_the_friction_and_go_on_after_an_interruption(tmp_path):
     """A third of the samples is missing in one; the other is another pull of the same canal."""
     rng, truth, asked, before = np.random.default_rng(12), [0.15, 0.5], [], []

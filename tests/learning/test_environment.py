@@ -26,6 +26,7 @@ def tip_height(signals):
     return signals["fingertip_position"][..., 2]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*Box (action|observation) space")
 @pytest.mark.parametrize("name", ["Reach", "Press", "Grasp"])
 def test_gymnasium_accepts_what_ships(name):

@@ -56,6 +56,7 @@ def test_runs_that_all_fail_are_an_error_that_holds_what_was_computed(monkeypatc
     assert np.isfinite(caught.value.result.joint_position.values[:, :5]).all()
 
 
+@pytest.mark.slow
 def test_what_only_some_runs_have_is_nan_in_the_others_and_said() -> None:
     names = ("reversals", "servo", "press")
     runs = [fp.load_scenario(name, {"simulation.duration": 5e-3, "simulation.sample_rate": 1e3}) for name in names]

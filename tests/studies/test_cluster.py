@@ -36,6 +36,7 @@ def executor(cluster):
         yield client.get_executor(pure=False)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_no_run_and_doubles_none_and_all_are_those_of_threads(cluster, executor, tmp_path):
     victim = cluster.workers[0].pid
     seen = []
@@ -58,6 +59,7 @@ def test_a_killed_worker_costs_no_run_and_doubles_none_and_all_are_those_of_thre
     assert away.identical(here)
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_workers_is_recorded_with_its_reason(cluster, executor):
     with distributed.Client(cluster) as client:
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 1))
@@ -114,6 +116,7 @@ def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, caps
     assert "2 runs: 2 done" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "not an address"])
 def test_a_scheduler_that_is_not_there_is_told_in_one_line(address, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

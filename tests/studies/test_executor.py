@@ -159,6 +159,7 @@ def test_an_executor_that_has_been_shut_down_is_named_in_one_line(study):
         STUDIES[study](**asked)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_a_stop_ends_what_other_processes_run_and_no_more_is_begun(tmp_path, method, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -191,6 +192,7 @@ print(result["doubled"].values, end="")
 """
 
 
+@pytest.mark.slow
 def test_what_is_typed_works_without_a_guard_and_with_a_metric_of_its_own(tmp_path):
     settings = {"cwd": tmp_path, "capture_output": True, "text": True, "timeout": 100, "env": os.environ}
     ended = subprocess.run([sys.executable, "-"], input=SWEEP, **settings)

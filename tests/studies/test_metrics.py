@@ -116,6 +116,7 @@ def test_a_design_beyond_self_locking_is_measured_without_a_warning():
     assert METRICS["tension_peak"].measure(Run(scenario)) > 0.0
 
 
+@pytest.mark.slow
 def test_the_hysteresis_of_a_fingertip_is_the_chord_between_its_two_ways():
     """One joint turns by 0.05 rad less than it is told to, either way: 2 L sin(0.05) at the end of three links."""
     run, time, behind = Run(fp.load_scenario("reversals")), np.linspace(0.0, 4.0, 4001), 0.05

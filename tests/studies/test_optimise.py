@@ -81,6 +81,7 @@ def test_no_other_design_is_better_than_one_that_is_not_dominated():
     assert nondominated(values).tolist() == [True, True, True, True, False, False, False]
 
 
+@pytest.mark.slow
 def test_a_search_finds_the_front_of_a_problem_whose_front_is_known():
     # Binh and Korn, 1997: minimise 4 x^2 + 4 y^2 and (x - 5)^2 + (y - 5)^2 for x in [0, 5], y in [0, 3], within two
     # circles. Its front is x = y up to 3, and y = 3 beyond.

@@ -16,6 +16,7 @@ QUICK = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("default:out/runs.jsonl")
 def test_a_search_goes_on_from_what_a_kill_leaves_and_ends_with_the_same_front(script, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -140,6 +140,7 @@ def test_a_sweep_whose_runs_all_fail_is_an_error_that_holds_their_reasons(tmp_pa
     assert fp.load(tmp_path / "sweep.nc").identical(caught.value.result)
 
 
+@pytest.mark.slow
 def test_names_and_switches_are_swept_like_numbers(tmp_path):
     over = {"simulation.method": ["Rodas4", "Rodas5P"], "controller.gravity_compensation": [True, False]}
     result = fp.sweep("reversals", over, metrics=["tracking_rms"], overrides=SHORT, output=tmp_path, executor=TWO)
