@@ -63,7 +63,7 @@ def test_a_rejected_step_leaves_no_trace(cases, method, touching):
     x = case.loop.initial_state()
     if touching:
         x[1] += 0.37
-        x += 1e-3 * np.random.default_rng(2).normal(size=x.shape)
+        x += 1e-5 * np.random.default_rng(2).normal(size=x.shape)
     tried = case.part(method, x=x, step=0.5)
     record = tried.room(1)
     assert tried.advance(1.0, record) == (integration.FULL, 1)

@@ -96,7 +96,7 @@ def test_settings_of_one_finger_are_its_own_and_the_others_keep_theirs():
     assert changed.hand.fingers["ring"].finger == fp.load_finger("dexmart_index")
     assert joints["little.distal"].link.mass == pytest.approx(0.5**3 * 0.0038)
     assert joints["little.distal"].link.inertia[1] == pytest.approx(0.5**5 * 2.0e-7)
-    assert changed.finger.tendons["little.T3"].crossings["little.medial"].radius == pytest.approx(0.5 * 0.0063)
+    assert changed.finger.tendons["little.T3"].crossings["little.medial"].radius == pytest.approx(0.5 * 0.0053)
     assert changed.reference.joints["index.medial"].amplitude == 0.2
     again = fp.Scenario.model_validate(tomllib.loads(fp.to_toml(changed)))
     assert again == changed

@@ -32,7 +32,7 @@ TIGHT = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
         (
             "press",
             LED,
-            ["environment.objects.plate.surface.friction", "finger.tendon_friction.coulomb"],
+            ["environment.objects.plate.surface.friction", "finger.tendon_friction.coulomb[2,3,4]"],
             VARIABLES,
             2e-3,
         ),
@@ -70,7 +70,9 @@ def test_a_loop_with_an_encoder_that_rounds_feels_a_parameter_as_one_that_reads_
 
 def test_differences_on_the_same_steps_and_branches_do_not_depend_on_the_change():
     # Before 0.7 s the pad touches; one that touches a little later or not yet must not differ by a leap.
-    prepared = fp.prepare(fp.load_scenario("press", {"simulation.duration": 0.7}), ["finger.tendon_friction.coulomb"])
+    prepared = fp.prepare(
+        fp.load_scenario("press", {"simulation.duration": 0.7}), ["finger.tendon_friction.coulomb[2,3,4]"]
+    )
     (value,) = prepared.values
     trajectory = Setup.of(prepared.scenario()).integrate()
     changes = value * np.array([0.0, -1e-6, -1e-7, 1e-7])
@@ -139,7 +141,7 @@ def test_of_a_sampled_controller_they_are_the_differences_of_tight_runs_too():
 
 def test_of_a_hand_whose_controller_is_sampled_every_finger_keeps_steps_of_its_own():
     entries = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0, "controller.sampling": {"period": 5e-3}}
-    keys = ["hand.fingers.index.finger.tendon_friction.coulomb"]
+    keys = ["hand.fingers.index.finger.tendon_friction.coulomb[2,3,4]"]
     prepared, exact = (
         fp.prepare(fp.load_scenario("hand", entries | more), keys, ["joint_position"]) for more in ({}, TIGHT)
     )
@@ -152,7 +154,7 @@ def test_of_a_hand_whose_controller_is_sampled_every_finger_keeps_steps_of_its_o
 
 def test_each_finger_of_a_hand_feels_numbers_of_its_own_alone():
     entries = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0}
-    keys = [f"hand.fingers.{name}.finger.tendon_friction.coulomb" for name in ("middle", "thumb")]
+    keys = [f"hand.fingers.{name}.finger.tendon_friction.coulomb[2,3,4]" for name in ("middle", "thumb")]
     prepared, exact = (
         fp.prepare(fp.load_scenario("hand", entries | more), keys, ["joint_position"]) for more in ({}, TIGHT)
     )

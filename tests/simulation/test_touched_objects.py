@@ -28,10 +28,7 @@ position = [0.0, 0.0, -0.03]
 
 @pytest.fixture(scope="module")
 def pressed():
-    # What slips and sticks multiplies small errors, as far as a linearised flow shows, beyond all bounds.
-    result = fp.simulate(fp.load_scenario("press", {"simulation.duration": 3.0}))
-    assert "the error of the run was not judged: small errors grow" in result.attrs["accuracy"]
-    return result
+    return fp.simulate(fp.load_scenario("press", {"simulation.duration": 3.0}))
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +80,7 @@ def test_what_pushes_back_loads_every_joint_as_the_same_force_at_the_fingertip_w
     """(17) knows of a force beyond a joint, not of where it acts."""
     at = pressed.isel(time=1200)
     assert float(at.contact_normal_force.max()) > 0.5
-    plain = fp.load_scenario("reversals")
-    finger = fp.Finger(plain.finger)
+    finger = fp.Finger("ub")
     x = finger.rest_state(at.joint_position.values, at.joint_velocity.values)
     state = finger.layout.unpack(x)
     state.passive_position[:] = at.passive_position.values
