@@ -10,6 +10,8 @@ import matplotlib.pyplot as plt
 import mujoco
 import numpy as np
 import pytest
+import test_every_law
+from law_cases import random_parameters, random_rows
 
 import finger_pin as fp
 
@@ -41,6 +43,22 @@ def test_an_own_finger_weighs_what_levers_say(example):
     lever = 0.015 * 0.025 + 0.008 * (0.05 + 0.015)
     np.testing.assert_allclose(names["weight"], [9.81 * lever, 9.81 * 0.008 * 0.015], rtol=1e-9)
     assert names["error"] < 0.5
+
+
+def test_a_canal_warms_by_what_friction_takes_and_a_warm_one_delivers_more(example):
+    """C dT = K x (exp(mu_e phi (1 - FALL T)) - 1) dx, separated; by the capstan law at the temperature at the end."""
+    names = example("warm_cord")
+    result, temperature = names["warmed"], names["temperature"]
+    np.testing.assert_allclose(temperature, names["expected"], atol=0.1)
+    assert float(temperature[-1]) > 30.0
+    rng = np.random.default_rng(5)
+    for law in (names["WARM"], names["HEAT"]):
+        drawn = law, random_rows(rng, test_every_law.COUNT), random_parameters(law, rng, test_every_law.COUNT)
+        test_every_law.test_slopes_are_the_derivatives_of_the_value(drawn)
+    turned = names["COULOMB"] * (1.0 - names["FALL"] * float(temperature[-1])) * names["turn"]
+    assert float(result.tendon_tension[-1, 0] / result.tendon_command[-1, 0]) == pytest.approx(
+        np.exp(-turned), rel=1e-3
+    )
 
 
 def test_measured_friction_is_that_of_a_straight_line_through_the_readings(example):

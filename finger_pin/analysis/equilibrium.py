@@ -171,7 +171,7 @@ def _refuse_restless(finger: Finger) -> None:
     """Refuse a finger that is no single one, or has parts whose rest inputs alone do not say."""
     description, tables = finger.description, finger.mechanism.rows
     driven = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
-    own = any(table.states for table in finger.constructor_args[1])
+    own = any(table.states for table in finger.constructor_args.rows)
     free = finger.layout.names_of("object_pose")
     refused = {
         "several fingers": description.hand is not None,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.buffers import Linear, Work, build_linear, build_work
+from finger_pin.core.buffers import Work, build_work
 from finger_pin.core.evaluation.condensation import condense
 from finger_pin.core.evaluation.contacts import add_pushes, fill_contact_gains, measure
 from finger_pin.core.evaluation.dynamics import evaluate, exert
@@ -19,6 +19,7 @@ from finger_pin.core.evaluation.paths import look
 from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
 from finger_pin.core.inputs import InputTable, held_control
 from finger_pin.core.jit import call, copied, nothing, pack
+from finger_pin.core.linear_systems import Linear, build_linear
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.tables import Tables
 from finger_pin.core.threads import in_threads, threads

@@ -8,7 +8,18 @@ import numpy as np
 
 from finger_pin.core.bound_models import FEW, Models, SignalBuffer, fill, path_motions, rows_of
 from finger_pin.core.evaluation.attitude_charts import Charts
-from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
+from finger_pin.core.evaluation.law_code import (
+    COMMAND,
+    CURVATURE,
+    FORCE,
+    LENGTH,
+    LOAD,
+    RATE,
+    READING,
+    SIGNALS,
+    SPEED,
+    STATE,
+)
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
@@ -105,9 +116,8 @@ class CompiledMechanism:
                 found[table.group] = RowSignals(table, None, own[0], own[0, ..., :0], ())
                 continue
             stateful = np.arange(table.count) % arms > 0 if arms > 1 else slice(None)
-            seen = table.law.sees(
-                own[LENGTH], own[SPEED], own[STATE][..., stateful], *(own[c] for c in (LOAD, COMMAND, CURVATURE))
-            )
+            others = (own[column] for column in (LOAD, COMMAND, CURVATURE, READING))
+            seen = table.law.sees(own[LENGTH], own[SPEED], own[STATE][..., stateful], *others)
             shown = tuple(own[SIGNALS + i, ..., ::arms] for i in range(len(table.law.signals)))
             found[table.group] = RowSignals(table, seen, own[FORCE], own[RATE][..., stateful], shown)
         return Evaluation(

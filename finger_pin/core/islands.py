@@ -64,6 +64,7 @@ def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> 
     for start in (tables.input_start, tables.load_start):
         owners = np.repeat(np.arange(count), np.diff(start))
         links.append((row_at + owners, row_at + tables.terms[start[0] : start[-1]]))
+    links.append((row_at + tables.read_row, row_at + tables.state_row[tables.read_at]))
     if planned:
         tensions, read = np.nonzero(_reads(control))
         links.append((loop_at + control.loop[tensions], read))
@@ -87,7 +88,7 @@ def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> 
             Island(
                 coordinates=np.flatnonzero(labels[:width] == label),
                 rows=rows,
-                states=states[states >= 0],
+                states=np.sort(states[states >= 0]),
                 # What nobody reads is the first one's.
                 channels=np.union1d(fed[fed >= 0], unread if not found else []).astype(np.int64),
                 planned=np.flatnonzero(labels[loop_at + control.loop] == label)
@@ -136,7 +137,9 @@ class Selection:
         part.keep("state", island.states, len(tables.state_row))
         part.keep("input row", np.flatnonzero(np.isin(tables.input_rows, rows)), len(tables.input_rows))
         part.keep("channel", island.channels, 1 + max(tables.channel.max(initial=-1), island.channels.max(initial=-1)))
-        for entries in ("arm", "bend", "term"):
+        read = tables.read_states
+        part.keep("read state", np.flatnonzero(np.isin(read, island.states)), len(read))
+        for entries in ("arm", "bend", "term", "reading"):
             part.keep_entries(tables, entries)
         part.keep("path", np.flatnonzero(np.isin(paths.rows, rows)), len(paths.rows))
         part.keep_entries(paths, "leg")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.buffers import Linear, Work
+from finger_pin.core.buffers import Work
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import StructType, Vector
+from finger_pin.core.linear_systems import Linear
 from finger_pin.core.tables import Tables
 
 

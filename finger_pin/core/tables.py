@@ -7,13 +7,13 @@ from typing import Annotated, Any, NamedTuple, NoReturn
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains, read_chains, tree_arrays, weighed
-from finger_pin.core.evaluation.law_code import addresses, kink_column
+from finger_pin.core.evaluation.law_code import addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.core.path_tables import Paths, reached, read_paths
+from finger_pin.core.row_tables import row_arrays
 from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody, Topology
@@ -67,6 +67,12 @@ class Tables(NamedTuple):
         load_start: First index of the terms of its load, shape (K + 1,).
         terms: Earlier rows, shape (terms,).
         weights: Their weights, shape (terms,).
+        read_start: First index of the states that a row reads, shape (K + 1,).
+        read_at: Their indices in z, shape (readings,).
+        read_row: The row, shape (readings,).
+        read_weight: Their weights, shape (readings,).
+        read_states: States that any row reads, shape (R,).
+        read_place: Of every state its place among these, -1 for none, shape (states,).
         joint_pin: The body whose pin the row is, -1 for none, shape (K,).
         supported_by: One where a force at a tip passes the pin of a body, shape (t, n).
         bend_start: First index of the row's bends, shape (K + 1,).
@@ -112,6 +118,12 @@ class Tables(NamedTuple):
     load_start: Annotated[Indices, along("row", starts="term")]
     terms: Annotated[Indices, along("term", of="row")]
     weights: Annotated[Vector, along("term")]
+    read_start: Annotated[Indices, along("row", starts="reading")]
+    read_at: Annotated[Indices, along("reading", of="state")]
+    read_row: Annotated[Indices, along("reading", of="row")]
+    read_weight: Annotated[Vector, along("reading")]
+    read_states: Annotated[Indices, along("read state", of="state")]
+    read_place: Annotated[Indices, along("state", of="read state")]
     joint_pin: Annotated[Indices, along("row", of="body")]
     supported_by: Annotated[Matrix, along("tip", "body")]
     bend_start: Annotated[Indices, along("row", starts="bend")]
@@ -184,8 +196,13 @@ def _of_paths(legs: tuple[tuple[Any, ...], ...], topology: Topology, chains: Cha
     return read_paths([path for each in legs for path in each], chains)
 
 
+def _wired(mechanism: Mechanism, _: Chains) -> tuple[Any, ...]:
+    states = tuple(each.start for each in mechanism.states)
+    return (mechanism.body.topology, states, *(each.structure.structure_key for each in mechanism.rows))
+
+
 # Inertias and parameters of laws change from run to run; how rows are wired seldom does.
-@memoised(lambda mechanism, _: (mechanism.body.topology, *(each.structure.structure_key for each in mechanism.rows)))
+@memoised(_wired)
 def _of_rows(mechanism: Mechanism, chains: Chains) -> dict[str, Any]:
     """Return laws, states, wiring, arms and paths of the rows."""
     rows, count = mechanism.rows, sum(table.count for table in mechanism.rows)
@@ -193,107 +210,6 @@ def _of_rows(mechanism: Mechanism, chains: Chains) -> dict[str, Any]:
     paths = _of_paths(legs, mechanism.body.topology, chains)
     return {
         "laws": np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
-        "energies": _energies(mechanism),
         "paths": paths,
-        **_of_states(mechanism, count),
-        **_of_wiring(mechanism, count),
-        **_of_arms(mechanism, reached(paths, count, mechanism.coordinates)),
+        **row_arrays(mechanism, reached(paths, count, mechanism.coordinates)),
     }
-
-
-def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
-    """Return the states and contacts among the rows."""
-    rows = mechanism.rows
-    ends = np.cumsum([0, *(table.count for table in rows)])
-    state, touch = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    for table, own, begin, end in zip(rows, mechanism.states, ends[:-1], ends[1:], strict=True):
-        stateful = np.arange(begin, end)
-        if table.law.arms > 1:
-            touch[begin:end] = 2
-            touch[begin : end : table.law.arms] = 1
-            stateful = stateful[touch[begin:end] == 2]
-        if table.states:
-            state[stateful] = np.arange(own.start, own.stop)
-    return {
-        "state": state,
-        "state_row": np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
-        "touch": touch,
-        "contact_rows": int(np.count_nonzero(touch)),
-    }
-
-
-def _of_wiring(mechanism: Mechanism, count: int) -> dict[str, Any]:
-    """Return the wiring of rows: inputs and loads by earlier ones, from outside, and as pins."""
-    rows, ends = mechanism.rows, np.cumsum([0, *(table.count for table in mechanism.rows)])
-    first_row = {table.group: int(begin) for table, begin in zip(rows, ends[:-1], strict=True)}
-    first_body = [*(int(joint.idx_v) for joint in mechanism.body.model.joints[1:]), -1]
-    terms: list[int] = []
-    weights: list[float] = []
-    starts: list[list[int]] = []
-    for wiring in ("inputs", "loads"):
-        starts.append([len(terms)])
-        for table in rows:
-            weighted = getattr(table, wiring)
-            if not weighted:
-                starts[-1] += [len(terms)] * table.count
-                continue
-            for k in range(table.count):
-                for group, matrix in weighted.items():
-                    found = np.flatnonzero(matrix[k])
-                    terms.extend(first_row[group] + found)
-                    weights.extend(matrix[k, found])
-                starts[-1].append(len(terms))
-    channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
-    groups = [
-        (begin, end, bool(table.inputs), bool(table.loads) or np.any(table.pins >= 0), kink_column(table.law))
-        for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
-    ]
-    return {
-        "groups": np.array(groups, dtype=np.int64).reshape(-1, 5),
-        "channel": channel,
-        "input_rows": np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
-        "input_start": np.array(starts[0], dtype=np.int64),
-        "load_start": np.array(starts[1], dtype=np.int64),
-        "terms": np.array(terms, dtype=np.int64),
-        "weights": np.array(weights, dtype=float),
-        "joint_pin": np.array([first_body[pin] for table in rows for pin in table.pins], dtype=np.int64),
-    }
-
-
-def _of_arms(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return the entries of arms, measures and bends that are not zero, or depend on paths."""
-    rows, none = mechanism.rows, np.zeros((0, mechanism.coordinates))
-    arm, measure, bends = (
-        np.concatenate([none, *(getattr(table, name) for table in rows)]) for name in ("arm", "measure", "bends")
-    )
-    arm_start, arm_row, arm_at = _sparse((arm != 0.0) | (measure != 0.0) | routed)
-    bend_start, bend_row, bend_at = _sparse((bends != 0.0) | routed)
-    return {
-        "offset": np.concatenate([np.zeros(0), *(table.offset for table in rows)]),
-        "arm_start": arm_start,
-        "arm_at": arm_at,
-        "arm_row": arm_row,
-        "arm": arm[arm_row, arm_at],
-        "measure": measure[arm_row, arm_at],
-        "bend_start": bend_start,
-        "bend_at": bend_at,
-        "bend_row": bend_row,
-        "bend": bends[bend_row, bend_at],
-        "curvature_offset": np.concatenate([np.zeros(0), *(table.curvature_offset for table in rows)]),
-    }
-
-
-def _energies(mechanism: Mechanism) -> NDArray[np.int64]:
-    stored, powers = ([each.name for each in one] for one in (mechanism.energies.stored, mechanism.energies.powers))
-    wide = 1 + max((len(table.powers) for table in mechanism.rows), default=0)
-    energies = np.full((len(mechanism.rows), wide), -1, dtype=np.int64)
-    for row, table in zip(energies, mechanism.rows, strict=True):
-        row[0] = stored.index(table.stored.name)
-        row[1 : 1 + len(table.powers)] = [len(stored) + powers.index(each.name) for each in table.powers]
-    return energies
-
-
-def _sparse(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first entry of each row among those wanted, and the entries' rows and columns."""
-    rows, columns = np.nonzero(wanted)
-    return np.append(0, np.cumsum(wanted.sum(axis=1))), np.ascontiguousarray(rows), np.ascontiguousarray(columns)

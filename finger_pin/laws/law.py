@@ -27,6 +27,7 @@ class Row(NamedTuple):
         curvature: phi, the angle by which its path turns, rad.
         side: On which side of its law's kink the row is held, 1 or -1; 0 to follow the motion. An integrator holds
             rows during a step, so that what it integrates is smooth, and ends steps where a row leaves its side.
+        reading: A weighted sum of the states of other rows, such as a temperature; 0 without any.
     """
 
     length: Number
@@ -36,6 +37,7 @@ class Row(NamedTuple):
     command: Number
     curvature: Number
     side: Number = 0.0
+    reading: Number = 0.0
 
 
 def beyond(kink: Number, side: Number) -> Number:
@@ -62,7 +64,8 @@ class Law:
         parameters: Names of the numbers that each row has; ``p`` holds them in this order.
         value: (row, p) -> (force, z', *signals).
         slopes: (row, p, signals) -> two tuples: derivatives of the force by l, l', z, z', N, u, phi, and of z' by l,
-            l', z, N, u, phi. That by z' is for a force that depends on the rate of the row's own state.
+            l', z, N, u, phi. That by z' is for a force that depends on the rate of the row's own state. Where the law
+            heeds ``Row.reading``, the derivative by that is the last of each.
         account: (row, p, force, z', signals) -> (stored energy, *supplied powers, *lost powers), J and W. Force times
             speed is what is supplied less what is lost less the change of what is stored.
         signals: Names of the further numbers that ``value`` returns.
@@ -74,6 +77,7 @@ class Law:
             value and slopes are smooth and heed ``Row.side``. With ``speed`` the state is bounded as in (9a): sliding
             on one way, z' falls with z, from its rate at z = 0 to zero at the most that z can be. Steps after which a
             state is beyond twice that and has grown are tried again, shorter.
+        reads_states: Whether the law heeds ``Row.reading``.
     """
 
     name: str
@@ -86,12 +90,22 @@ class Law:
     losses: tuple[str, ...] = ()
     scale: float | None = None
     kink: str = ""
+    reads_states: bool = False
     arms: ClassVar[int] = 1
     states: ClassVar[int] = 1
 
-    def sees(self, length: Array, speed: Array, state: Array, load: Array, command: Array, curvature: Array) -> Row:
+    def sees(
+        self,
+        length: Array,
+        speed: Array,
+        state: Array,
+        load: Array,
+        command: Array,
+        curvature: Array,
+        reading: Number = 0.0,
+    ) -> Row:
         """Return the arguments of the law for rows, shape (..., k) each."""
-        return Row(length, speed, state, load, command, curvature)
+        return Row(length, speed, state, load, command, curvature, reading=reading)
 
     def act(self, row: Row, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
         """Return the rows' forces, the rates of their states, and their signals."""
@@ -155,10 +169,20 @@ class ContactLaw:
     scale: float
     kink: str = ""
     supplies: ClassVar[tuple[str, ...]] = ()
+    reads_states: ClassVar[bool] = False
     arms: ClassVar[int] = 3
     states: ClassVar[int] = 2
 
-    def sees(self, length: Array, speed: Array, state: Array, load: Array, command: Array, curvature: Array) -> Touch:
+    def sees(
+        self,
+        length: Array,
+        speed: Array,
+        state: Array,
+        load: Array,
+        command: Array,
+        curvature: Array,
+        reading: Number = 0.0,
+    ) -> Touch:
         """Return the arguments for contacts from arms, shape (..., 3 k), and states, (..., 2 k)."""
         slips = (speed[..., each::3] for each in range(3))
         return Touch(length[..., ::3], *slips, *(state[..., each::2] for each in range(2)))

@@ -42,7 +42,7 @@ def with_finger(scenario: Scenario, finger: Finger | None) -> Scenario:
     if finger is None:
         return scenario
     own = {} if scenario.hand is not None else {"finger": finger.description}
-    return scenario.updated(environment={"objects": finger.constructor_args[2]}, **own)
+    return scenario.updated(environment={"objects": finger.constructor_args.objects}, **own)
 
 
 def is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
-from finger_pin.mechanism.finger_parts import Parts, check_joints, check_layout, state_layout
+from finger_pin.mechanism.finger_parts import ConstructorArgs, Parts, check_joints, check_layout, state_layout
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
 from finger_pin.mechanism.mechanism import Mechanism
@@ -23,6 +23,7 @@ from finger_pin.mechanism.state import Motion, as_floats
 from finger_pin.mechanism.tendon_paths import Excursions, TendonPaths
 from finger_pin.mechanism.tree import build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
+from finger_pin.mechanism.wiring import replaced
 from finger_pin.typing import Array
 
 
@@ -44,7 +45,7 @@ class Finger:
         extra_rows: Tables of rows that were added, those of a tree first.
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
-        constructor_args: The rigid body, the rows and the objects that it was given.
+        constructor_args: What it was built from besides its description.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
         scene: Objects and contacts; None without any.
     """
@@ -55,6 +56,7 @@ class Finger:
         rigid_body: RigidBody | None = None,
         rows: Sequence[Rows] = (),
         objects: Mapping[str, Object] | None = None,
+        tables: Mapping[str, Callable[[Rows], Rows]] | None = None,
     ) -> None:
         """Build a finger.
 
@@ -65,13 +67,16 @@ class Finger:
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
             objects: Objects that its links may touch, by name; without any they do not touch each other either.
+            tables: By group of one of its tables of rows, such as ``driven_tendons``, a function that returns what
+                stands in its place, with a law of one's own: the same rows, with as many states, and with at least the
+                parameters, in the same places, and the signals that the finger's have.
 
         Raises:
             InputError: If the joints of the two differ, or one has several coordinates; with objects, if a link has no
-                size, or an object the name of a joint.
+                size, or an object the name of a joint; if there is no such table, or what replaces it is no such one.
         """
         self.description = description = describe(description)
-        self.constructor_args = rigid_body, tuple(rows), objects
+        self.constructor_args = ConstructorArgs(rigid_body, tuple(rows), objects, dict(tables or {}))
         self.paths: TendonPaths | None = None
         if description.tree is None:
             self.rigid_body = rigid_body or build_rigid_body(description)
@@ -87,13 +92,13 @@ class Finger:
         before = tuple(table for table in of_tree if table.group != "tendon_dry_friction")
         drives = parts.drives(description, rows)
         self.drive_matrices = self.tendons.drive_matrices(drives)
-        tables, canals = parts.tables(description, self.paths, before, drives, self.drive_matrices)
+        built, canals = parts.tables(description, self.paths, before, drives, self.drive_matrices)
         last = (*parts.hysteresis_rows(), *(table for table in of_tree if table not in before), *rows)
         self.wraps = canals.wraps
         self.extra_rows = (*before, *canals.tables, *last)
         mechanism = Mechanism(
             self.rigid_body,
-            [*tables, *(table for table in last if not table.pulls)],
+            replaced([*built, *(table for table in last if not table.pulls)], self.constructor_args.tables),
             (
                 *self.routing.passive_names,
                 *(f"{name}.spool" for name in self.actuators.loose_names),
@@ -151,8 +156,8 @@ class Finger:
 
     def changed(self, description: FingerDescription, objects: Mapping[str, Object] | None) -> Finger:
         """Return the finger that another description and other objects make, with the body and rows that were given."""
-        rigid_body, rows, _ = self.constructor_args
-        finger = Finger(description, rigid_body, rows, objects)
+        given = self.constructor_args
+        finger = Finger(description, given.rigid_body, given.rows, objects, given.tables)
         finger.visuals = self.visuals
         return finger
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
+from finger_pin.description.objects import Object
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
@@ -23,6 +24,15 @@ from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths
 from finger_pin.typing import Array
+
+
+class ConstructorArgs(NamedTuple):
+    """What a finger was built from besides its description, as `Finger` takes it."""
+
+    rigid_body: RigidBody | None
+    rows: tuple[Rows, ...]
+    objects: Mapping[str, Object] | None
+    tables: Mapping[str, Callable[[Rows], Rows]]
 
 
 class Parts(NamedTuple):

@@ -1,21 +1,22 @@
 """The model as coordinates and rows, and its evaluation: (18) for any mechanism.
 
     M(q) v' + h(q, v) = sum_k A_k(q)^T phi_k + J^T F,       q' = E(q) v
-    (phi_k, z_k') = law_k(l_k, l_k', z_k, N_k, u_k, curvature_k)
+    (phi_k, z_k') = law_k(l_k, l_k', z_k, N_k, u_k, curvature_k, reading_k)
 
 Coordinates are everything that has inertia: the joints of the tree, then lumps, which move along a line of their own
 (the mass of a passive tendon, a rotor). Rows are everything that exerts force. The packed state is
 
     | q | v | z |
 
-with the states z of the rows in the order of their tables. q and v have the same size N, but for a spherical joint,
-whose four numbers in q are a unit quaternion (x, y, z, w).
+with the states z of the rows in the order in which their tables are listed. q and v have the same size N, but for a
+spherical joint, whose four numbers in q are a unit quaternion (x, y, z, w).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,9 @@ from numpy.typing import NDArray
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.path_elements import PathKinematics, Paths, moved, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import Energies, Rows, RowSignals, check_wiring
+from finger_pin.mechanism.rows import Energies, Rows, RowSignals
 from finger_pin.mechanism.urdf import join_bodies
+from finger_pin.mechanism.wiring import in_order
 from finger_pin.typing import Array
 
 #: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `base_motion`.
@@ -39,8 +41,9 @@ class Mechanism:
         body: The tree of rigid bodies; its joints are the first coordinates.
         lumps: Names of the further coordinates.
         inertia: Of the lumps, shape (l,), kg or kg m2.
+        listed: The tables, whose states follow each other in z.
         rows: The tables, in the order of evaluation.
-        states: For every table the range of its states in z.
+        states: For every table in that order the range of its states in z.
         energies: Energies and powers of the rows.
         channels: Number of inputs from outside.
         moved: Whether the base moves along a path.
@@ -62,23 +65,22 @@ class Mechanism:
         There are as many inputs as rows have, or more if so many ``channels`` are asked for.
 
         Raises:
-            InputError: If a table reads one that is not evaluated before it, or two have one name.
+            InputError: If tables read each other's forces in a circle, or there is no such table, or two have one name.
         """
-        check_wiring(rows)
         self.body = body
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
-        self.rows = tuple(rows)
+        # The core evaluates contacts before all else.
+        self.listed = tuple(sorted(rows, key=lambda table: table.law.arms == 1))
+        self.rows = in_order(self.listed)
         self.moved = moved
         self.prescribed = np.full(self.coordinates, -1) if prescribed is None else prescribed
         self.energies = Energies.of(self.rows, moved, not moved and bool(np.any(self.prescribed >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
-        self.states: list[slice] = []
-        end = 0
-        for table in self.rows:
-            begin, end = end, end + table.states
-            self.states.append(slice(begin, end))
-        self.state_count = end
+        counts = accumulate(table.states for table in self.listed)
+        ends = dict(zip((table.group for table in self.listed), counts, strict=True))
+        self.states = [slice(ends[table.group] - table.states, ends[table.group]) for table in self.rows]
+        self.state_count = max(ends.values(), default=0)
 
     @classmethod
     def join(cls, parts: Mapping[str, Mechanism]) -> Mechanism:
@@ -97,7 +99,7 @@ class Mechanism:
         for name, part in parts.items():
             size = int(part.body.model.nv)
             places = np.append(coordinate + np.arange(size), lump + np.arange(len(part.lumps)))
-            for table in part.rows:
+            for table in part.listed:
                 rows.append(
                     replace(
                         table.embed_coordinates(places, width),
@@ -107,6 +109,7 @@ class Mechanism:
                         paths=moved(table.paths, joint),
                         inputs={f"{name}.{group}": weights for group, weights in table.inputs.items()},
                         loads={f"{name}.{group}": weights for group, weights in table.loads.items()},
+                        readings={f"{name}.{group}": weights for group, weights in table.readings.items()},
                     )
                 )
             joint, coordinate = joint + part.body.model.njoints - 1, coordinate + size
@@ -187,7 +190,7 @@ class Mechanism:
                 # What pushes against a world that stands still does no work; the palm feels it.
                 power, prescribed_power = power + prescribed_power[..., None], None
         moving = self.body.position_rate(turning, v[..., :joints])
-        rates = [found[t.group].rate for t in self.rows if t.states]
+        rates = [found[table.group].rate for table in self.listed if table.states]
         return Evaluation(
             energies=self.energies,
             rows=found,
@@ -216,6 +219,7 @@ class Mechanism:
                 self._load(table, found, turning, forces, touching),
                 self._input(table, found, command, lead),
                 np.abs(linear) @ table.bends.T + table.curvature_offset + routed.turn,
+                self._reading(table, z),
             )
             exerted, rate, signals = table.law.act(row, table.parameters)
             found[table.group] = RowSignals(table, row, exerted, rate, signals)
@@ -261,6 +265,13 @@ class Mechanism:
             total[..., wired] = command[..., table.channels[wired]]
         for group, weights in table.inputs.items():
             total = total + found[group].force @ weights.T
+        return total
+
+    def _reading(self, table: Rows, z: Array) -> Array:
+        total = np.zeros((*z.shape[:-1], table.count))
+        for part, other in zip(self.states, self.rows, strict=True):
+            if other.group in table.readings:
+                total = total + z[..., part] @ table.readings[other.group].T
         return total
 
     def _load(

@@ -1,8 +1,9 @@
 """Rows: tables of all force elements; their arms and indices are the wiring of (18).
 
-A row acts along its arm, tau = arm^T phi. What it sees is linear in earlier rows: its input and its load are sums of
-their forces. Rows that share a law stand together in one table, and tables stand in the order in which they are
-evaluated.
+A row acts along its arm, tau = arm^T phi. What it sees of other rows is linear: its input and its load are sums of
+their forces, and its reading is a sum of their states. Rows that share a law stand together in one table. States are
+known before any force is: tables may read those of any other, their own too. Forces are evaluated in the order in which
+tables read them, whatever the order in which tables are listed.
 """
 
 from __future__ import annotations
@@ -88,8 +89,10 @@ class Rows:
         measure: dl/dq, shape (k, N), for rows whose length is not measured along their arm; by default the arm.
         offset: Length at q = 0, shape (k,).
         channels: For rows with an input from outside, its indices, shape (k,); -1 for none.
-        inputs: By group of earlier rows, weights of shape (k, rows there) with which their forces are the input.
-        loads: By group of earlier rows, weights of shape (k, rows there) with which their forces are the load.
+        inputs: By group of other rows, weights of shape (k, rows there) with which their forces are the input.
+        loads: By group of other rows, weights of shape (k, rows there) with which their forces are the load.
+        readings: By group of any rows but contacts, weights of shape (k, rows there) with which their states are
+            `Row.reading`.
         pins: For rows that are loaded as the pin of a joint (17), the joint's index, shape (k,): the load pulls along
             the link before the joint, and forces at the tips beyond it add.
         bends: Shape (k, N), how much |q| adds to the curvature (15).
@@ -114,6 +117,7 @@ class Rows:
     channels: NDArray[np.int64] = None  # type: ignore[assignment]
     inputs: Mapping[str, Array] = field(default_factory=dict)
     loads: Mapping[str, Array] = field(default_factory=dict)
+    readings: Mapping[str, Array] = field(default_factory=dict)
     pins: NDArray[np.int64] = None  # type: ignore[assignment]
     bends: Array = None  # type: ignore[assignment]
     curvature_offset: Array = None  # type: ignore[assignment]
@@ -147,6 +151,8 @@ class Rows:
             raise InputError(f"rows.{self.group}.paths", f"must be {count}, not {len(self.paths)}")
         if self.pulls and len(self.pulls) != count:
             raise InputError(f"rows.{self.group}.pulls", f"must be {count} tendons, not {len(self.pulls)}")
+        if self.readings and not self.law.reads_states:
+            raise InputError(f"rows.{self.group}.readings", f"law {self.law.name} reads no states (reads_states)")
         object.__setattr__(self, "stored", energy(self.stored or self.group))
         object.__setattr__(self, "powers", self._named_powers())
 
@@ -184,7 +190,8 @@ class Rows:
     def structure_key(self) -> tuple[Any, ...]:
         """Everything but the parameters of the law, to be compared by value."""
         arrays = (self.arm, self.measure, self.offset, self.channels, self.pins, self.bends, self.curvature_offset)
-        weighted = [(*each, *(matrix.tobytes() for matrix in each.values())) for each in (self.inputs, self.loads)]
+        wiring = self.inputs, self.loads, self.readings
+        weighted = [(*each, *(matrix.tobytes() for matrix in each.values())) for each in wiring]
         named = (self.group, self.law, self.paths, self.stored, self.powers)
         return (*named, *self.arm.shape, *weighted, *(each.tobytes() for each in arrays))
 
@@ -248,46 +255,6 @@ def combined(force: Array, weights: Array) -> Array:
     Of one state they have the same bits as of many, which a product of matrices does not promise.
     """
     return np.asarray(np.einsum("...k,kn->...n", force, weights))
-
-
-def check_wiring(tables: Sequence[Rows]) -> None:
-    """Refuse tables that read the forces of rows which are evaluated later, or of none.
-
-    Raises:
-        InputError: Naming the reading and the read table; also if weights have the wrong shape or two tables one name.
-    """
-    counts: dict[str, int] = {}
-    for table in tables:
-        for wiring, read in (("inputs", table.inputs), ("loads", table.loads)):
-            for group, weights in read.items():
-                entry = f"rows.{table.group}.{wiring}"
-                if group not in counts:
-                    allowed = f"must be evaluated before {table.group}, as are {', '.join(counts) or 'no others'}"
-                    raise InputError(entry, allowed, group)
-                if np.shape(weights) != (table.count, counts[group]):
-                    allowed = f"must have shape {(table.count, counts[group])}, not {np.shape(weights)}"
-                    raise InputError(f"{entry}.{group}", allowed)
-        if table.group in counts:
-            raise InputError("rows", "two tables have this name; choose another", table.group)
-        counts[table.group] = table.count
-
-
-def drive_matrices(tables: Sequence[Rows], tendons: Sequence[str]) -> dict[str, Array]:
-    """Return the weights with which the rows of drives pull t tendons, by table, shape (t, k).
-
-    Raises:
-        InputError: If there is no such tendon.
-    """
-    for table in tables:
-        for name in table.pulls:
-            if name not in tendons:
-                allowed = f"no such tendon with a source of its own; there are {', '.join(tendons)}"
-                raise InputError(f"rows.{table.group}.pulls", allowed, name)
-    return {
-        table.group: np.array([np.equal(name, table.pulls) for name in tendons], dtype=float).reshape(-1, table.count)
-        for table in tables
-        if table.pulls
-    }
 
 
 def state_scales(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:

@@ -158,7 +158,7 @@ class Scene:
         places = np.append(np.arange(joints), bodies + np.arange(lumps))
         width = bodies + lumps
         rows = []
-        for table in mechanism.rows:
+        for table in mechanism.listed:
             structure = _embedded(table.structure, places, width)
             rows.append(structure if table.structure is table else structure.with_parameters(table.parameters))
         lumps_of = mechanism.lumps, mechanism.inertia

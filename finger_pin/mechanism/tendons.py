@@ -17,8 +17,9 @@ from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coefficient
 from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
-from finger_pin.mechanism.rows import Energy, Rows, drive_matrices
+from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
+from finger_pin.mechanism.wiring import drive_matrices
 from finger_pin.typing import Array, Number
 
 #: What ideal sources of force supply.

@@ -151,7 +151,7 @@ class Simulator:
         if self._family is None or self._family.keys != tuple(values):
             self._family = ParametrisedScenario.of_finger(self.finger.description, tuple(values))
         described = self._family.with_values([*values.values()]).finger
-        changed = self.finger.changed(described, self.finger.constructor_args[2])
+        changed = self.finger.changed(described, self.finger.constructor_args.objects)
         if changed.layout.names != self.finger.layout.names:
             raise InputError("values", "make a finger with another state: make another simulator of it")
         x, time = self.x, self.time

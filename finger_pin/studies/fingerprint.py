@@ -63,15 +63,15 @@ def code_digest(function: Any) -> str:
 
 
 def finger_digest(finger: Finger) -> str:
-    """Return a digest of a custom finger: description, rigid body, rows and their laws, objects.
+    """Return a digest of a custom finger: description, rigid body, rows and their laws, objects, replaced tables.
 
     Raises:
         UnknownDependency: If a law depends on something that has no digest.
     """
-    body, rows, objects = finger.constructor_args
-    model = None if body is None else body.model.saveToString()
-    described = {name: each.model_dump_json() for name, each in (objects or {}).items()}
-    return code_digest((finger.description.model_dump_json(), model, tuple(rows), described))
+    given = finger.constructor_args
+    model = None if given.rigid_body is None else given.rigid_body.model.saveToString()
+    described = {name: each.model_dump_json() for name, each in (given.objects or {}).items()}
+    return code_digest((finger.description.model_dump_json(), model, given.rows, described, dict(given.tables)))
 
 
 def _content(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Any:

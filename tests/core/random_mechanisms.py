@@ -7,6 +7,7 @@ import pinocchio as pin
 from law_cases import every_law, random_parameters
 
 from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.law import Law
 from finger_pin.mechanism.gaps import PRISM, prism_parameters
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
@@ -105,8 +106,49 @@ def random_contacts(rng, joints, width):
     return Rows("contacts", CONTACT, names, parameters, np.zeros((3 * count, width)), paths=paths)
 
 
+def _read(row, p):
+    force = -p[0] * row.length - (1.0 + row.reading) * row.state
+    return force, row.speed - p[1] * row.state + row.reading * row.reading + 0.3 * row.command
+
+
+def _read_slopes(row, p, signals):
+    of_force = (-p[0], 0.0, -1.0 - row.reading, 0.0, 0.0, 0.0, 0.0, -row.state)
+    return of_force, (0.0, 1.0, -p[1], 0.0, 0.3, 0.0, 2.0 * row.reading)
+
+
+#: A row whose force and state depend on the states of others.
+READER = Law(
+    "reader", ("stiffness", "decay"), _read, _read_slopes, lambda row, p, force, *_: (0.0 * force,),
+    scale=1.0, reads_states=True,
+)  # fmt: skip
+
+
+def random_readers(tables, width):
+    """Two tables that read states of all, each other's and their own too; the first is fed by the second."""
+    rng = np.random.default_rng(len(tables) + width)
+    counts = {table.group: table.count for table in tables if table.states == table.count} | {"one": 2, "other": 1}
+
+    def weights(count, others):
+        return 0.3 * rng.normal(size=(count, others)) * (rng.random((count, others)) < 0.6)
+
+    def reader(name, fed_by):
+        count = counts[name]
+        return Rows(
+            group=name,
+            law=READER,
+            names=tuple(f"row{k}" for k in range(count)),
+            parameters=random_parameters(READER, rng, count),
+            arm=weights(count, width),
+            inputs={fed_by.group: weights(count, fed_by.count)},
+            readings={group: weights(count, size) for group, size in counts.items()},
+        )
+
+    other = reader("other", tables[-1])
+    return [reader("one", other), other]
+
+
 def random_mechanism(rng, free=False):
-    """Tables of rows of all laws in any order, each fed and pressed by some of those before."""
+    """Tables of rows of all laws in any order, each fed and pressed by some others; those that read states first."""
     body = random_body(rng, free)
     lumps = tuple(f"lump{i}" for i in range(rng.integers(0, 3)))
     width, joints = body.model.nv + len(lumps), body.model.njoints - 1
@@ -140,7 +182,7 @@ def random_mechanism(rng, free=False):
                 paths=[random_path(rng, joints) for _ in range(count)] if rng.random() < 0.3 else (),
             )
         )
-    return Mechanism(body, tables, lumps, rng.uniform(0.5, 2.0, len(lumps)))
+    return Mechanism(body, [*random_readers(tables, width), *tables], lumps, rng.uniform(0.5, 2.0, len(lumps)))
 
 
 def with_other_numbers(mechanism, rng):
@@ -175,13 +217,14 @@ def with_other_numbers(mechanism, rng):
             offset=scaled(table.offset),
             inputs={group: scaled(weights) for group, weights in table.inputs.items()},
             loads={group: scaled(weights) for group, weights in table.loads.items()},
+            readings={group: scaled(weights) for group, weights in table.readings.items()},
             bends=scaled(table.bends),
             curvature_offset=scaled(table.curvature_offset),
             paths=tuple(tuple(map(elsewhere, legs)) for legs in table.paths),
         )
 
     inertia = rng.uniform(0.5, 2.0, len(mechanism.lumps))
-    return Mechanism(body, [other(table) for table in mechanism.rows], mechanism.lumps, inertia, mechanism.channels)
+    return Mechanism(body, [other(table) for table in mechanism.listed], mechanism.lumps, inertia, mechanism.channels)
 
 
 def random_states(mechanism, rng, count):

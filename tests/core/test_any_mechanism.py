@@ -115,19 +115,59 @@ def leaves(table):
     return [leaf for each in table for leaf in (leaves(each) if isinstance(each, tuple) else [each])]
 
 
+def by_listing(mechanism, order):
+    """Return the mechanism with its tables listed in another order, and where its numbers of a packed state stand."""
+    tables = [mechanism.rows[k] for k in order]
+    listed = Mechanism(mechanism.body, tables, mechanism.lumps, mechanism.inertia, mechanism.channels)
+    places = np.arange(mechanism.size)
+    of = {table.group: part for table, part in zip(mechanism.rows, mechanism.states, strict=True)}
+    moving = mechanism.size - mechanism.state_count
+    for table, part in zip(listed.rows, listed.states, strict=True):
+        places[moving:][part] = moving + np.arange(mechanism.state_count)[of[table.group]]
+    return listed, places
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_tables_may_be_listed_in_any_order(seed):
+    """Compiled code would read what the last evaluation has left, did it read a force before that is known."""
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng)
+    x, command = random_states(mechanism, rng, 4), rng.uniform(-0.5, 3.0, mechanism.channels)
+    expected = mechanism.evaluate(x, command).rate
+    listed, places = by_listing(mechanism, rng.permutation(len(mechanism.rows)))
+    for evaluator in (listed, CompiledMechanism(listed)):
+        found = evaluator.evaluate(x[:, places], command).rate
+        np.testing.assert_allclose(found, expected[:, places], rtol=1e-9, atol=1e-11 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("wiring", ["inputs", "loads"])
-def test_rows_that_read_later_rows_themselves_or_none_are_refused_naming_both(wiring):
-    """Compiled code would read what the last evaluation has left there."""
+def test_forces_that_read_each_other_in_a_circle_are_refused_and_the_circle_named(wiring):
     mechanism = random_mechanism(np.random.default_rng(2))
     body, last, before = mechanism.body, mechanism.rows[-1], mechanism.rows[-2]
-    for group, width in ((last.group, last.count), (before.group, before.count), ("nowhere", 1)):
+    reading = replace(last, **{wiring: {before.group: np.ones((last.count, before.count))}})
+    for group, width, circle in (
+        (last.group, last.count, f"({before.group} reads {last.group}|{last.group} reads {before.group}) reads"),
+        (before.group, before.count, f"{before.group} reads {before.group}$"),
+    ):
         reader = replace(before, **{wiring: {group: np.ones((before.count, width))}})
-        rows = [*mechanism.rows[:-2], reader, last]
-        with pytest.raises(fp.InputError, match=f"^rows.{before.group}.{wiring} = .{group}.: must be evaluated before"):
+        rows = [*mechanism.rows[:-2], reader, reading]
+        with pytest.raises(fp.InputError, match=f"^rows: no force may depend on itself: {circle}"):
             Mechanism(body, rows, mechanism.lumps, mechanism.inertia)
+
+
+@pytest.mark.parametrize("wiring", ["inputs", "loads", "readings"])
+def test_what_reads_rows_that_are_not_there_or_with_weights_of_another_shape_is_refused(wiring):
+    mechanism = random_mechanism(np.random.default_rng(2))
+    tables = {table.group: table for table in mechanism.rows}
+    body, before = mechanism.body, tables["other"]
+    last = tables["one"]
+    others = [table for table in mechanism.rows if table is not last]
+    reader = replace(last, **{wiring: {"nowhere": np.ones((last.count, 1))}})
+    with pytest.raises(fp.InputError, match=f"^rows.{last.group}.{wiring} = .nowhere.: no such table.*other"):
+        Mechanism(body, [*others, reader], mechanism.lumps, mechanism.inertia)
     reader = replace(last, **{wiring: {before.group: np.ones((last.count, before.count + 1))}})
     with pytest.raises(fp.InputError, match=f"^rows.{last.group}.{wiring}.{before.group}: must have shape"):
-        Mechanism(body, [*mechanism.rows[:-1], reader], mechanism.lumps, mechanism.inertia)
+        Mechanism(body, [*others, reader], mechanism.lumps, mechanism.inertia)
     with pytest.raises(fp.InputError, match=f"^rows = .{last.group}.: two tables have this name"):
         Mechanism(body, [*mechanism.rows, last], mechanism.lumps, mechanism.inertia)
 
@@ -137,7 +177,7 @@ def test_rows_that_move_nothing_are_stepped_with_the_rest_and_change_none_of_it(
     """A state that nothing couples, in one island or in one of several: z' = -z - 1 here, to e^-t (1 + z) - 1."""
     mechanism = random_mechanism(np.random.default_rng(seed))
     own = Rows("aside", ASIDE, ("aside",), np.zeros((0, 1)), np.zeros((1, mechanism.coordinates)))
-    more = Mechanism(mechanism.body, [*mechanism.rows, own], mechanism.lumps, mechanism.inertia, mechanism.channels)
+    more = Mechanism(mechanism.body, [*mechanism.listed, own], mechanism.lumps, mechanism.inertia, mechanism.channels)
     x = 0.1 * random_states(mechanism, np.random.default_rng(seed), 1)[0]
     control, ends = held_control(mechanism.channels, mechanism.coordinates), []
     for each, start in ((mechanism, x), (more, np.append(x, 0.5))):

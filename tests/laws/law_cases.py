@@ -45,7 +45,7 @@ def random_rows(rng, count):
     """Return arguments of rows, all of order one: to and fro, pushed and pulled, pressed."""
     length, speed, state = rng.normal(size=(3, count))
     load, command, curvature = rng.uniform([[0.0], [-0.5], [0.0]], 3.0, (3, count))
-    return Row(length, speed, state, load, command, curvature)
+    return Row(length, speed, state, load, command, curvature, reading=0.3 * length)
 
 
 class ComplexNumPy:

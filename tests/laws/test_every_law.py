@@ -9,7 +9,7 @@ from finger_pin.core.evaluation import law_code
 from finger_pin.laws.law import Law, Row
 
 LAWS, COUNT, STEP = every_law(), 3000, 1e-30
-SEEN = [name for name in Row._fields if name != "side"]
+SEEN = [name for name in Row._fields if name not in ("side", "reading")]
 
 
 @pytest.fixture(params=LAWS.values(), ids=LAWS.keys())
@@ -56,7 +56,7 @@ def test_slopes_are_the_derivatives_of_the_value(drawn):
     of_force, of_rate = law.slopes(row, p, signals)
     of_force, by_rate = [*of_force[:3], *of_force[4:]], of_force[3]
     value = for_complex(law.value)
-    for name, direct, rate in zip(SEEN, of_force, of_rate, strict=True):
+    for name, direct, rate in zip([*SEEN, *["reading"] * law.reads_states], of_force, of_rate, strict=True):
         force_slope, rate_slope, *_ = along(lambda moved: value(moved, p), row, name)
         size = np.abs(direct) + np.abs(by_rate * rate) + 1e-3
         assert np.all(np.abs(direct + by_rate * rate - force_slope) < 1e-12 * size), name
@@ -68,7 +68,8 @@ def test_value_slopes_and_account_return_what_the_law_declares(drawn):
     force, rate, *signals = law.value(row, p)
     of_force, of_rate = law.slopes(row, p, signals)
     stored = law.account(row, p, force, rate, signals)
-    assert len(signals) == len(law.signals) and (len(of_force), len(of_rate)) == (7, 6)
+    assert len(signals) == len(law.signals)
+    assert (len(of_force), len(of_rate)) == (7 + law.reads_states, 6 + law.reads_states)
     assert len(stored) == 1 + len(law.supplies) + len(law.losses)
     if law.scale is None:
         assert not np.any(rate) and not any(np.any(slope) for slope in of_rate)

@@ -1,5 +1,7 @@
 """A drive that stands in this file alone: a source of tension that follows its command late, f^a' = (u - f^a) / T."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -88,14 +90,36 @@ def test_a_run_of_it_goes_on_from_its_state(driven):
     np.testing.assert_allclose(second.muscles_force[-1], TENSION[2:] * (1.0 - np.exp(-0.02 / LAG)), atol=1e-6)
 
 
-def test_a_drive_that_reads_a_row_which_is_evaluated_later_is_refused(finger):
-    """In both evaluators alike: neither is built."""
+@pytest.mark.parametrize("listed", [slice(None), slice(None, None, -1)], ids=["reader first", "reader last"])
+def test_a_drive_may_read_a_row_wherever_that_is_listed(finger, listed):
+    """Two lags after each other: f^a = u (1 - (1 + t / T) exp(-t / T))."""
     arm, one = np.zeros((1, finger.mechanism.coordinates)), np.ones((1, 1))
     numbers = np.full((1, 1), LAG)
     filtered = fp.Rows("filter", MUSCLE, ("T3",), numbers, arm, channels=np.array([2]))
     rows = [fp.Rows("muscles", MUSCLE, ("T3",), numbers, arm, inputs={"filter": one}, pulls=("T3",)), filtered]
-    for given in (rows, rows[::-1]):
-        with pytest.raises(
-            fp.InputError, match=r"^rows.muscles.inputs = .filter.: must be evaluated before muscles, as"
-        ):
-            fp.Finger(finger.description, rows=given)
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.05, "simulation.rtol": 1e-8})
+    held = np.array([0.0, 0.05]), np.tile(TENSION, (2, 1))
+    result = fp.simulate(scenario, finger=fp.Finger(finger.description, rows=rows[listed]), controller=held)
+    late = result.time.values / LAG
+    np.testing.assert_allclose(
+        result.muscles_force.squeeze(), TENSION[2] * (1.0 - (1.0 + late) * np.exp(-late)), atol=1e-5
+    )
+
+
+def test_rows_in_place_of_the_fingers_own_act_and_others_are_refused(finger):
+    """Half the Coulomb coefficient by a replaced table is half of it by its key."""
+    halved = lambda own: replace(own, parameters=own.parameters * [[0.5], *[[1.0]] * (len(own.parameters) - 1)])  # noqa: E731
+    half = {"tendon_friction": {"coulomb": 0.5 * finger.description.tendon_friction.coulomb}}
+    x = finger.rest_state([0.1, 0.5, 0.6, 0.7], [0.1, 1.0, 1.0, 1.0]) + 0.1 * finger.layout.scales()
+    by_table = fp.Finger(finger.description, tables={"driven_tendons": halved, "passive_tendons": halved})
+    by_key = fp.Finger(finger.description.updated(**half))
+    found, expected, whole = (each.evaluate(x, TENSION).mechanism.rate for each in (by_table, by_key, finger))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert np.abs(found - whole).max() > 1e-3
+    for tables, says in (
+        ({"springs": halved}, r"^tables = .springs.: no such table of rows; there are .*driven_tendons"),
+        ({"driven_tendons": lambda own: replace(own, names=("A", "B", "C", "D"))}, "^tables.driven_tendons: must have"),
+        ({"driven_tendons": lambda own: replace(own, law=replace(own.law, signals=()))}, "signals: must begin"),
+    ):
+        with pytest.raises(fp.InputError, match=says):
+            fp.Finger(finger.description, tables=tables)

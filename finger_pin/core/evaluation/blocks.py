@@ -7,9 +7,10 @@ each of its states decays on its own.
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import Blocks, Work
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.jit import Indices, Matrix, njit_always_inline, njit_inline
+from finger_pin.core.linear_systems import Blocks
 from finger_pin.core.tables import Tables
 
 

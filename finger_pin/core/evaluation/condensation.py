@@ -6,15 +6,16 @@ changes dq and dv of positions and velocities, and of its own r:
     d l = A dq,  d l' = A dv,  d N and d u from the rows before,
     g dz - dz' = r_z   with  dz' = by l, l', N, u, curvature, and z itself: one division,
 
+where rows read states of others, the changes of these states are unknowns besides, solved for when all rows are known,
 and what is left is (g M + dh/dv - sum A^T G_v + (dh/dq - sum A^T G_q) / g) dv = M r_v - ... . All of it is linear in
 r, so the solution is kept as one matrix, and a stage costs one product with it.
 """
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import Linear
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent, factorise, substitute
+from finger_pin.core.evaluation.readings import add_readings, resolve_readings
 from finger_pin.core.jit import (
     CompiledFunction,
     Indices,
@@ -26,6 +27,7 @@ from finger_pin.core.jit import (
     njit_reassociate,
     unpack,
 )
+from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.tables import Tables
 
@@ -47,7 +49,7 @@ def _outside(model: Model, address: int, g: float, b: int, width: int, wide: int
     tables, work, linear, force = model.tables, model.work, model.linear, model.linear.force
     places, last = linear.blocks.coordinates[linear.blocks.coordinate_start[b] :], wide - 1
     for j in range(width):
-        for c in range(wide):
+        for c in range(wide + tables.read_states.size):
             force[j, c] = 0.0
         force[j, last] -= linear.bias_rate[places[j]]
     if tables.has_tip_force:
@@ -64,7 +66,8 @@ def _outside(model: Model, address: int, g: float, b: int, width: int, wide: int
 def _load(model: Model, address: int, k: int, places: Indices, width: int, wide: int) -> None:
     """Fill the change of a row's load."""
     tables, linear, load = model.tables, model.linear, model.linear.load
-    _terms(tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, wide, load)
+    full, begin, end = wide + tables.read_states.size, tables.load_start[k], tables.load_start[k + 1]
+    _terms(tables, begin, end, linear.load_slope[k], linear.gain, full, load)
     if (tables.has_tip_force or tables.contact_rows) and tables.joint_pin[k] >= 0:
         for c in range(width):
             load[c] += linear.load_by_position[k, places[c]]
@@ -77,7 +80,8 @@ def _load(model: Model, address: int, k: int, places: Indices, width: int, wide:
 def _command(model: Model, k: int, places: Indices, width: int, wide: int) -> None:
     """Fill the change of a row's input."""
     tables, control, linear, command = model.tables, model.control, model.linear, model.linear.command
-    _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, wide, command)
+    full = wide + tables.read_states.size
+    _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, full, command)
     channel = tables.channel[k]
     if channel >= 0:
         for c in range(width):
@@ -100,11 +104,15 @@ def _add_motion(
 
 
 @njit_inline
-def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) -> None:
-    """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
+def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) -> bool:
+    """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time).
+
+    Return false if the states that rows read of each other cannot be told.
+    """
     tables, linear, slopes, blocks = model.tables, model.linear, model.work.slopes, model.linear.blocks
     load, command, force, place = linear.load, linear.command, linear.force, blocks.place
     own_places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+    full = wide + tables.read_states.size
     _outside(model, address, g, b, width, wide)
     for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
         k = blocks.rows[index]
@@ -119,44 +127,50 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
             # d phi by z and by z' = g dz - r_z.
             total = slopes[at.F_STATE, k] + g * slopes[at.F_RATE, k]
         own = linear.state_gain[max(state, 0)]
-        for c in range(wide):
+        for c in range(full):
             row[c] = 0.0
         if state >= 0:
-            for c in range(wide):
+            for c in range(full):
                 own[c] = 0.0
         pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.contact_rows and tables.joint_pin[k] >= 0)
         if pressed and (of_load != 0.0 or by_load != 0.0):
             _load(model, address, k, own_places, width, wide)
-            for c in range(wide):
+            for c in range(full):
                 row[c] = of_load * load[c]
             if by_load != 0.0:
-                for c in range(wide):
+                for c in range(full):
                     own[c] = by_load * load[c]
         fed = tables.channel[k] >= 0 or tables.input_start[k + 1] > tables.input_start[k]
         if fed and (of_command != 0.0 or by_command != 0.0):
             _command(model, k, own_places, width, wide)
-            for c in range(wide):
+            for c in range(full):
                 row[c] += of_command * command[c]
             if by_command != 0.0:
-                for c in range(wide):
+                for c in range(full):
                     own[c] += by_command * command[c]
+        reads = tables.read_start[k + 1] > tables.read_start[k]
         if state >= 0:
             by_length, by_speed = factor * slopes[at.R_LENGTH, k], factor * slopes[at.R_SPEED, k]
             _add_motion(model, k, width, by_length, by_speed, factor * slopes[at.R_CURVATURE, k], own)
-            for c in range(wide):
+            if reads:
+                add_readings(tables, k, factor * slopes[at.R_READING, k], wide, own)
+            for c in range(full):
                 row[c] += total * own[c]
             # The column of r_z itself, without the difference g dz - r_z.
             itself = 2 * width + blocks.state_place[state]
             own[itself] += factor
             row[itself] += factor * (slopes[at.F_STATE, k] + slopes[at.F_RATE, k] * slopes[at.R_STATE, k])
-        elif of_length == 0.0 and of_speed == 0.0 and of_curvature == 0.0 and not (pressed or fed):
+        elif of_length == 0.0 and of_speed == 0.0 and of_curvature == 0.0 and not (pressed or fed or reads):
             # An idle row, such as a limiter inside its range.
             continue
         _add_motion(model, k, width, of_length, of_speed, of_curvature, row)
+        if reads:
+            add_readings(tables, k, slopes[at.F_READING, k], wide, row)
         for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
             arm, target = linear.arm[e], force[place[tables.arm_at[e]]]
-            for c in range(wide):
+            for c in range(full):
                 target[c] += arm * row[c]
+    return full == wide or resolve_readings(tables, linear, b, width, wide)
 
 
 @CompiledFunction
@@ -181,7 +195,8 @@ def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
     states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
     whole = linear.mass.shape[0]
     width, wide = extent(blocks, b)
-    _gains(model, address, g, b, width, wide)
+    if not _gains(model, address, g, b, width, wide):
+        return False
     force, velocity, reduced = linear.force, linear.velocity, linear.reduced
     inverse = 1.0 / g
     for i in range(width):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import Linear, Work
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
 from finger_pin.core.jit import CompiledFunction, Vector, call_value, njit_always_inline, njit_inline, unpack
+from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS
 from finger_pin.core.tables import END, FIRST, Tables

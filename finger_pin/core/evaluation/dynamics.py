@@ -6,7 +6,7 @@ import numpy as np
 
 from finger_pin.core.buffers import AXIS, Work
 from finger_pin.core.evaluation.inputs import inputs, tip_forces
-from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE
+from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, READING, SPEED, STATE
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.evaluation.time_functions import signal_derivatives
@@ -92,6 +92,10 @@ def _see(tables: Tables, q: Vector, v: Vector, z: Vector, work: Work) -> None:
         rows[CURVATURE, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
     for i in range(2 * first // 3, tables.state_row.size):
         rows[STATE, tables.state_row[i]] = z[i]
+    for e in range(tables.read_at.size):
+        rows[READING, tables.read_row[e]] = 0.0
+    for e in range(tables.read_at.size):
+        rows[READING, tables.read_row[e]] += tables.read_weight[e] * z[tables.read_at[e]]
     for i in range(tables.input_rows.size):
         k = tables.input_rows[i]
         rows[COMMAND, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0

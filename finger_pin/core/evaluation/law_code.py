@@ -22,10 +22,10 @@ from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law, Row, Touch
 
 # Columns of the table of rows; the signals of the law follow. Numba reads them as constants.
-LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, SIDE, FORCE, RATE, SIGNALS = range(10)
-# Columns of the table of slopes: the force by l, l', z, z', N, u, phi, then z' by l, l', z, N, u, phi.
-F_LENGTH, F_SPEED, F_STATE, F_RATE, F_LOAD, F_COMMAND, F_CURVATURE = range(7)
-R_LENGTH, R_SPEED, R_STATE, R_LOAD, R_COMMAND, R_CURVATURE, SLOPES = range(7, 14)
+LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, SIDE, READING, FORCE, RATE, SIGNALS = range(11)
+# Columns of the table of slopes: the force by l, l', z, z', N, u, phi and what is read, then z' by all these but z'.
+F_LENGTH, F_SPEED, F_STATE, F_RATE, F_LOAD, F_COMMAND, F_CURVATURE, F_READING = range(8)
+R_LENGTH, R_SPEED, R_STATE, R_LOAD, R_COMMAND, R_CURVATURE, R_READING, SLOPES = range(8, 16)
 
 # Filled in for every law.
 _law: Any = None
@@ -121,8 +121,8 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
 
 @njit_inline
 def _seen(table: Pointer, stride: int, k: int) -> Row:
-    length, speed, state, load, command, curvature, side = _numbers(table, k, stride, 7)
-    return Row(length, speed, state, load, command, curvature, side)
+    length, speed, state, load, command, curvature, side, reading = _numbers(table, k, stride, 8)
+    return Row(length, speed, state, load, command, curvature, side, reading)
 
 
 def _value(table: Pointer, numbers: Pointer, stride: int, begin: int, end: int) -> None:

@@ -5,12 +5,13 @@ The wrenches of a piece turn with the body that carries its frame, and change wi
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import AXIS, Linear, Work
+from finger_pin.core.buffers import AXIS, Work
 from finger_pin.core.evaluation.blocks import partition
 from finger_pin.core.evaluation.law_code import FORCE, LOAD
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, njit_always_inline, njit_inline, unpack
+from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS, WRENCH, Paths
 from finger_pin.core.tables import Tables

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.buffers import Linear
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, njit_always_inline, njit_inline, unpack
+from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping.integration import INTEGRATION, Integration
 from finger_pin.core.stepping.interpolation import between

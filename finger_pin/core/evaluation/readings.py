@@ -1,0 +1,44 @@
+"""What rows read of states, in the systems of `condensation`: the changes of these states are unknowns of their own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from finger_pin.core.evaluation.blocks import factorise, substitute
+from finger_pin.core.jit import Vector, njit_inline
+from finger_pin.core.linear_systems import Linear
+from finger_pin.core.tables import Tables
+
+
+@njit_inline
+def add_readings(tables: Tables, k: int, slope: float, wide: int, out: Vector) -> None:
+    """Add a slope by what a row reads of states."""
+    for e in range(tables.read_start[k], tables.read_start[k + 1]):
+        out[wide + tables.read_place[tables.read_at[e]]] += slope * tables.read_weight[e]
+
+
+@njit_inline
+def resolve_readings(tables: Tables, linear: Linear, b: int, width: int, wide: int) -> bool:
+    """Solve for the changes of the states that rows of a block read, and put them into its gains; false if singular."""
+    blocks, matrix, solved, reads = linear.blocks, linear.read_matrix, linear.read_gain, tables.read_states.size
+    states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
+    matrix[:, :] = np.eye(reads)
+    solved[:, :wide] = 0.0
+    for s in states:
+        if tables.read_place[s] >= 0:
+            p, own = tables.read_place[s], linear.state_gain[s]
+            for c in range(reads):
+                matrix[p, c] -= own[wide + c]
+            for c in range(wide):
+                solved[p, c] = own[c]
+    if not factorise(matrix, reads, linear.read_pivots):
+        return False
+    substitute(matrix, reads, linear.read_pivots, solved, wide)
+    for p in range(reads):
+        for s in states:
+            for c in range(wide):
+                linear.state_gain[s, c] += linear.state_gain[s, wide + p] * solved[p, c]
+        for j in range(width):
+            for c in range(wide):
+                linear.force[j, c] += linear.force[j, wide + p] * solved[p, c]
+    return True

@@ -1,0 +1,204 @@
+"""Memory of the linear systems that an implicit method solves, and the blocks that they fall into."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.inputs import InputTable
+from finger_pin.core.islands import find_islands
+from finger_pin.core.jit import Indices, Matrix, Vector
+from finger_pin.core.path_tables import COLUMNS
+from finger_pin.core.tables import Tables
+from finger_pin.core.threads import physical_memory
+from finger_pin.exceptions import InputError
+
+
+class Blocks(NamedTuple):
+    """Atoms, and the blocks to which contacts join them; N coordinates, K rows, Z states, A atoms.
+
+    Members of all blocks stand in a row, one block after the other; ``*_start`` has where each begins.
+
+    Attributes:
+        atom: Of every coordinate, shape (N,).
+        row_atom: Of every row, shape (K,); -1 for contacts.
+        label: Block of every atom, shape (A,).
+        number: Number of blocks, shape (1,).
+        coordinate_start, coordinates: Shapes (A + 1,) and (N,).
+        row_start, rows: Of all rows but those of contacts, shapes (A + 1,) and (K,).
+        touch_start, touches: First rows of closed contacts, shapes (A + 1,) and (contacts,).
+        state_start, states: Shapes (A + 1,) and (Z,).
+        place: Of every coordinate in its block, shape (N,).
+        state_place: Of every state in its block, shape (Z,).
+        loose: For the states of contacts that are open, -dz'/dz, shape (Z,); zero for all others.
+        active_states, active_state_count: States of active contact pairs, shape (Z,), and how many, shape (1,).
+        current: The block that is being condensed, shape (1,).
+    """
+
+    atom: Indices
+    row_atom: Indices
+    label: Indices
+    number: Indices
+    coordinate_start: Indices
+    coordinates: Indices
+    row_start: Indices
+    rows: Indices
+    touch_start: Indices
+    touches: Indices
+    state_start: Indices
+    states: Indices
+    place: Indices
+    state_place: Indices
+    loose: Vector
+    active_states: Indices
+    active_state_count: Indices
+    current: Indices
+
+
+def build_blocks(tables: Tables, control: InputTable) -> Blocks:
+    """Return the blocks of tables while nothing touches."""
+    count, width, states = len(tables.state), len(tables.prescribed), len(tables.state_row)
+    atom, row_atom, atoms = np.zeros(width, dtype=np.int64), np.zeros(count, dtype=np.int64), 1
+    if tables.contact_rows:
+        islands = find_islands(tables, control, False)
+        atoms = len(islands)
+        for index, island in enumerate(islands):
+            atom[island.coordinates], row_atom[island.rows] = index, index
+        row_atom[tables.touch > 0] = -1
+
+    def room(size: int) -> NDArray[np.int64]:
+        return np.zeros(size, dtype=np.int64)
+
+    return Blocks(
+        atom=atom,
+        row_atom=row_atom,
+        label=room(atoms),
+        number=np.ones(1, dtype=np.int64),
+        coordinate_start=np.array([0, *[width] * atoms]),
+        coordinates=np.arange(width),
+        row_start=np.array([0, *[count] * atoms]),
+        rows=np.arange(count),
+        touch_start=room(atoms + 1),
+        touches=room(tables.contact_rows // COLUMNS),
+        state_start=np.array([0, *[states] * atoms]),
+        states=np.arange(states),
+        place=np.arange(width),
+        state_place=np.arange(states),
+        loose=np.zeros(states),
+        active_states=room(states),
+        active_state_count=room(1),
+        current=room(1),
+    )
+
+
+class Linear(NamedTuple):
+    """Partial derivatives at one state, and the solution of (g - J) u = r; K rows, N coordinates, Z states.
+
+    Columns of what is wide are (r of positions, N | r of velocities, N | r of states, Z | h d_i of a stage, 1) of one
+    block; before the reduced system is solved, velocities stand in place of their r. What is full has a column more for
+    the change of every state that any row reads, R. Of what blocks have in common the rows are those of the whole.
+
+    Attributes:
+        mass: M with the lumps, shape (N, N).
+        by_position: d(M a + h - J^T F)/dq at the actual acceleration, shape (N, N).
+        by_velocity: dh/dv, shape (N, N).
+        bias_rate: dh/dt by the motion of the base, shape (N,).
+        arm: dl'/dv, shape (arms,).
+        measure: dl/dq, shape (arms,).
+        turning: dl'/dq at constant v, shape (arms,).
+        bend: d(curvature)/dq, as in the tables, shape (bends,).
+        load_slope: dN/dS, S the sum of earlier forces, shape (K,).
+        load_by_position: dN/dq at constant S, shape (K, N).
+        load_by_time: dN/dt at constant S, shape (K,).
+        gain: d phi, shape (K, full).
+        state_gain: d z, shape (Z, full).
+        load, command: Of one row, shape (full,).
+        force: Sum of A^T d phi of a block, shape (N, full).
+        read_gain: d z of the states that are read, shape (R, wide).
+        read_matrix: What they change of each other, shape (R, R), factorised in place.
+        read_pivots: Row exchanges, shape (R,).
+        reduced: Of a block, shape (N, N), factorised in place.
+        pivots: Row exchanges, shape (N,).
+        velocity: The solution's velocities of a block, shape (N, wide).
+        solution: The solution u, shape (2 N + Z, wide).
+        loose: Of the states of open contacts, u / r, shape (Z,).
+        right: The right-hand side of a block, shape (wide,).
+        blocks: The coupled blocks.
+    """
+
+    mass: Matrix
+    by_position: Matrix
+    by_velocity: Matrix
+    bias_rate: Vector
+    arm: Vector
+    measure: Vector
+    turning: Vector
+    bend: Vector
+    load_slope: Vector
+    load_by_position: Matrix
+    load_by_time: Vector
+    gain: Matrix
+    state_gain: Matrix
+    load: Vector
+    command: Vector
+    force: Matrix
+    read_gain: Matrix
+    read_matrix: Matrix
+    read_pivots: Indices
+    reduced: Matrix
+    pivots: Indices
+    velocity: Matrix
+    solution: Matrix
+    loose: Vector
+    right: Vector
+    blocks: Blocks
+
+
+def build_linear(tables: Tables, control: InputTable) -> Linear:
+    """Allocate the linearisation of tables.
+
+    Raises:
+        InputError: If so many bodies can touch that it cannot fit into the machine's memory.
+    """
+    count, width, states = len(tables.state), len(tables.prescribed), len(tables.state_row)
+    wide, reads = 2 * width + states + 1, len(tables.read_states)
+    full = wide + reads
+    if (needed := 8.0 * wide * max(count, wide)) > (present := physical_memory()):
+        pairs, most = tables.contact_rows // COLUMNS, present / 2**30
+        allowed = f"{pairs} pairs of bodies can touch, which needs {needed / 2**30:.3g} GiB of memory, of {most:.3g}"
+        raise InputError("contacts", f"{allowed}; let fewer bodies touch")
+    linear = Linear(
+        mass=np.zeros((width, width)),
+        by_position=np.zeros((width, width)),
+        by_velocity=np.zeros((width, width)),
+        bias_rate=np.zeros(width),
+        arm=np.zeros(len(tables.arm)),
+        measure=np.zeros(len(tables.arm)),
+        turning=np.zeros(len(tables.arm)),
+        bend=np.zeros(len(tables.bend)),
+        load_slope=np.zeros(count),
+        load_by_position=np.zeros((count, width)),
+        load_by_time=np.zeros(count),
+        gain=np.zeros((count, full)),
+        state_gain=np.zeros((states, full)),
+        load=np.zeros(full),
+        command=np.zeros(full),
+        force=np.zeros((width, full)),
+        read_gain=np.zeros((reads, wide)),
+        read_matrix=np.zeros((reads, reads)),
+        read_pivots=np.zeros(reads, dtype=np.int64),
+        reduced=np.zeros((width, width)),
+        pivots=np.zeros(width, dtype=np.int64),
+        velocity=np.zeros((width, wide)),
+        solution=np.zeros((wide - 1, wide)),
+        loose=np.zeros(states),
+        right=np.zeros(wide),
+        blocks=build_blocks(tables, control),
+    )
+    # No posture changes these.
+    lumped = np.arange(len(tables.parents), width)
+    linear.mass[lumped, lumped] = tables.lumps
+    linear.arm[:], linear.measure[:], linear.bend[:] = tables.arm, tables.measure, tables.bend
+    return linear

@@ -1,0 +1,92 @@
+"""Wiring: which rows read the forces and states of which, and which drives pull which tendons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
+
+import numpy as np
+
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.rows import Rows
+from finger_pin.typing import Array
+
+
+def in_order(tables: Sequence[Rows]) -> tuple[Rows, ...]:
+    """Return tables in an order in which every force is known before it is read; else as they are listed.
+
+    Raises:
+        InputError: If forces read each other in a circle, or a table reads one that there is not; also if weights have
+            the wrong shape, or two tables one name.
+    """
+    names = [table.group for table in tables]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError("rows", "two tables have this name; choose another", name)
+    for table in tables:
+        _check_wiring(table, tables)
+    readers = {table.group: {*table.inputs, *table.loads} for table in tables}
+    try:
+        TopologicalSorter(readers).prepare()
+    except CycleError as error:
+        # In the circle each one is read by the next.
+        circle = " reads ".join(reversed(error.args[1]))
+        raise InputError("rows", f"no force may depend on itself: {circle}") from None
+    left, ordered = list(tables), list[Rows]()
+    while left:
+        known = {table.group for table in ordered}
+        ordered.append(next(table for table in left if readers[table.group] <= known))
+        left.remove(ordered[-1])
+    return tuple(ordered)
+
+
+def replaced(tables: Sequence[Rows], replacements: Mapping[str, Callable[[Rows], Rows]]) -> list[Rows]:
+    """Return tables with some in place of those of their groups.
+
+    Raises:
+        InputError: If there is no such group, or a replacement has other rows, or fewer parameters or signals.
+    """
+    names = [table.group for table in tables]
+    for name in replacements:
+        if name not in names:
+            raise InputError("tables", f"no such table of rows; there are {', '.join(names)}", name)
+    placed = [replacements[table.group](table) if table.group in replacements else table for table in tables]
+    for new, old in zip(placed, tables, strict=True):
+        if (new.group, new.names, new.states) != (old.group, old.names, old.states):
+            raise InputError(f"tables.{old.group}", f"must have the group, names and states of {old.group}")
+        for kind in ("parameters", "signals"):
+            first = getattr(old.law, kind)
+            if getattr(new.law, kind)[: len(first)] != first:
+                raise InputError(f"tables.{old.group}.law.{kind}", f"must begin with {', '.join(first)}")
+    return placed
+
+
+def _check_wiring(table: Rows, tables: Sequence[Rows]) -> None:
+    """Refuse a table that reads forces or states that there are not, or with weights of the wrong shape."""
+    for wiring in ("inputs", "loads", "readings"):
+        counts = {each.group: each.count for each in tables if wiring != "readings" or each.states == each.count}
+        for group, weights in getattr(table, wiring).items():
+            entry, of_states = f"rows.{table.group}.{wiring}", " with a state in each row" * (wiring == "readings")
+            if group not in counts:
+                raise InputError(entry, f"no such table{of_states}; there are {', '.join(counts) or 'none'}", group)
+            if np.shape(weights) != (table.count, counts[group]):
+                allowed = f"must have shape {(table.count, counts[group])}, not {np.shape(weights)}"
+                raise InputError(f"{entry}.{group}", allowed)
+
+
+def drive_matrices(tables: Sequence[Rows], tendons: Sequence[str]) -> dict[str, Array]:
+    """Return the weights with which the rows of drives pull t tendons, by table, shape (t, k).
+
+    Raises:
+        InputError: If there is no such tendon.
+    """
+    for table in tables:
+        for name in table.pulls:
+            if name not in tendons:
+                allowed = f"no such tendon with a source of its own; there are {', '.join(tendons)}"
+                raise InputError(f"rows.{table.group}.pulls", allowed, name)
+    return {
+        table.group: np.array([np.equal(name, table.pulls) for name in tendons], dtype=float).reshape(-1, table.count)
+        for table in tables
+        if table.pulls
+    }
