@@ -100,7 +100,7 @@ class Parts(NamedTuple):
 
 
 # Most changes of numbers leave most parts, and most tables, as they were.
-@memoised(lambda make, *given: (make.__self__, make.__name__, *given), most=1024)
+@memoised(lambda make, *given: (make.__self__, make.__name__, *given), most=256)
 def _made(make: Any, *given: Any) -> Any:
     """Return a method's result, remembered by its part and arguments."""
     return make(*given)

@@ -59,7 +59,7 @@ def _touching(
     return (topology, *pairs, width, *links, *shapes)
 
 
-@memoised(lambda structure, places, width: (structure, places.tobytes(), width), most=1024)
+@memoised(lambda structure, places, width: (structure, places.tobytes(), width), most=256)
 def _embedded(structure: Rows, places: Indices, width: int) -> Rows:
     return structure.embed_coordinates(places, width)
 

@@ -1,93 +1,85 @@
-"""What is remembered: the same thing for the same parts, within a bound in bytes, also in a forked process."""
+"""What is remembered: the same thing for the same parts, up to a number of things, also in a forked process."""
 
+import gc
 import os
 import signal
 import threading
 import time
 import weakref
 
-import numpy as np
 import pytest
 
-from finger_pin.description.caching import LIMIT, memoised
-
-MEGABYTE = 2**20
+import finger_pin as fp
+from finger_pin.description.caching import memoised
 
 
 class Thing:
-    """It holds an array, or what else it is given."""
+    """It holds what it is given."""
 
-    def __init__(self, size=0, other=None):
-        """Hold so many bytes."""
-        self.numbers, self.other = np.zeros(size, dtype=np.uint8), other
+    def __init__(self, other=None):
+        """Hold a thing."""
+        self.other = other
 
 
-def remembering(most=128):
+def remembering(most=32):
     """Return a function of a number, and of how to make what belongs to it, that remembers the latest values."""
     return memoised(lambda number, make: (number,), most)(lambda number, make: make())
 
 
-def test_the_same_parts_have_the_same_thing_and_the_latest_ones_stay():
+def test_the_same_parts_have_the_same_thing_and_those_used_last_stay():
     known = remembering(3)
-    made = [known(number, Thing) for number in range(5)]
-    assert all(known(number, Thing) is made[number] for number in (2, 3, 4))
-    assert known(0, Thing) is not made[0]
+    made = [known(number, Thing) for number in range(3)]
+    assert known(0, Thing) is made[0]
+    known(3, Thing)
+    assert all(known(number, Thing) is made[number] for number in (0, 2))
+    assert known(1, Thing) is not made[1]
 
 
-def test_all_that_is_remembered_has_one_bound_in_bytes():
-    """Of 200 arrays of a megabyte in two places as many live as the bound has megabytes, the latest of both."""
-    places, living = [remembering(1024), remembering(1024)], weakref.WeakSet()
+def test_no_more_live_than_are_remembered_and_nothing_else_of_a_call_does():
+    living, arguments, known = weakref.WeakSet(), weakref.WeakSet(), remembering(5)
 
-    def made():
-        thing = Thing(MEGABYTE)
-        living.add(thing)
-        return thing
+    def maker():
+        other = Thing()
+        arguments.add(other)
 
+        def make():
+            thing = Thing() if other else None
+            living.add(thing)
+            return thing
+
+        return make
+
+    for number in range(50):
+        known(number, maker())
+    gc.collect()
+    assert (len(living), len(arguments)) == (5, 0)
+
+
+def test_descriptions_are_told_apart_by_identity_also_when_one_has_gone():
+    """A description that is freed leaves its address to the next one."""
+    known = memoised(lambda description: (description,))(lambda description: description.name)
     for number in range(100):
-        for place in places:
-            place(number, made)
-    most = LIMIT // MEGABYTE
-    assert 0.75 * most <= len(living) <= most
-    kept = len(living)
-    for place in places:
-        place(99, made)
-    assert len(living) == kept
-
-
-def test_what_is_larger_than_the_bound_is_remembered_until_the_next_comes():
-    known = remembering()
-    large = known(0, lambda: Thing(LIMIT + 1))
-    assert known(0, Thing) is large
-    known(1, Thing)
-    assert known(0, Thing) is not large
-
-
-def test_what_many_share_counts_once():
-    """Fifty things that refer to one of half the bound would be 25 times the bound together."""
-    large, small = remembering(), remembering()
-    shared = large(0, lambda: Thing(LIMIT // 2))
-    made = [small(number, lambda: Thing(other=shared)) for number in range(50)]
-    assert large(0, Thing) is shared
-    assert all(small(number, Thing) is each for number, each in enumerate(made))
+        description = fp.load_finger("ub").updated(name=f"finger{number}")
+        assert known(description) == f"finger{number}"
+        del description
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
 def test_a_process_that_is_forked_while_a_thread_remembers_remembers_too():
     inside, known = threading.Event(), remembering()
 
-    class Slow:
-        def __sizeof__(self):
-            inside.set()
-            time.sleep(0.2)
-            return 0
+    def slow():
+        inside.set()
+        time.sleep(0.2)
 
-    thread = threading.Thread(target=lambda: known(0, Slow))
+    thread = threading.Thread(target=lambda: known(0, slow))
     thread.start()
     inside.wait(120.0)
     child = os.fork()
     if not child:
         signal.alarm(120)
         known(1, Thing)
+        known(0, Thing)
         os._exit(0)
     thread.join()
     assert os.waitpid(child, 0)[1] == 0
