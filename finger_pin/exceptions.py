@@ -34,7 +34,7 @@ class MicroDampingWarning(ScenarioWarning):
 
 
 class AccuracyWarning(ScenarioWarning):
-    """The error of a result is far more than its tolerances suggest."""
+    """What a result shows is finer than its tolerances tell."""
 
 
 class LeftOutWarning(ScenarioWarning):

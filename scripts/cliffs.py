@@ -27,7 +27,6 @@ class Run:
     seconds: float
     steps: int
     residual: float
-    estimate: float
     reason: str
 
 
@@ -51,8 +50,8 @@ def run_seed(seed: int, limit: float) -> Run:
         except fp.exceptions.Interrupted as error:
             result, reason = error.result, f"not done after {limit:g} s: {error}"
     assert result is not None
-    steps, estimate = int(result.attrs["solver_steps"]), float(result.attrs.get("estimated_error", np.nan))
-    return Run(seed, time.process_time() - began, steps, residual_share(result), estimate, reason)
+    steps = int(result.attrs["solver_steps"])
+    return Run(seed, time.process_time() - began, steps, residual_share(result), reason)
 
 
 def main(given: list[str] | None = None) -> int:
@@ -64,7 +63,7 @@ def main(given: list[str] | None = None) -> int:
     parser.add_argument("--processes", type=int, default=2, help="side by side (default 2)")
     arguments = parser.parse_args(given)
     seeds = range(arguments.seed, arguments.seed + arguments.count)
-    print(f"{'seed':>6}{'s':>8}{'steps':>9}{'residual':>11}{'estimate':>11}")
+    print(f"{'seed':>6}{'s':>8}{'steps':>9}{'residual':>11}")
     runs = []
     # What compiles is no part of a run.
     fp.simulate("reversals")
@@ -72,7 +71,7 @@ def main(given: list[str] | None = None) -> int:
         for run in pool.map(partial(run_seed, limit=arguments.limit), seeds):
             runs.append(run)
             if run.reason or run.residual > OPEN or run.seconds > SLOW / 4:
-                numbers = f"{run.seed:6}{run.seconds:8.2f}{run.steps:9}{run.residual:11.1e}{run.estimate:11.1e}"
+                numbers = f"{run.seed:6}{run.seconds:8.2f}{run.steps:9}{run.residual:11.1e}"
                 print(f"{numbers}  {run.reason}", flush=True)
     failed = [run for run in runs if run.reason]
     steps = np.array([run.steps for run in runs])

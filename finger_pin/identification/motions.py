@@ -163,7 +163,7 @@ class RecordedMotion:
     def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
         moved = self._with_own(scenario, own)
         finger = None if self._finger is None else with_parameters_of(self._finger, self.scenario, moved)
-        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger), estimate_error=False)
+        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger))
 
     def _made(
         self, scenario: Scenario, own: Mapping[str, float], factor: float

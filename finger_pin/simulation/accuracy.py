@@ -1,4 +1,4 @@
-"""Warnings about a run: its own error, masses that ring in it, and contacts too stiff for it."""
+"""Warnings about a run: an account that is open, masses that ring in it, and contacts too stiff for it."""
 
 from __future__ import annotations
 
@@ -18,21 +18,6 @@ from finger_pin.typing import Array
 #: Steps between two looks at a compiled simulation.
 CHUNK = 128
 
-# A run at tolerance tol is expected to be within so many times tol, rad, and never worse than the second number.
-_EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
-# The estimate is seldom below a third of the error and sometimes far above it: the warning comes from so many times the
-# expected error on. A linearised flow says nothing of an error as large as the last number, rad or m.
-_DOUBTED, _MOST_BELIEVED = 3.0, 0.1
-#: Where the error of a run is not known.
-NOT_JUDGED = "the error of the run was not judged: "
-_BEYOND = "small errors grow beyond all bounds, as over many impacts or of a body that tumbles"
-_CHECK = (
-    "compare it with a run at a tighter tolerance (--check, check_convergence), "
-    "or try a smaller simulation.rtol and atol_scale"
-)
-# Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
-# is then beyond a linearised flow.
-_CLOSE_TO_LOCKING = 1.5
 # The share of the energy exchanged to which an account has to close, and what of the energy stored is rounding.
 _OPEN, _ROUNDING = 1e-4, 1e-13
 #: The tolerances, and how tight they can be.
@@ -42,39 +27,6 @@ TOLERANCES = {"rtol": LEAST_RTOL, "atol_scale": LEAST_ATOL_SCALE}
 _MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
 # A contact is too stiff where a newton presses it in by so small a part of what positions are computed to.
 _SEEN = 1e-4
-
-
-def expected_error(scenario: Scenario) -> float:
-    """Return the error of the joints' angles that the tolerances let a user expect, rad rms."""
-    settings = scenario.simulation
-    return min(_EXPECTED * max(settings.rtol, settings.atol_scale), _MOST_EXPECTED)
-
-
-def judge_error(scenario: Scenario, trajectory: Trajectory, *, margin: float) -> tuple[float, str]:
-    """Return the error that a run estimates of itself, and a warning, empty where the error is as expected.
-
-    The estimate is carried along the flow linearised along the motion. Where that cannot be believed the run is not
-    judged: the error is not a number, and the warning gives the reason.
-
-    Args:
-        scenario: The scenario.
-        trajectory: Its solution, with the estimate: rad rms over joints and time, or of objects rad and m, where that
-            is larger.
-        margin: Of the joints' friction to what locks the finger; infinite where not known.
-    """
-    error = trajectory.estimated_error
-    if np.isnan(error) or trajectory.failure or trajectory.interrupted:
-        return error, ""
-    if margin < _CLOSE_TO_LOCKING:
-        return np.nan, f"{NOT_JUDGED}close to self-locking, a linearised flow does not show how far slips go; {_CHECK}"
-    if not error < _MOST_BELIEVED:
-        return np.nan, f"{NOT_JUDGED}{_BEYOND}; {_CHECK}"
-    if error > _DOUBTED * expected_error(scenario):
-        return error, (
-            f"the run errs by about {error:.1g} rad rms, as far as its linearised flow shows: the motion is sensitive, "
-            f"as in a loop that hunts or of a body that tumbles; {_CHECK}"
-        )
-    return error, ""
 
 
 def with_tighter(scenario: Scenario, factor: float) -> Scenario:

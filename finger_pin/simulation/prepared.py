@@ -160,7 +160,7 @@ class Prepared:
         return add_slopes(found, base, numbers, runs, changes)
 
     def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
-        return Setup.of(scenario, self._loop(scenario, initial), estimate_error=False)
+        return Setup.of(scenario, self._loop(scenario, initial))
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
         motions = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)

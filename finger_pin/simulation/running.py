@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
@@ -26,7 +25,7 @@ from finger_pin.exceptions import (
     SelfLockingWarning,
 )
 from finger_pin.references.reference import LoopReference
-from finger_pin.simulation.accuracy import CHUNK, judge_error, left_open, open_account, ringing, too_stiff
+from finger_pin.simulation.accuracy import CHUNK, left_open, open_account, ringing, too_stiff
 from finger_pin.simulation.recording import RunArrays, check_memory, finite_part, only, record, refuse_unknown
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
@@ -81,20 +80,14 @@ def run(
         warnings.warn(close, SelfLockingWarning, stacklevel=5)
     sampled = SampledTrajectory(loop, trajectory, scenario.sample_times())
     result = record(scenario, sampled, setup.method, needed, text=to_toml(scenario))
-    error, inaccurate = judge_error(scenario, trajectory, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
-    # It says why, where an error that is large or unknown says that alone.
     stiff = too_stiff(result, loop.finger, scenario.simulation.atol_scale)
-    inaccurate = stiff or inaccurate
-    # Close to self-locking the warning of that is enough; an unknown error is no warning, but said in the result.
-    if stiff or (inaccurate and np.isfinite(error) and not close):
-        warnings.warn(inaccurate, AccuracyWarning, stacklevel=5)
+    if stiff:
+        warnings.warn(stiff, AccuracyWarning, stacklevel=5)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
-    if np.isfinite(error):
-        result.attrs["estimated_error"] = error
     gap = "" if trajectory.failure else open_account(result, left_open(result))
-    warned = {"self_locking": close, "micro_damping": driving, "accuracy": inaccurate, "account": gap, "ringing": slow}
+    warned = {"self_locking": close, "micro_damping": driving, "accuracy": stiff, "account": gap, "ringing": slow}
     notes = {**warned, "custom": custom}
     result.attrs |= {name: text for name, text in notes.items() if text}
     if names is not None:

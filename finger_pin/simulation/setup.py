@@ -47,7 +47,6 @@ class Setup:
         controller: The controller itself, where the loop samples it.
         sampled: Its sampled controller, if it has one.
         control: Inputs that are compiled; None where they are sampled or Python.
-        estimate_error: Whether the error of its motion will be asked for.
     """
 
     scenario: Scenario
@@ -56,16 +55,10 @@ class Setup:
     controller: LoopController
     sampled: SampledController | None
     control: InputTable | None = None
-    estimate_error: bool = True
 
     @classmethod
     def of(
-        cls,
-        scenario: Scenario,
-        loop: ClosedLoop | None = None,
-        custom: str = "",
-        control_period: float | None = None,
-        estimate_error: bool = True,
+        cls, scenario: Scenario, loop: ClosedLoop | None = None, custom: str = "", control_period: float | None = None
     ) -> Setup:
         """Make a scenario ready.
 
@@ -74,7 +67,6 @@ class Setup:
             loop: Its loop, where something in it is a user's own.
             custom: Names of the parts given in place of the scenario's, from `custom_parts`.
             control_period: As for `simulate`.
-            estimate_error: Whether the error of its motion will be asked for, which takes a tenth of its time.
 
         Raises:
             InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
@@ -117,7 +109,7 @@ class Setup:
         elif custom:
             # A wrong answer of a user's own controller is refused before anything is computed.
             loop.evaluate(0.0, loop.initial_state())
-        return cls(scenario, loop, method, controller, sampled, control, estimate_error)
+        return cls(scenario, loop, method, controller, sampled, control)
 
     def integrate(
         self,
@@ -194,8 +186,6 @@ class Setup:
             method=self.method,
             rtol=given.rtol,
             atol_scale=given.atol_scale,
-            # Of controllers that are sampled the linearised flow knows nothing.
-            estimate_error=self.estimate_error and self.sampled is None and loop.drives is None,
         )
 
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:

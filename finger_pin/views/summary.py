@@ -12,7 +12,6 @@ from finger_pin.description.scene_metadata import read_scene
 from finger_pin.mechanism.canals import WRAPS, is_canal
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
-from finger_pin.simulation.accuracy import NOT_JUDGED
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.simulation.recording import custom_of, is_tracking
@@ -66,9 +65,7 @@ def _own(result: xr.Dataset) -> list[str]:
 
 def _warnings(result: xr.Dataset) -> list[str]:
     told = [result.attrs[name] for name in _WARNINGS if name in result.attrs]
-    return [
-        line for each in told for line in textwrap.wrap(f"{'Note' if NOT_JUDGED in each else 'Warning'}: {each}", 80)
-    ]
+    return [line for each in told for line in textwrap.wrap(f"Warning: {each}", 80)]
 
 
 def _tracking(result: xr.Dataset) -> list[str]:
@@ -218,9 +215,7 @@ def _cost(result: xr.Dataset) -> list[str]:
     attributes = result.attrs
     wall = float(attributes["solver_wall_time"])
     factor = f"{attributes['end_time'] / wall:.3g}" if wall > 0.0 else "-"
-    error = attributes.get("estimated_error")
     return [
-        *([] if error is None else [f"Estimated error of the joint angles: {error:.0e} rad rms"]),
         f"Solver: {attributes['solver_steps']} steps, {attributes['solver_evaluations']} evaluations, "
         f"{attributes['solver_jacobians']} Jacobians",
         f"Wall time {wall:.3g} s, real-time factor {factor} (simulated over wall time)",

@@ -55,7 +55,7 @@ def _runs(name: str, rounds: int, quick: bool) -> dict[str, float]:
         {
             "short run": lambda: prepared.run([_SHORT, own]),
             "short changed": lambda: prepared.run([_SHORT, next(numbers)]),
-            "short steps": _Steps(Setup.of(brief, estimate_error=False)),
+            "short steps": _Steps(Setup.of(brief)),
         },
         4 * rounds,
     )

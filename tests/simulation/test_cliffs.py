@@ -3,7 +3,6 @@
 import os
 import warnings
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from validation.wild_fingers import wild_scenario
 
 import finger_pin as fp
-from finger_pin.exceptions import AccuracyWarning, SelfLockingWarning
 from finger_pin.laws.spring import JOINT_SPRING, spring_energy
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation import accuracy, recording
@@ -63,59 +61,6 @@ def test_a_loop_that_diverges_is_stopped_with_the_speed_that_says_so():
     table["controller"]["gain"] = 1e3
     with pytest.raises(fp.IntegrationError, match=r"joint_velocity\[j\] is beyond 34300 rad/s .* physical range"):
         fp.simulate(fp.Scenario.model_validate(table))
-
-
-@pytest.mark.slow
-def test_the_estimated_error_of_the_main_job_has_the_size_of_its_error_and_is_in_the_summary(fig6_runs):
-    result = fig6_runs["Rodas5P"]
-    tight = {"simulation.duration": 0.1, "simulation.rtol": 1e-10, "simulation.atol_scale": 1e-10}
-    exact = fp.simulate(fp.load_scenario("reversals", tight))
-    error = float(np.sqrt(np.mean((result.joint_position - exact.joint_position) ** 2)))
-    assert 0.1 * error < result.attrs["estimated_error"] < 100.0 * error
-    assert "accuracy" not in result.attrs
-    assert "Estimated error of the joint angles" in summarize(result)
-
-
-# The paper's finger with a stiff controller and six times the joint friction: from 0.17 s on it hunts.
-HUNTING = {"simulation.duration": 0.3, "controller.gain": 10.0, "finger.joint_friction.coulomb": 1.5e-3,
-           "finger.joint_friction.stiction": 2.1e-3}  # fmt: skip
-
-
-def hunting(tolerance):
-    overrides = HUNTING | {"simulation.rtol": tolerance, "simulation.atol_scale": tolerance}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SelfLockingWarning)
-        return fp.simulate(fp.load_scenario("reversals", overrides))
-
-
-@cache
-def truth():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AccuracyWarning)
-        return hunting(1e-9)
-
-
-def error_of(result):
-    difference = truth().joint_position - result.joint_position
-    return float(np.sqrt(np.mean(difference**2)))
-
-
-def test_the_estimate_that_is_carried_along_follows_what_a_loop_that_hunts_makes_of_small_errors(monkeypatch):
-    monkeypatch.setattr(accuracy, "_CLOSE_TO_LOCKING", 0.0)
-    result = hunting(1e-6)
-    assert error_of(result) > 1e-4
-    assert 1.0 / 3.0 < result.attrs["estimated_error"] / error_of(result) < 10.0
-    assert "accuracy" not in result.attrs
-
-
-def test_a_run_that_errs_by_far_more_than_its_tolerance_says_so(monkeypatch):
-    # Held to less than a user may expect at this tolerance.
-    monkeypatch.setattr(accuracy, "_MOST_EXPECTED", 1e-5)
-    monkeypatch.setattr(accuracy, "_CLOSE_TO_LOCKING", 0.0)
-    with pytest.warns(AccuracyWarning, match="errs by about"):
-        result = hunting(1e-6)
-    assert 1.0 / 3.0 < result.attrs["estimated_error"] / error_of(result) < 10.0
-    assert "Warning: the run errs by about" in summarize(result).replace("\n", " ")
 
 
 def test_what_rings_in_a_slow_run_is_named_with_its_frequency(monkeypatch):
@@ -194,7 +139,6 @@ mass = 0.1
 angular_velocity = [0.001, 5, 0]
 """)
     result = fp.simulate(path)
-    assert "a body that tumbles" in result.attrs["accuracy"]
     assert " of the energy stored, as none is exchanged:" in result.attrs["account"]
 
 
@@ -235,7 +179,6 @@ def test_a_power_that_bends_at_the_very_end_of_a_step_is_booked_to_a_millionth()
 def test_an_account_that_is_open_at_the_tolerance_is_told_and_closes_at_a_tighter_one():
     tight = wild_scenario(854).updated(simulation={"rtol": 1e-8, "atol_scale": 1e-8})
     result, closed = fp.simulate(wild_scenario(854)), fp.simulate(tight)
-    assert "not judged: close to self-locking" in result.attrs["accuracy"]
     assert share_left_open(result) > 1e-4 and "account closes only to" in result.attrs["account"]
     assert share_left_open(closed) < 1e-5 and "account" not in closed.attrs
 

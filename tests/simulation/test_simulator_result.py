@@ -36,7 +36,7 @@ def test_held_tensions_give_the_dataset_of_an_open_loop_scenario(finger: fp.Fing
         simulator.step(TENSION, 1e-3)
     found = simulator.result()
     assert list(found.variables) == list(expected.variables)
-    assert set(found.attrs) == {*expected.attrs, "custom"} - {"estimated_error"}
+    assert set(found.attrs) == {*expected.attrs, "custom"}
     for name, variable in expected.variables.items():
         assert found[name].dims == variable.dims
         assert found[name].attrs == variable.attrs

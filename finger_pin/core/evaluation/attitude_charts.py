@@ -52,17 +52,13 @@ place_bodies = inlined(place_all)
 
 
 @njit_always_inline
-def rechart(tables: Tables, x: Vector, attitude: Matrix, drift: Vector) -> None:
-    """Move the angles of all free bodies into their quaternions (x, y, z, w), and into the bodies' placements.
-
-    The ``drift`` of angles and rates, small changes of them, is that of the new ones afterwards.
-    """
+def rechart(tables: Tables, x: Vector, attitude: Matrix) -> None:
+    """Move the angles of all free bodies into their quaternions (x, y, z, w), and into the bodies' placements."""
     width = tables.parents.size + tables.lumps.size
     for f in range(tables.charts.size):
         i = tables.charts[f]
         a, b, c = x[i], x[i + 1], x[i + 2]
         da, db, dc = x[width + i], x[width + i + 1], x[width + i + 2]
-        turn_small(a, b, c, da, db, dc, drift[i : i + 3], drift[width + i : width + i + 3])
         x[width + i] = da * np.cos(b) * np.cos(c) + db * np.sin(c)
         x[width + i + 1] = db * np.cos(c) - da * np.cos(b) * np.sin(c)
         x[width + i + 2] = da * np.sin(b) + dc
@@ -75,23 +71,6 @@ def rechart(tables: Tables, x: Vector, attitude: Matrix, drift: Vector) -> None:
         for r in range(4):
             q[r] /= size
         _place(tables.chart_frames[f], q, tables.bodies[i])
-
-
-@njit_inline
-def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, angles: Vector, rates: Vector) -> None:
-    """Replace small changes of angles and rates by those after the angles are reset to zero."""
-    sb, cb, sc, cc = np.sin(b), np.cos(b), np.sin(c), np.cos(c)
-    # The angular velocity (x, y), as in `rechart`, and how it changes.
-    x, y = da * cb * cc + db * sc, db * cc - da * cb * sc
-    p, q, r = angles[0], angles[1], angles[2]
-    dx = rates[0] * cb * cc + rates[1] * sc - da * sb * cc * q + y * r
-    dy = rates[1] * cc - rates[0] * cb * sc + da * sb * sc * q - x * r
-    dz = rates[0] * sb + rates[2] + da * cb * q
-    # The turn that changes of the angles are, about the body's axes.
-    p, q, r = p * cb * cc + q * sc, q * cc - p * cb * sc, p * sb + r
-    angles[0], angles[1], angles[2] = p, q, r
-    # From the angular velocity at these new angles to their rates.
-    rates[0], rates[1], rates[2] = dx - y * r, dy + x * r, dz - x * q
 
 
 @njit_inline

@@ -44,18 +44,16 @@ def cut_step(address: int, h: float) -> int:
     """Cut a step that an `Integration` at an address has tried; fill its interpolant and the shares taken and next."""
     integration = unpack(address, INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
-    again = memory.rejected[0] > 0.0 and model.tables.contact_rows > 0
     interpolant(integration.tableau, integration.k, integration.dense)
     part, kept, share = _kept_at_kinks(integration, model, h, int(memory.outcome[0]))
     if kept == 1.0:
         before = _part_before_reversal(integration, model, part * h)
         if before < share:
-            memory.max_next_step_size[0], share = np.inf, 1.0
+            memory.max_next_step_size[0] = np.inf
         part *= before
         if bristles_over_limit(integration, model) and part * h > _MIN_CUT_STEP * max(1.0, abs(memory.time[0])):
             kept = _OVERLOAD_RETRY_SHARE * part
-    memory.taken_share[0], memory.retry_share[0], memory.left_share[0] = part, kept, share
-    memory.errors_alike[0] = 1.0 * (share < 1.0 or memory.outcome[0] == LEFT_BRANCH or again)
+    memory.taken_share[0], memory.retry_share[0] = part, kept
     if kept == 1.0 and integration.events.detect:
         call_at(integration.events.detect, address, h)
     return 1
@@ -84,8 +82,8 @@ def cull_contacts(address: int, _time: float) -> int:
     tables, paths, first = model.tables, model.work.paths, 2 * model.linear.mass.shape[0]
     if update_culling(tables, model.work.rows, paths, model.state[first:]):
         list_active_pairs(tables, paths)
-        for values in (integration.start, integration.global_error, model.rate):
-            forget_culled(tables, paths, first, values)
+        forget_culled(tables, paths, first, integration.start)
+        forget_culled(tables, paths, first, model.rate)
         for j in range(integration.k.shape[0]):
             forget_culled(tables, paths, first, integration.k[j])
     return 1

@@ -136,7 +136,7 @@ def accept_step(args: AdvanceArgs, integration: Integration, model: Model, time:
         copy(x, args.states[taken])
         copy(integration.kinks, args.branches[taken])
         args.shares[taken] = integration.memory.taken_share[0]
-    rechart(model.tables, x, attitude, integration.global_error)
+    rechart(model.tables, x, attitude)
     if taken < args.times.size:
         for f in range(attitude.shape[0]):
             for c in range(4):
@@ -183,8 +183,6 @@ def advance(address: int, end: float) -> int:
         elif kept < 1.0:
             _shorten(integration, h * kept, max(memory.uncut_step_size[0], h))
         else:
-            if integration.joints.size + integration.objects.size > 0:
-                call_at(integration.propagate_error, args.integration, h)
             accept_step(args, integration, model, end if final and part == 1.0 else time + part * h)
             _pace(integration, h, error, final, clipped)
     return at.DONE

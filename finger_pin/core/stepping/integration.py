@@ -39,9 +39,6 @@ class StepMemory(NamedTuple):
         goal: End of the last call, s.
         window_start: Time at which the last `WINDOW` tries began, s.
         window_end: Number of tries at which they end.
-        joint_error: Integral over time of the mean square of the joints' errors, rad2 s.
-        object_error: The same of objects, rad2 s or m2 s.
-        error_lag: Time from where the error has been carried to, to the time reached, s.
         fresh: Flag, whether the step that is tried has a new start.
         jumped: Flag, whether held inputs have jumped since the last step.
         uncut_step_size: Size of the step before it was cut at a kink, s, or 0.
@@ -49,9 +46,7 @@ class StepMemory(NamedTuple):
         outcome: Outcome of the try.
         taken_share: Share of the try that is taken.
         retry_share: Share of it that is tried next, or 1.
-        left_share: Share of what is taken after which a branch has been left, or 1.
         stale: Flag, whether the model has changed since the try, which is repeated from a new evaluation of its start.
-        errors_alike: Flag, whether both methods of the pair may err alike in the step, so that its defect is asked.
         frozen: Flag, whether the branches of kinks are given instead of those where the step starts.
     """
 
@@ -71,9 +66,6 @@ class StepMemory(NamedTuple):
     goal: Vector
     window_start: Vector
     window_end: Vector
-    joint_error: Vector
-    object_error: Vector
-    error_lag: Vector
     fresh: Vector
     jumped: Vector
     uncut_step_size: Vector
@@ -81,9 +73,7 @@ class StepMemory(NamedTuple):
     outcome: Vector
     taken_share: Vector
     retry_share: Vector
-    left_share: Vector
     stale: Vector
-    errors_alike: Vector
     frozen: Vector
 
     @classmethod
@@ -131,13 +121,9 @@ class Integration(NamedTuple):
         r: Scratch, shape (size + 1,).
         end: Scratch, shape (size,).
         dense: Coefficients of a step's interpolant, shape (rows of the tableau's dense, size).
-        global_error: Estimate of the error so far, shape (size,).
         kinks: Where each row was between the sides of its kink when the step began, or a sign, shape (K,).
         reevaluate: Whether a second try evaluates its start again, for what is read from the memory of that.
-        joints: Coordinates whose error is estimated; without any nothing is, which saves a tenth.
-        objects: Those of free objects, likewise.
         events: What its model does about steps.
-        propagate_error: Address of what carries the error over a step; 0 where none is estimated.
     """
 
     model: int
@@ -152,13 +138,9 @@ class Integration(NamedTuple):
     r: Vector
     end: Vector
     dense: Matrix
-    global_error: Vector
     kinks: Vector
     reevaluate: bool
-    joints: Indices
-    objects: Indices
     events: Events
-    propagate_error: int
 
 
 class AdvanceArgs(NamedTuple):

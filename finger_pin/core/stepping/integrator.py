@@ -119,7 +119,6 @@ def integrate_compiled(
         stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
     # Of a controller that acts in between, the linearised flow knows nothing.
     known = held is None and not stepper.driven
-    estimate_error = known and stepper.estimate_error and not stepper.repeats
     recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     began = time.perf_counter()
     alone = len(recorders) == 1
@@ -141,7 +140,6 @@ def integrate_compiled(
         statistics=_statistics(recorders, time.perf_counter() - began),
         failure=reason,
         interrupted=interrupted,
-        estimated_error=stepper.estimated_error if estimate_error else np.nan,
         # Inputs that are held in between are not the core's own.
         islands=() if not known or stepper.held else tuple(steps),
         steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
-from finger_pin.core.chains import PRISMATIC
 from finger_pin.core.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.events.step_events import activate_contacts, step_events
@@ -20,7 +18,6 @@ from finger_pin.core.islands import Island
 from finger_pin.core.jit import Block, CompiledFunction, copied, pack
 from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.adaptive import advance
-from finger_pin.core.stepping.error_propagation import propagate_error
 from finger_pin.core.stepping.knots import ADVANCE_KNOTTED_ARGS, AdvanceKnottedArgs, advance_knotted
 from finger_pin.core.stepping.repetition import REPEAT_STEPS_ARGS, RepeatStepsArgs, Steps, repeat_steps
 from finger_pin.core.stepping.tableaus import Tableau
@@ -79,9 +76,6 @@ class IslandIntegrator:
         attitude: Quaternions of its free bodies, shape (f, 4).
         atol: Absolute tolerances, shape (size,).
         memory: Time, step size, error history and counters; views of one vector.
-        estimate_error: Whether its error is estimated.
-        joints: Coordinates whose error is; none of what is moved along paths.
-        objects: Coordinates of free objects, likewise.
         drives: Loops of motors in position drive, which sample on the way; None for none.
         knots: Times at which steps end, s, positive, in order.
         steps: Steps that are taken whatever their errors; None to choose them.
@@ -103,7 +97,6 @@ class IslandIntegrator:
         rtol: float,
         atol: Array,
         memory: Array,
-        estimate_error: bool = True,
     ) -> None:
         """Bind everything; arrays are taken as they are, not copied."""
         self.island, self.laws = island, laws
@@ -112,7 +105,6 @@ class IslandIntegrator:
         self.model = BoundModel(tables, control, self.work)
         if not len(x) == len(atol) == len(self.model.model.state):
             raise RuntimeError(f"an island of {len(self.model.model.state)} numbers starts from {len(x)}")
-        of_objects, free = object_coordinates(tables), tables.prescribed[: len(tables.parents)] < 0
         self._bound = core.Integration(
             model=self.model.address,
             tableau=tableau,
@@ -126,18 +118,13 @@ class IslandIntegrator:
             r=np.zeros(len(x) + 1),
             end=np.zeros(len(x)),
             dense=np.zeros((len(tableau.dense), len(x))),
-            global_error=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
-            joints=np.flatnonzero(~of_objects & free & estimate_error),
-            objects=np.flatnonzero(of_objects & free & estimate_error),
             reevaluate=bool(tables.has_tip_force or tables.contact_rows),
             events=step_events(tables.contact_rows > 0),
-            propagate_error=propagate_error.address if estimate_error else 0,
         )
         self._block = pack(self._bound, core.INTEGRATION)
-        self.joints, self.objects = self._bound.joints, self._bound.objects
         place_all(tables, attitude)
-        self.tables, self.control, self.tableau, self.estimate_error = tables, control, tableau, estimate_error
+        self.tables, self.control, self.tableau = tables, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, self._bound.memory
         self._memory = memory
         self._nothing, self._taken = self.room(0), np.zeros(2, dtype=np.int64)
@@ -155,11 +142,6 @@ class IslandIntegrator:
     def rtol(self) -> float:
         """Relative tolerance."""
         return float(self._bound.rtol)
-
-    @property
-    def global_error(self) -> Array:
-        """Estimate of the error of its state, carried along, shape (size,); no copy."""
-        return self._bound.global_error
 
     @property
     def time(self) -> float:
@@ -235,7 +217,6 @@ class IslandIntegrator:
             pack.rtol,
             pack.atol,
             self._memory,
-            self.estimate_error,
         )
 
     @property
@@ -263,18 +244,7 @@ class IslandIntegrator:
             pack.rtol,
             pack.atol.copy(),
             self._memory.copy(),
-            self.estimate_error,
         )
-
-
-def object_coordinates(tables: Tables) -> NDArray[np.bool_]:
-    """Return a mask of the bodies' coordinates that are of free objects: three that slide, and three that turn."""
-    found = np.zeros(len(tables.parents), dtype=bool)
-    for first in tables.charts:
-        found[first : first + 3] = True
-        if first >= 3 and np.all(tables.kinds[first - 3 : first] == PRISMATIC):
-            found[first - 3 : first] = True
-    return found
 
 
 def failure(part: IslandIntegrator, status: int, names: list[str]) -> str:

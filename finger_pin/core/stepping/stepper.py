@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,9 +28,6 @@ Snapshot = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
 
-# As often the error that is carried along counts.
-_TWICE = 2.0
-
 
 class Stepper:
     """Integrator of a mechanism, one island at a time.
@@ -39,7 +35,6 @@ class Stepper:
     Attributes:
         mechanism: The mechanism.
         parts: Its islands.
-        estimate_error: Whether its error is estimated.
     """
 
     def __init__(
@@ -52,8 +47,6 @@ class Stepper:
         atol: Array,
         force: Array | None = None,
         time: float = 0.0,
-        *,
-        estimate_error: bool = True,
     ) -> None:
         """Start from a state.
 
@@ -66,9 +59,7 @@ class Stepper:
             atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
             force: At the tips, shape (3,) or (t, 3), N, base frame.
             time: When, s.
-            estimate_error: Whether `estimated_error` will be asked for, which takes a tenth of the time.
         """
-        self.estimate_error = estimate_error
         tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
         self._charts, self._width = Charts.of(mechanism), mechanism.coordinates
         selected = selections(tables, control)
@@ -89,7 +80,7 @@ class Stepper:
             own = copied(each.tables(tables)._replace(tip_force=pushed, has_tip_force=loaded))
             begun = inputs, start[at], attitude[free], tableau, float(rtol), tolerances[at], memory
             followed = [laws[group] for group in each.of_groups]
-            self.parts.append(IslandIntegrator(each.island, followed, own, *begun, estimate_error))
+            self.parts.append(IslandIntegrator(each.island, followed, own, *begun))
 
     @classmethod
     def of(
@@ -102,7 +93,6 @@ class Stepper:
         method: str,
         rtol: float,
         atol_scale: float,
-        estimate_error: bool = False,
     ) -> Stepper:
         """Return the stepper of a finger under inputs, from a packed state on.
 
@@ -114,11 +104,9 @@ class Stepper:
             method: One of `TABLEAUS`.
             rtol: Relative tolerance.
             atol_scale: Absolute tolerance over the scale of each kind of state.
-            estimate_error: Whether the error will be asked for.
         """
         tolerances = atol_scale * finger.layout.scales()
-        given = finger.mechanism, control, x, TABLEAUS[method](), rtol, tolerances, force
-        return cls(*given, estimate_error=estimate_error)
+        return cls(finger.mechanism, control, x, TABLEAUS[method](), rtol, tolerances, force)
 
     def _places(self, island: Island) -> NDArray[np.int64]:
         """Return the places of an island's numbers in the state of the whole."""
@@ -142,24 +130,6 @@ class Stepper:
     def held(self) -> bool:
         """Whether inputs are held."""
         return any(part.control.kind == HELD for part in self.parts)
-
-    @property
-    def estimated_error(self) -> float:
-        """Estimate of the error of the joints' angles so far, root mean square over joints and time, rad.
-
-        It is that of free objects, of their turns and places, rad and m, where that is larger. The local errors are
-        carried along the linearised flow, and count twice: at kinks they are known to a factor only. It is seldom
-        below a third of the error, and sometimes far above it; NaN if nobody wants to know.
-        """
-        if not self.estimate_error:
-            return np.nan
-        joints = [(len(part.joints), part.memory.joint_error[0]) for part in self.parts]
-        objects = [(len(part.objects), part.memory.object_error[0]) for part in self.parts]
-        means = [
-            sum(n * global_error for n, global_error in each) / max(sum(n for n, _ in each), 1)
-            for each in (joints, objects)
-        ]
-        return _TWICE * float(np.sqrt(max(means) / self.time)) if self.time > 0.0 else 0.0
 
     @property
     def time(self) -> float:
@@ -248,7 +218,7 @@ class Stepper:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds islands of its own."""
-        return partial(Stepper, estimate_error=self.estimate_error), self._made_of, self.state_snapshot
+        return Stepper, self._made_of, self.state_snapshot
 
     def __setstate__(self, state: Snapshot) -> None:
         """Continue from the snapshot of a stepper with the same arguments."""

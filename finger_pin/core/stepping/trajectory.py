@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.typing import Array
 
@@ -48,7 +46,6 @@ class Trajectory:
         statistics: The cost.
         failure: Report of the integrator if it failed, otherwise empty.
         interrupted: Whether it was asked to stop.
-        estimated_error: Of the joints' angles, root mean square over joints and time, rad; NaN where not estimated.
         islands: Motions of what moves apart, where the core computes all inputs itself; none otherwise.
         steps: Steps of each that moves apart, of a method of the core; none of others.
     """
@@ -58,6 +55,5 @@ class Trajectory:
     statistics: Statistics
     failure: str = ""
     interrupted: bool = False
-    estimated_error: float = np.nan
     islands: tuple[Apart, ...] = ()
     steps: tuple[Steps, ...] = ()
