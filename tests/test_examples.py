@@ -173,17 +173,13 @@ def test_the_notebook_sticks_slips_goes_slack_and_locks(tmp_path):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
 
-    def printed():
-        notebook = nbformat.read(FOLDER / "stick_slip_slack_locking.ipynb", as_version=4)
-        assert not any(cell.get("outputs") for cell in notebook.cells)
-        nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(tmp_path)}}).execute()
-        return [each for cell in notebook.cells for each in cell.get("outputs", []) if each.output_type == "stream"]
-
-    # The first run of all says that it compiles, and how far it is; the next one says nothing of that.
-    streams = printed()
-    streams = streams if {each.name for each in streams} == {"stdout"} else printed()
-    assert {each.name for each in streams} == {"stdout"}
-    lines = "".join(each.text for each in streams).splitlines()
+    notebook = nbformat.read(FOLDER / "stick_slip_slack_locking.ipynb", as_version=4)
+    assert not any(cell.get("outputs") for cell in notebook.cells)
+    nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    streams = [each for cell in notebook.cells for each in cell.get("outputs", []) if each.output_type == "stream"]
+    # A slow machine says how far it is, and the first run of all that it compiles.
+    assert not any("Warning" in each.text for each in streams)
+    lines = "".join(each.text for each in streams if each.name == "stdout").splitlines()
     even, jerky, loose, *locking = [[float(number) for number in re.findall(r"[\d.]+", line)] for line in lines]
     assert even[1] == pytest.approx(even[2], rel=0.01) and jerky[1] > 10.0 * jerky[2]
     # Friction of 20 mN m holds the lever where its spring of 0.05 N m/rad pulls with less, and nothing else does.

@@ -36,6 +36,7 @@ EXPRESSIBLE: dict[str, Any] = {
 # The pad meets the plate of `press` at 1.4 m/s, bounces four times, and pushes; what contact loses is taken away too.
 PRESSING: dict[str, Any] = {
     "finger": "ub_stand_in",
+    "controller.damping": 0.0,
     "environment.objects.plate.surface": {"friction": 0.0, "damping": 0.0},
     "reference.joints.proximal": {"kind": "points", "times": [0.0, 0.04], "values": [0.15, 0.42]},
     "reference.joints.medial": {"kind": "points", "times": [0.0, 0.04], "values": [0.38, 0.455]},

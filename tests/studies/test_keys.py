@@ -53,7 +53,6 @@ def test_a_whole_number_stays_one(reversals):
         ("controller.kind", "must be one of"),
         ("simulation.method", "must be one of"),
         ("finger.title", "no such number"),
-        ("finger.tendons.T1.crossings.abduction.bends", "no such number"),
         ("finger.tendons.T9.crossings.abduction.radius", "no such number"),
         ("finger.tendons.T3.crossings.distal.radius", "no such number"),
         ("reference.joints.medial", "must be a table"),
