@@ -73,7 +73,7 @@ def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
     """
     finger = as_finger(finger)
     theta = finite_vector("position", position, len(finger.routing.joints))
-    if finger.paths is None:
+    if not finger.paths.routes:
         return finger
     if finger.tendons.at_bends:
         allowed = 'must be "canal" for statics of tendons along paths through space'

@@ -227,14 +227,14 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
 
 
 def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> None:
-    actuators = tuple(finger.tree.actuators) if finger.tree else ()
+    actuators = tuple(finger.tree_or_empty.actuators)
     for name in settings.inputs or {}:
         if name not in actuators:
             hint = f"; give controller.spool_angle.{name}" if name in finger.actuators else suggestion(name, actuators)
             allowed = f"no such actuator; there are {', '.join(actuators) or 'none'}{hint}"
             raise problem(f"controller.inputs.{name}", allowed)
     if settings.kind == "proportional":
-        if finger.tree is not None and (actuators or not finger.tendons):
+        if actuators or not finger.tendons:
             raise problem("controller.kind", 'must be "tensions": actuators are driven in open loop', settings.kind)
         return
     names = finger.actuated_names

@@ -89,7 +89,7 @@ OF_FINGER = (
     Rule(
         "",
         ("touches_itself",),
-        lambda finger, _: finger.tree.touching if finger.tree else len(finger.joints) > 2,
+        lambda finger, _: finger.tree_or_empty.touching or (finger.tree is None and len(finger.joints) > 2),
         "has no effect where no two parts but neighbours could touch",
     ),
     Rule(

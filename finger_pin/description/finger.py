@@ -25,7 +25,7 @@ from finger_pin.description.placement import (
     scaled,
     tendon_of_hand,
 )
-from finger_pin.description.tree import Tree
+from finger_pin.description.tree import EMPTY, Tree
 from finger_pin.description.validation import IN_RADIANS, Description, Name, check_size, problem, quantity, real, vector
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
@@ -77,8 +77,8 @@ class FingerDescription(Description):
             raise problem("tendons", "must have at least one entry")
         if self.tree is not None and tuple(self.tree.joints) != joints:
             raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
+        paths = tuple(self.tree_or_empty.tendons)
         for name, tendon in self.tendons.items():
-            paths = tuple(self.tree.tendons) if self.tree else ()
             if tendon.along is not None and tendon.along not in paths:
                 allowed = f"no such tendon of the tree; there are {', '.join(paths) or 'none'}"
                 raise problem(f"tendons.{name}.along", allowed, tendon.along)
@@ -86,8 +86,8 @@ class FingerDescription(Description):
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
-        driven = (*self.actuated_names, *self.tree.actuators) if self.tree is not None else ()
-        for key, keyframe in (self.tree.keyframes if self.tree is not None else {}).items():
+        driven = (*self.actuated_names, *self.tree_or_empty.actuators)
+        for key, keyframe in self.tree_or_empty.keyframes.items():
             for name in keyframe.inputs:
                 if name not in driven:
                     allowed = f"no such actuator or tendon; there are {', '.join(driven)}"
@@ -110,6 +110,11 @@ class FingerDescription(Description):
         return self
 
     @property
+    def tree_or_empty(self) -> Tree:
+        """Its tree; of a finger of links one without anything."""
+        return self.tree or EMPTY
+
+    @property
     def outline(self) -> str:
         """Name, joints and tendons, in a line."""
         if self.hand is not None:
@@ -130,7 +135,7 @@ class FingerDescription(Description):
     @property
     def canals(self) -> tuple[str, ...]:
         """Names of the tree's tendons that something else than ideal sources pulls: they rub as all tendons do."""
-        return self.tree.rubbing if self.tree is not None else ()
+        return self.tree_or_empty.rubbing
 
     @property
     def passive_names(self) -> tuple[str, ...]:

@@ -71,9 +71,9 @@ class Routing:
                 radii[column[joint], order] = crossing.radius
                 bends[column[joint], order] = crossing.bends if joint in rubbing else 0.0
                 crossed[column[joint], order] = 1.0
-            if tendon.along is not None and description.tree is not None:
+            if tendon.along is not None:
                 # Its arms depend on the posture; which joints it crosses does not.
-                parts = description.tree.crossed(tendon.along)
+                parts = description.tree_or_empty.crossed(tendon.along)
                 crossed = np.array([[sum(1.0 / divisor for divisor, own in parts if j in own)] for j in joints])
             coupling.append(radii.sum(axis=1))
             curvature.append(bends.sum(axis=1))
@@ -230,7 +230,7 @@ class ForceClosure:
 
 def _offset(description: FingerDescription, tendon: Tendon) -> float:
     """Return the curvature of a tendon at theta = 0 that does not show: its own, its crossings', its path's."""
-    along = description.tree.tendons[tendon.along].curvature_offset if description.tree and tendon.along else 0.0
+    along = description.tree_or_empty.tendons[tendon.along].curvature_offset if tendon.along else 0.0
     own = _rubbing(description, tendon)
     return tendon.curvature_offset + along + sum(tendon.crossings[each].curvature_offset for each in own)
 

@@ -143,7 +143,7 @@ class Scenario(Description):
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         table: dict[str, Any] = handler(self)
-        of_tree = self.finger.tree.objects if self.finger.tree else {}
+        of_tree = self.finger.tree_or_empty.objects
         around = table.get("environment", {}).get("objects") or {}
         for name in {*of_tree} & {*around}:
             # It stands in the tree, where it can be changed.
@@ -204,14 +204,14 @@ class Scenario(Description):
     @property
     def keyframe(self) -> Keyframe | None:
         """The posture of a tree that the run starts from, and the inputs that go with it; None without any."""
-        known, initial = self.finger.tree.keyframes if self.finger.tree else {}, self.simulation.initial
+        known, initial = self.finger.tree_or_empty.keyframes, self.simulation.initial
         name = initial.keyframe if initial else None
         return known[name] if name else next(iter(known.values()), None)
 
     def _check_names(self) -> None:
         """Refuse a table for a joint or a finger that is not there."""
         initial = self.simulation.initial or InitialSettings()
-        keyframes = tuple(self.finger.tree.keyframes) if self.finger.tree else ()
+        keyframes = tuple(self.finger.tree_or_empty.keyframes)
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
             "reference.joints": (self.reference.joints, "joint", joints),

@@ -180,6 +180,10 @@ class Tree(Description):
         return found
 
 
+#: What a finger of links has beside its own joints and tendons: nothing.
+EMPTY = Tree.model_construct(bodies={}, joints={})
+
+
 def _check(entry: str, name: str | None, names: Iterable[str], what: str) -> None:
     known = list(names)
     if name is not None and name not in known:

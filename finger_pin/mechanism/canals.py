@@ -75,7 +75,7 @@ class Canals:
     def __init__(
         self,
         description: FingerDescription,
-        routes: TendonPaths | None,
+        routes: TendonPaths,
         tendons: Tendons,
         rows: Sequence[Rows],
         drive_matrices: Mapping[str, Array],
@@ -85,7 +85,7 @@ class Canals:
 
         Args:
             description: Of the finger.
-            routes: The tendons of its tree; None without one.
+            routes: The tendons of its tree.
             tendons: With the numbers of friction, those of canals after the finger's own.
             rows: Earlier rows: those of the tree, and of the finger's tendons.
             drive_matrices: Weights with which drives pull the actuated tendons, by table.
@@ -94,7 +94,7 @@ class Canals:
         self.tables: list[Rows] = []
         self.loads: dict[str, Array] = {}
         self.wraps: dict[str, Array] = {}
-        self._description, self._tree, self._tendons = description, description.tree, tendons
+        self._description, self._tree, self._tendons = description, description.tree_or_empty, tendons
         self._joints, self._width = tuple(description.joints), width
         self._known = {table.group: table for table in rows}
         # They load the pins by themselves.
@@ -105,8 +105,6 @@ class Canals:
         for table in self.tables:
             tendon = {row: index for index, each in enumerate(own) for _, row in left[each.name]}
             self.wraps[table.group] = np.eye(len(tendons.routing.tendons))[:, [tendon[name] for name in table.names]]
-        if routes is None or self._tree is None:
-            return
         cords = {name: shares for name in self._tree.rubbing if (shares := self._tree.linked(name))}
         if cords:
             self._known[CORDS] = self._cords(cords)
@@ -159,7 +157,7 @@ class Canals:
             wraps=(wrap,),
         )
 
-    def _own(self, index: int, name: str, routes: TendonPaths | None, drive_matrices: Mapping[str, Array]) -> _Canal:
+    def _own(self, index: int, name: str, routes: TendonPaths, drive_matrices: Mapping[str, Array]) -> _Canal:
         """Return the canal of an actuated tendon of the finger, pulled by its drives besides what its source leaves."""
         tendon = self._description.tendons[name]
         drives = {
@@ -168,16 +166,14 @@ class Canals:
             for k in np.flatnonzero(weights[index])
         }
         route = TendonPath(-self._tendons.routing.coupling[index], ())
-        if tendon.along is not None and routes is not None:
+        if tendon.along is not None:
             route = routes.routes[tendon.along]
         bends, wraps = self._tendons.routing.curvature_matrix[index], self._tendons.wraps[index]
         return _Canal(name, index, route, True, frozenset(), drives, bends=bends, wraps=wraps)
 
     def _trunk(self, name: str, routes: TendonPaths) -> _Canal:
         """Return the canal of a tendon of the tree before its first pulley, at the first of its wraps."""
-        tree = self._tree
-        assert tree is not None
-        tendon = tree.tendons[name]
+        tree, tendon = self._tree, self._tree.tendons[name]
         sources: dict[tuple[str, str], float] = {}
         # No path through space has a length below zero, at which its spring or its range would push.
         one_way = not tendon.friction
@@ -203,7 +199,6 @@ class Canals:
 
     def _behind(self, trunk: _Canal, tendon: str, friction: dict[tuple[str, str], float]) -> list[_Canal]:
         """Return the branches of a tendon: what pulls them is what the trunk's friction leaves, divided."""
-        assert self._tree is not None
         found, parts = [], zip(trunk.route.branches, self._tree.crossed(tendon)[1:], strict=True)
         for number, ((divisor, legs), (_, crossed)) in enumerate(parts, start=1):
             if legs:
@@ -216,9 +211,7 @@ class Canals:
 
     def _cords(self, cords: Mapping[str, Mapping[str, float]]) -> Rows:
         """Return the tensions of cords that turn joints."""
-        tree = self._tree
-        assert tree is not None
-        actuators = tree.actuators
+        tree, actuators = self._tree, self._tree.actuators
         shares = [{(table_of(actuators[key]), key): share for key, share in each.items()} for each in cords.values()]
         return Rows(
             group=CORDS,
@@ -258,7 +251,7 @@ class Canals:
     def _press(self, own: str, canals: Sequence[_Canal], *, whole: bool) -> None:
         """Record how the friction of canals, and as a whole what pulls through them, load the joints they cross."""
         for joint, name in enumerate(self._joints):
-            if self._tree is not None and not self._tree.joints[name].bearing:
+            if name in self._tree.joints and not self._tree.joints[name].bearing:
                 continue
             for each in canals:
                 pressing = each.sources if whole else {}

@@ -41,7 +41,7 @@ class Finger:
         springs: The springs of the joints.
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
-        paths: The tendons of a tree as functions of the posture; None without a tree.
+        paths: The tendons of a tree as functions of the posture; none without a tree.
         extra_rows: Tables of rows that were added, those of a tree first.
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
@@ -77,9 +77,9 @@ class Finger:
         """
         self.description = description = describe(description)
         self.constructor_args = ConstructorArgs(rigid_body, tuple(rows), objects, dict(tables or {}))
-        self.paths: TendonPaths | None = None
         if description.tree is None:
             self.rigid_body = rigid_body or build_rigid_body(description)
+            self.paths = TendonPaths(self.rigid_body, {}, {}, {})
         else:
             self.rigid_body, self.paths = build_tree(description)
         check_joints(self.rigid_body, description)
@@ -87,7 +87,7 @@ class Finger:
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self._excursions = Excursions(self.routing, description, self.paths)
         self.visuals: pin.GeometryModel | None = None
-        of_tree = tree_rows(description, self.paths, parts.width) if self.paths else []
+        of_tree = tree_rows(description, self.paths, parts.width)
         # What pulls tendons comes before their friction.
         before = tuple(table for table in of_tree if table.group != "tendon_dry_friction")
         drives = parts.drives(description, rows)
@@ -109,8 +109,7 @@ class Finger:
             self.routing.actuated,
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
-        placed = None if self.paths is None else self.paths.placed
-        self.scene = Scene.around(mechanism, objects, description, placed)
+        self.scene = Scene.around(mechanism, objects, description, self.paths.placed or None)
         self.mechanism = mechanism if self.scene is None else self.scene.joined(mechanism)
         layers = self.tendons, self.joint_friction, self.actuators
         self.layout = state_layout(*layers, last, self.scene, before, canals.tables, self.rigid_body.slides)
@@ -199,10 +198,9 @@ class Finger:
     @property
     def input_names(self) -> tuple[str, ...]:
         """Names of the inputs u: the actuated tendons, of winches what is wound, then the actuators of a tree."""
-        tree, routing = self.description.tree, self.routing
-        names = zip(routing.tendons, routing.winched, strict=False)
+        names = zip(self.routing.tendons, self.routing.winched, strict=False)
         inputs = (f"tendon_winding.{name}" if winched else name for name, winched in names)
-        return (*inputs, *(tree.actuators if tree is not None else ()))
+        return (*inputs, *self.description.tree_or_empty.actuators)
 
     def evaluate(
         self,

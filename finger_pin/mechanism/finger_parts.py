@@ -76,16 +76,15 @@ class Parts(NamedTuple):
     def tables(
         self,
         description: FingerDescription,
-        paths: TendonPaths | None,
+        paths: TendonPaths,
         of_tree: tuple[Rows, ...],
         drives: tuple[Rows, ...],
         drive_matrices: dict[str, Array],
     ) -> tuple[list[Rows], Canals]:
         """Return the tables of rows in the order of evaluation, and the canals."""
         joints, width = self.routing.joints, self.width
-        tendon_rows: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.inertias))
-        if paths:
-            tendon_rows = [along_paths(description, paths, table) for table in tendon_rows]
+        tendon_rows = _made(self.tendons.rows, drives, len(self.actuators.inertias))
+        tendon_rows = [along_paths(description, paths, table) for table in tendon_rows]
         canals = Canals(description, paths, self.tendons, [*of_tree, *tendon_rows], drive_matrices, width)
         pins = _pins(self, drives, drive_matrices, canals.loads)
         return [

@@ -168,29 +168,27 @@ def rotation(quaternion: tuple[float, float, float, float]) -> Array:
 class Excursions:
     """Excursions of all t tendons, zero in the joints' reference posture."""
 
-    def __init__(self, routing: Routing, description: FingerDescription, paths: TendonPaths | None) -> None:
+    def __init__(self, routing: Routing, description: FingerDescription, paths: TendonPaths) -> None:
         """Find the tendons that go along paths.
 
         Args:
             routing: H_c.
             description: Of the finger.
-            paths: The paths of its tree; None without a tree.
+            paths: The paths of its tree.
         """
-        self._coupling, self._paths, self._rest = routing.coupling, paths, np.zeros(0)
+        self._coupling = routing.coupling
+        self._rest = np.array([joint.reference for joint in description.tree_or_empty.joints.values()])
+        tendons = enumerate(description.tendons.values())
+        along = {k: tendon.along for k, tendon in tendons if tendon.along is not None}
+        names = list(dict.fromkeys(along.values()))
         # Of every tendon that goes along a path, which one.
-        self._along: dict[int, int] = {}
-        if paths is not None and description.tree is not None:
-            self._rest = np.array([joint.reference for joint in description.tree.joints.values()])
-            tendons = enumerate(description.tendons.values())
-            along = {k: tendon.along for k, tendon in tendons if tendon.along is not None}
-            names = list(dict.fromkeys(along.values()))
-            self._along = {k: names.index(name) for k, name in along.items()}
-            self._paths = replace(paths, routes={name: paths.routes[name] for name in names})
+        self._along = {k: names.index(name) for k, name in along.items()}
+        self._paths = replace(paths, routes={name: paths.routes[name] for name in names})
 
     def lengths(self, position: Array) -> Array:
         """Return the excursions of the tendons at theta, shape (..., n): shape (..., t), m."""
         drawn = np.asarray(position @ self._coupling.T)
-        if self._paths is not None and self._along:
+        if self._along:
             lengths = self._paths.length(self._rest) - self._paths.length(position)
             for k, path in self._along.items():
                 drawn[..., k] = lengths[..., path]
@@ -199,14 +197,14 @@ class Excursions:
     def slopes(self, position: Array) -> Array:
         """Return their derivatives by theta, shape (..., n): shape (..., t, n), m."""
         coupling = np.broadcast_to(self._coupling, (*position.shape[:-1], *self._coupling.shape)).copy()
-        if self._paths is not None and self._along:
+        if self._along:
             coupling[..., [*self._along], :] = -self._paths.arms(position)[..., [*self._along.values()], :]
         return coupling
 
     def torque(self, x: Array, tendons: RowSignals) -> Array:
         """Return the torque of driven or elastic tendons at packed states, shape (..., size): shape (..., n), N m."""
         joints, rows = self._coupling.shape[1], tendons.rows
-        if not rows.routed or self._paths is None:
+        if not rows.routed:
             return combined(tendons.force, rows.arm)[..., :joints]
         body, width = self._paths.body, rows.arm.shape[1]
         found = np.zeros((*x.shape[:-1], joints))

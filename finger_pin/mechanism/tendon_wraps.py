@@ -47,7 +47,7 @@ class _Stretch(NamedTuple):
 
 def _stretches(description: FingerDescription, tendon: str, branch: int) -> tuple[list[_Stretch], float]:
     """Return the stretches of a tendon, or of a branch of it, and the curvature that is not of any one of them."""
-    own, tree = description.tendons.get(tendon), description.tree
+    own, tree = description.tendons.get(tendon), description.tree_or_empty
     if own is not None and own.along is None:
         found = [
             _Stretch(name, each.bends > 0.0 or offset > 0.0, bool(each.radius), offset, frozenset({name}))
@@ -55,7 +55,6 @@ def _stretches(description: FingerDescription, tendon: str, branch: int) -> tupl
             for offset in [each.curvature_offset]
         ]
         return found, own.curvature_offset
-    assert tree is not None
     route = tree.tendons[str(own.along) if own else tendon]
     offset = 0.0 if branch else route.curvature_offset + (own.curvature_offset if own else 0.0)
     if route.path is None:

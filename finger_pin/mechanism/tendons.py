@@ -90,7 +90,7 @@ class Tendons:
         law, passive = description.tendon_friction, description.passive_tendon
         size, among = len(routing.tendons), len(routing.tendons) + len(description.canals)
         friction = {"surface": expand(law.coulomb, among), "stiction_ratio": expand(law.stiction_ratio, among)}
-        losses = [description.tree.tendons[name].friction for name in description.canals] if description.tree else []
+        losses = [description.tree_or_empty.tendons[name].friction for name in description.canals]
         friction |= bristles(law, among, np.array([0.0] * size + losses)) | {"drag": expand(law.drag, among)}
         wraps = [find_wraps(description, name) for name in (*routing.tendons, *description.canals)]
         return cls(

@@ -111,12 +111,14 @@ def along_paths(description: FingerDescription, routes: TendonPaths, table: Rows
 
     The curvature of driven ones is that of the first place where they rub.
     """
-    assert description.tree is not None
     if table.group != "driven_tendons" and not table.pulls:
         return table
     arm, offset, paths = table.arm.copy(), table.offset.copy(), list(table.paths)
-    lengths, joints = _reference_lengths(description.tree, routes), len(description.joints)
-    for k, name in enumerate(table.pulls or table.names):
+    names, joints = table.pulls or table.names, len(description.joints)
+    if all(description.tendons[name].along is None for name in names):
+        return table
+    lengths = _reference_lengths(description.tree_or_empty, routes)
+    for k, name in enumerate(names):
         along = description.tendons[name].along
         if along is not None:
             route, first = routes.routes[along].times(-1.0), find_wraps(description, name)[0]
@@ -134,8 +136,7 @@ def _reference_lengths(tree: Tree, routes: TendonPaths) -> dict[str, float]:
 
 def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -> list[Rows]:
     """Return the rows of a tree but for friction of loaded tendons, as wide as there are coordinates."""
-    tree = description.tree
-    assert tree is not None
+    tree = description.tree_or_empty
     joints = {name: TendonPath(row, ()) for name, row in zip(tree.joints, np.eye(len(tree.joints)), strict=True)}
 
     def table(
@@ -246,9 +247,8 @@ def _loops(tree: Tree, routes: TendonPaths) -> _Described:
 
 def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
     """Return the forces that hold up a part of bodies' weight."""
-    tree, gravity = description.tree, np.array(description.gravity)
+    tree, gravity = description.tree_or_empty, np.array(description.gravity)
     size = float(np.linalg.norm(gravity))
-    assert tree is not None
     held = {
         name: each
         for name, each in tree.bodies.items()

@@ -76,8 +76,8 @@ def _turned(finger: FingerDescription, tendons: Iterable[str]) -> set[str]:
     """Return the joints that tendons turn."""
     found: set[str] = set()
     for tendon in (finger.tendons[name] for name in tendons):
-        if tendon.along is not None and finger.tree is not None:
-            found |= frozenset().union(*(joints for _, joints in finger.tree.crossed(tendon.along)))
+        if tendon.along is not None:
+            found |= frozenset().union(*(joints for _, joints in finger.tree_or_empty.crossed(tendon.along)))
         found |= {joint for joint, crossing in tendon.crossings.items() if crossing.radius != 0.0}
     return found
 
@@ -86,7 +86,8 @@ def _loop(axes: Axes, result: xr.Dataset, motor: str, finger: FingerDescription,
     spool = np.rad2deg(result["motor_position"].sel(motor=motor).values)
     for index, joint in enumerate(names(result, "joint")):
         if joint in turned:
-            slides = finger.tree is not None and finger.tree.joints[joint].kind == "slide"
+            of_tree = finger.tree_or_empty.joints.get(joint)
+            slides = of_tree is not None and of_tree.kind == "slide"
             position = result["joint_position"].sel(joint=joint).values
             shown = 1e3 * position if slides else np.rad2deg(position)
             label = f"{joint} (mm)" if slides else joint
