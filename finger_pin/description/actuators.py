@@ -289,21 +289,3 @@ def check_actuators(actuators: dict[str, Actuator], actuated: tuple[str, ...], p
             if tendon in owner:
                 raise problem(entry, f"{tendon} has two sources: {owner[tendon]} pulls it already; leave one out")
             owner[tendon] = name
-
-
-def check_currents(actuators: dict[str, Actuator], tension: dict[str, float]) -> None:
-    """Refuse a motor that cannot exert the tensions, N by tendon, that keep its tendons taut at rest."""
-    for name, actuator in actuators.items():
-        motor, count = actuator.motor, len(actuator.tendons)
-        # Several tendons on a spool have the tension that they are built with.
-        taut = [tension[actuator.tendons[0]]] if count == 1 else expand(actuator.pretension, count)
-        constant, resistance, _ = motor.constants
-        needed = abs(float(actuator.radii @ taut)) / constant
-        if needed > min(motor.maximum_current, motor.voltage / resistance):
-            what = ", ".join(f"{each:.3g} N of {tendon}" for each, tendon in zip(taut, actuator.tendons, strict=True))
-            if needed > motor.maximum_current:
-                entry, limit, unit = "maximum_current", motor.maximum_current, "A"
-            else:
-                entry, limit, needed, unit = "voltage", motor.voltage, needed * resistance, "V"
-            allowed = f"pretension alone needs {needed:.3g} {unit}: {what} at rest"
-            raise problem(f"finger.actuators.{name}.motor.{entry}", allowed, limit)

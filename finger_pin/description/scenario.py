@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.actuators import check_currents
 from finger_pin.description.by_finger import error_of_finger, of_finger
 from finger_pin.description.caching import memoised
 from finger_pin.description.controller import ControllerSettings, check_controller
@@ -20,7 +19,7 @@ from finger_pin.description.objects import EnvironmentSettings
 from finger_pin.description.routing import Routing
 from finger_pin.description.signals import ReferenceSettings
 from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
-from finger_pin.description.tautness import Tautness
+from finger_pin.description.tautness import Tautness, check_currents
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.description.validation import Description, Name, expand, problem, suggestion
 from finger_pin.description.winding import BY_SOURCE, check_sources, hand_with_winches, with_winches

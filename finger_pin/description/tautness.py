@@ -7,9 +7,11 @@ from itertools import product
 
 import numpy as np
 
+from finger_pin.description.actuators import Actuator
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
+from finger_pin.description.validation import expand, problem
 from finger_pin.typing import Array
 
 
@@ -79,3 +81,21 @@ class Tautness:
         if self.holds:
             return f"the springs keep all tendons taut, {self.spare:.3g} N above their minimum or more"
         return f"its springs leave a tendon {max(-self.spare, 0.0):.3g} N short of its minimum tension at {where} rad"
+
+
+def check_currents(actuators: dict[str, Actuator], tension: dict[str, float]) -> None:
+    """Refuse a motor that cannot exert the tensions, N by tendon, that keep its tendons taut at rest."""
+    for name, actuator in actuators.items():
+        motor, count = actuator.motor, len(actuator.tendons)
+        # Several tendons on a spool have the tension that they are built with.
+        taut = [tension[actuator.tendons[0]]] if count == 1 else expand(actuator.pretension, count)
+        constant, resistance, _ = motor.constants
+        needed = abs(float(actuator.radii @ taut)) / constant
+        if needed > min(motor.maximum_current, motor.voltage / resistance):
+            what = ", ".join(f"{each:.3g} N of {tendon}" for each, tendon in zip(taut, actuator.tendons, strict=True))
+            if needed > motor.maximum_current:
+                entry, limit, unit = "maximum_current", motor.maximum_current, "A"
+            else:
+                entry, limit, needed, unit = "voltage", motor.voltage, needed * resistance, "V"
+            allowed = f"pretension alone needs {needed:.3g} {unit}: {what} at rest"
+            raise problem(f"finger.actuators.{name}.motor.{entry}", allowed, limit)

@@ -251,14 +251,14 @@ class _Reader:
         return found
 
     def _joint(self, i: int) -> Table:
-        model, dof = self.model, int(self.model.jnt_dofadr[i])
+        model = self.model
         spring = {
             "stiffness": float(model.jnt_stiffness[i]),
             "rest": float(model.qpos_spring[model.jnt_qposadr[i]]),
-            "damping": float(model.dof_damping[dof]),
+            "damping": float(model.dof_damping[int(model.jnt_dofadr[i])]),
         }
-        limited, hinge = bool(model.jnt_limited[i]), model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE
-        margin, reach = float(model.jnt_margin[i]), math.pi if hinge else 1.0
+        limited, margin = bool(model.jnt_limited[i]), float(model.jnt_margin[i])
+        reach = math.pi if model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE else 1.0
         return {
             "range": (model.jnt_range[i] + (margin, -margin)).tolist() if limited else [-reach, reach],
             "limited": limited,
@@ -266,11 +266,10 @@ class _Reader:
         }
 
     def _moving(self, i: int) -> Table:
-        model = self.model
-        hinge = model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE
+        model, hinge = self.model, self.mujoco.mjtJoint.mjJNT_HINGE
         return {
             "body": self.names.bodies[model.jnt_bodyid[i]],
-            "kind": "hinge" if hinge else "slide",
+            "kind": "hinge" if model.jnt_type[i] == hinge else "slide",
             "axis": model.jnt_axis[i].tolist(),
             "anchor": model.jnt_pos[i].tolist(),
             "reference": float(model.qpos0[model.jnt_qposadr[i]]),
@@ -287,16 +286,15 @@ class _Reader:
 
     def _moved_by_joints(self) -> set[int]:
         """Return the bodies that joints move which turn or slide."""
-        model, found = self.model, set[int]()
-        for i in range(1, model.nbody):
-            if int(model.body_parentid[i]) in found or any(model.jnt_bodyid[j] == i for j in self.kept_joints):
-                found.add(i)
+        parents, found = self.model.body_parentid, {int(self.model.jnt_bodyid[j]) for j in self.kept_joints}
+        for i in range(1, self.model.nbody):
+            found |= {i} if int(parents[i]) in found else set()
         return found
 
     def _wraps(self) -> NDArray[np.bool_]:
         """Return a mask of the pieces of tendons' paths that are wraps."""
-        types = self.mujoco.mjtWrap
-        return np.isin(self.model.wrap_type, (int(types.mjWRAP_SPHERE), int(types.mjWRAP_CYLINDER)))
+        wraps = self.mujoco.mjtWrap.mjWRAP_SPHERE, self.mujoco.mjtWrap.mjWRAP_CYLINDER
+        return np.isin(self.model.wrap_type, [int(each) for each in wraps])
 
     def _tip(self) -> Table:
         body, position = self._tip_body()

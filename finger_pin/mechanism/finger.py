@@ -67,9 +67,8 @@ class Finger:
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
             objects: Objects that its links may touch, by name; without any they do not touch each other either.
-            tables: By group of one of its tables of rows, such as ``driven_tendons``, a function that returns what
-                stands in its place, with a law of one's own: the same rows, with as many states, and with at least the
-                parameters, in the same places, and the signals that the finger's have.
+            tables: By group of one of its tables, such as ``driven_tendons``, a function that returns what stands in
+                its place: the same rows, with as many states, with at least the same parameters and signals.
 
         Raises:
             InputError: If the joints of the two differ, or one has several coordinates; with objects, if a link has no

@@ -60,9 +60,7 @@ class Mechanism:
         moved: bool = False,
         prescribed: NDArray[np.int64] | None = None,
     ) -> None:
-        """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
-
-        There are as many inputs as rows have, or more if so many ``channels`` are asked for.
+        """Join coordinates and rows, as wide as there are coordinates; more inputs than rows have if asked for.
 
         Raises:
             InputError: If tables read each other's forces in a circle, or there is no such table, or two have one name.
@@ -77,8 +75,7 @@ class Mechanism:
         self.prescribed = np.full(self.coordinates, -1) if prescribed is None else prescribed
         self.energies = Energies.of(self.rows, moved, not moved and bool(np.any(self.prescribed >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
-        counts = accumulate(table.states for table in self.listed)
-        ends = dict(zip((table.group for table in self.listed), counts, strict=True))
+        ends = dict(zip((t.group for t in self.listed), accumulate(t.states for t in self.listed), strict=True))
         self.states = [slice(ends[table.group] - table.states, ends[table.group]) for table in self.rows]
         self.state_count = max(ends.values(), default=0)
 
@@ -206,23 +203,24 @@ class Mechanism:
         """Return the signals of all tables under inputs and forces at tips, and the sum of A^T phi, shape (..., N)."""
         q, v, z = self.split(x)
         turning, linear, lead = q[..., : self.body.model.nq], self.linear_positions(q), x.shape[:-1]
-        found: dict[str, RowSignals] = {}
+        states = {table.group: z[..., part] for table, part in zip(self.rows, self.states, strict=True)}
+        found, known = dict[str, RowSignals](), dict[str, Array]()
         touching: list[tuple[Paths, Array]] = []
         torque = np.zeros((*lead, self.coordinates))
-        for table, part in zip(self.rows, self.states, strict=True):
+        for table in self.rows:
             routed = self._routed(table, turning)
             arm = table.arm + routed.arm
             row: Any = table.law.sees(
                 linear @ table.measure.T + table.offset + routed.length,
                 (arm @ v[..., None])[..., 0],
-                z[..., part] if table.states else np.zeros((*lead, table.count)),
-                self._load(table, found, turning, forces, touching),
-                self._input(table, found, command, lead),
+                states[table.group] if table.states else np.zeros((*lead, table.count)),
+                self._load(table, known, turning, forces, touching),
+                self._input(table, known, command, lead),
                 np.abs(linear) @ table.bends.T + table.curvature_offset + routed.turn,
-                self._reading(table, z),
+                _weighted(table.readings, states, np.zeros((*lead, table.count))),
             )
             exerted, rate, signals = table.law.act(row, table.parameters)
-            found[table.group] = RowSignals(table, row, exerted, rate, signals)
+            found[table.group], known[table.group] = RowSignals(table, row, exerted, rate, signals), exerted
             if table.law.arms > 1:
                 touching.append((table.paths[:: table.law.arms], _touching(exerted, routed.force, table.law.arms)))
             torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
@@ -258,34 +256,18 @@ class Mechanism:
             return np.array([self._base_power(*each) for each in zip(q, v, a, base, strict=True)])
         return np.array([base[:6] @ self.body.base_dynamics(q, v, a, base)[0]])
 
-    def _input(self, table: Rows, found: dict[str, RowSignals], command: Array, lead: tuple[int, ...]) -> Array:
+    def _input(self, table: Rows, forces: Mapping[str, Array], command: Array, lead: tuple[int, ...]) -> Array:
         total = np.zeros((*lead, table.count))
         wired = table.channels >= 0
         if wired.any():
             total[..., wired] = command[..., table.channels[wired]]
-        for group, weights in table.inputs.items():
-            total = total + found[group].force @ weights.T
-        return total
-
-    def _reading(self, table: Rows, z: Array) -> Array:
-        total = np.zeros((*z.shape[:-1], table.count))
-        for part, other in zip(self.states, self.rows, strict=True):
-            if other.group in table.readings:
-                total = total + z[..., part] @ table.readings[other.group].T
-        return total
+        return _weighted(table.inputs, forces, total)
 
     def _load(
-        self,
-        table: Rows,
-        found: dict[str, RowSignals],
-        q: Array,
-        forces: Array,
-        touching: Sequence[tuple[Paths, Array]],
+        self, table: Rows, known: Mapping[str, Array], q: Array, forces: Array, touching: Sequence[tuple[Paths, Array]]
     ) -> Array:
         """Return N, the magnitude of a sum of earlier rows' forces, or of -e S + F for the pins of joints (17)."""
-        load = np.zeros((*q.shape[:-1], table.count))
-        for group, weights in table.loads.items():
-            load = load + found[group].force @ weights.T
+        load = _weighted(table.loads, known, np.zeros((*q.shape[:-1], table.count)))
         if not (table.pins >= 0).any() or not (np.any(forces) or touching):
             return np.abs(load)
         directions = self.body.link_directions(q)[..., table.pins, :]
@@ -302,6 +284,13 @@ class Mechanism:
         pieces = [legs[0].piece for legs in paths]
         pairs = [[(pin + 1 in supports[p.ends[0].joint], pin + 1 in supports[p.joint]) for p in pieces] for pin in pins]
         return np.array([[float(first) - float(second) for first, second in row] for row in pairs])
+
+
+def _weighted(weights: Mapping[str, Array], values: Mapping[str, Array], start: Array) -> Array:
+    """Return a start and weighted sums of tables' values, shape (..., k)."""
+    for group, matrix in weights.items():
+        start = start + values[group] @ matrix.T
+    return start
 
 
 def _touching(force: Array, directions: Array, arms: int) -> Array:

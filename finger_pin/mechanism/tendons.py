@@ -36,8 +36,7 @@ BRISTLES = Energy("tendon_bristles", "tendon bristles")
 SOURCES_WITH_END, WINCHES = "tension_sources", "winches"
 _WOUND = Energy("winches", "winches, through their cords")
 _HALVES = ("proximal", "distal")
-_NAMES = {"ratio": "stiction_ratio"}  # What the law calls otherwise.
-_STRETCHING = Energy("passive_hysteresis", "passive tendons stretching")
+_NAMES, _STRETCHING = {"ratio": "stiction_ratio"}, Energy("passive_hysteresis", "passive tendons stretching")
 
 
 @dataclass(frozen=True, eq=False)
