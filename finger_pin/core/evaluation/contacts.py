@@ -77,7 +77,8 @@ def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear,
     for i in range(2):
         by_first, by_second = (inverse * d, -inverse * b) if i == 0 else (-inverse * c, inverse * a)
         own = linear.state_gain[first if i == 0 else second]
-        for column in range(wide):
+        # Those of states that rows read, too: other blocks may have had their columns there.
+        for column in range(wide + tables.read_states.size):
             own[column] = 0.0
         weights = (
             by_first * slopes[at.R_LENGTH, k + 1] + by_second * slopes[at.R_LENGTH, k + 2],
@@ -91,7 +92,7 @@ def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear,
     for m in range(3):
         row = linear.gain[k + m]
         of_first, of_second = slopes[4, k + m], slopes[5, k + m]
-        for column in range(wide):
+        for column in range(wide + tables.read_states.size):
             row[column] = of_first * linear.state_gain[first, column] + of_second * linear.state_gain[second, column]
         weights = slopes[0, k + m], slopes[1, k + m], slopes[2, k + m], slopes[3, k + m]
         _add_inputs(tables, k, weights, linear, width, row)
