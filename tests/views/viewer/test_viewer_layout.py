@@ -6,6 +6,7 @@ import xarray as xr
 from closed_kinematics import equation_1
 from motion import joint_position
 from pages import opened, seek
+from selenium.webdriver.support.ui import WebDriverWait
 
 import finger_pin as fp
 from finger_pin.description.demo_motion import demo_motion
@@ -39,6 +40,9 @@ def test_in_a_window_of_any_size_nothing_overflows_and_the_finger_is_clear_of_pa
     )
     try:
         both.execute_script("window.dispatchEvent(new Event('resize'))")
+        # On a slow machine the page is laid out a moment later.
+        shown = "return document.querySelector('#ticks span').getBoundingClientRect().width > 0"
+        WebDriverWait(both, 60).until(lambda page: page.execute_script(shown))
         places = both.execute_script("""
         const inside = (selector) => [...document.querySelectorAll(selector)].map((e) => e.getBoundingClientRect());
         const box = (r) => [r.left, r.top, r.right, r.bottom];
