@@ -87,7 +87,7 @@ def _reset_time(task: Mapping[str, Any]) -> float:
     from finger_pin.learning import Environment, Uniform
 
     names = ["finger"] if task["scenario"].hand is None else ["hand.fingers.left.finger", "hand.fingers.right.finger"]
-    drawn = {f"{name}.tendon_friction.coulomb": Uniform(0.05, 0.2) for name in names}
+    drawn = {f"{name}.tendon_friction.viscous": Uniform(0.5, 1.5) for name in names}
     environment = Environment(**{**task, "randomise": {**task.get("randomise", {}), **drawn}})
     took = []
     for seed in range(30):

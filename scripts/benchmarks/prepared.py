@@ -36,7 +36,7 @@ def _runs(name: str, rounds: int, quick: bool) -> dict[str, float]:
     duration = 0.2 if quick else fp.load_scenario(name).simulation.duration
     scenario = fp.load_scenario(name, {"simulation.duration": duration})
     finger = "hand.fingers.thumb.finger" if scenario.hand else "finger"
-    prepared = fp.prepare(scenario, ["simulation.duration", f"{finger}.tendon_friction.coulomb"], RECORDED)
+    prepared = fp.prepare(scenario, ["simulation.duration", f"{finger}.tendon_friction.viscous"], RECORDED)
     own = prepared.values[1]
     brief = prepared.scenario([_SHORT, own])
     # Another number of the finger for every run.
