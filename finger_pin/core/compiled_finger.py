@@ -25,6 +25,7 @@ from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
 from finger_pin.description.caching import cached_property
 from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
@@ -116,10 +117,10 @@ class CompiledMechanism:
                 found[table.group] = RowSignals(table, None, own[0], own[0, ..., :0], ())
                 continue
             stateful = np.arange(table.count) % arms > 0 if arms > 1 else slice(None)
-            others = (own[column] for column in (LOAD, COMMAND, CURVATURE, READING))
-            seen = table.law.sees(own[LENGTH], own[SPEED], own[STATE][..., stateful], *others)
+            length, speed, load, command, curvature = (own[c] for c in (LENGTH, SPEED, LOAD, COMMAND, CURVATURE))
+            row = Row(length, speed, own[STATE][..., stateful], load, command, curvature, reading=own[READING])
             shown = tuple(own[SIGNALS + i, ..., ::arms] for i in range(len(table.law.signals)))
-            found[table.group] = RowSignals(table, seen, own[FORCE], own[RATE][..., stateful], shown)
+            found[table.group] = RowSignals(table, table.law.sees(row), own[FORCE], own[RATE][..., stateful], shown)
         return Evaluation(
             mechanism.energies,
             found,

@@ -152,9 +152,7 @@ class _Reader:
 
     def _joints(self) -> tuple[Table, Table, list[float]]:
         """Return the joints of the finger, those of its tree, and their losses by friction, in the bodies' order."""
-        joints: Table = {}
-        moving: Table = {}
-        loss: list[float] = []
+        joints, moving, loss = dict[str, Any](), dict[str, Any](), list[float]()
         for i in range(self.model.njnt):
             if i in self.kept_joints:
                 name = self.names.joints[i]

@@ -94,18 +94,9 @@ class Law:
     arms: ClassVar[int] = 1
     states: ClassVar[int] = 1
 
-    def sees(
-        self,
-        length: Array,
-        speed: Array,
-        state: Array,
-        load: Array,
-        command: Array,
-        curvature: Array,
-        reading: Number = 0.0,
-    ) -> Row:
-        """Return the arguments of the law for rows, shape (..., k) each."""
-        return Row(length, speed, state, load, command, curvature, reading=reading)
+    def sees(self, row: Row) -> Row:
+        """Return the arguments of the law for rows, shape (..., k) each: these."""
+        return row
 
     def act(self, row: Row, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
         """Return the rows' forces, the rates of their states, and their signals."""
@@ -173,19 +164,10 @@ class ContactLaw:
     arms: ClassVar[int] = 3
     states: ClassVar[int] = 2
 
-    def sees(
-        self,
-        length: Array,
-        speed: Array,
-        state: Array,
-        load: Array,
-        command: Array,
-        curvature: Array,
-        reading: Number = 0.0,
-    ) -> Touch:
-        """Return the arguments for contacts from arms, shape (..., 3 k), and states, (..., 2 k)."""
-        slips = (speed[..., each::3] for each in range(3))
-        return Touch(length[..., ::3], *slips, *(state[..., each::2] for each in range(2)))
+    def sees(self, row: Any) -> Touch:
+        """Return the arguments for contacts from a `Row` of arms, shape (..., 3 k), and of states, (..., 2 k)."""
+        slips = (row.speed[..., each::3] for each in range(3))
+        return Touch(row.length[..., ::3], *slips, *(row.state[..., each::2] for each in range(2)))
 
     def act(self, touch: Touch, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
         """Return the contacts' forces, shape (..., 3 k), the rates of their states, (..., 2 k), and their signals."""

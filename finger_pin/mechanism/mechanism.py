@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.path_elements import PathKinematics, Paths, moved, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -210,17 +211,18 @@ class Mechanism:
         for table in self.rows:
             routed = self._routed(table, turning)
             arm = table.arm + routed.arm
-            row: Any = table.law.sees(
+            row = Row(
                 linear @ table.measure.T + table.offset + routed.length,
                 (arm @ v[..., None])[..., 0],
                 states[table.group] if table.states else np.zeros((*lead, table.count)),
                 self._load(table, known, turning, forces, touching),
                 self._input(table, known, command, lead),
                 np.abs(linear) @ table.bends.T + table.curvature_offset + routed.turn,
-                _weighted(table.readings, states, np.zeros((*lead, table.count))),
+                reading=_weighted(table.readings, states, np.zeros((*lead, table.count))),
             )
-            exerted, rate, signals = table.law.act(row, table.parameters)
-            found[table.group], known[table.group] = RowSignals(table, row, exerted, rate, signals), exerted
+            law: Any = table.law
+            exerted, rate, signals = law.act(seen := law.sees(row), table.parameters)
+            found[table.group], known[table.group] = RowSignals(table, seen, exerted, rate, signals), exerted
             if table.law.arms > 1:
                 touching.append((table.paths[:: table.law.arms], _touching(exerted, routed.force, table.law.arms)))
             torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
@@ -228,10 +230,9 @@ class Mechanism:
 
     def _forces(self, force: Array | None, lead: tuple[int, ...]) -> Array:
         """Return the forces at all tips, shape (..., t, 3)."""
-        tips = len(self.body.tips)
-        given = np.zeros(3) if force is None else np.asarray(force, dtype=float)
-        one = tips == 1 or force is None
-        return np.broadcast_to(given[..., None, :] if one else given, (*lead, tips, 3))
+        tips, given = len(self.body.tips), np.zeros(3) if force is None else np.asarray(force, dtype=float)
+        given = given[..., None, :] if tips == 1 or force is None else given
+        return np.broadcast_to(given, (*lead, tips, 3))
 
     def _routed(self, table: Rows, q: Array) -> PathKinematics:
         """Return lengths, turns and arms of paths through space for a table, shape (..., k) and (..., k, N)."""
@@ -259,8 +260,7 @@ class Mechanism:
     def _input(self, table: Rows, forces: Mapping[str, Array], command: Array, lead: tuple[int, ...]) -> Array:
         total = np.zeros((*lead, table.count))
         wired = table.channels >= 0
-        if wired.any():
-            total[..., wired] = command[..., table.channels[wired]]
+        total[..., wired] = command[..., table.channels[wired]]
         return _weighted(table.inputs, forces, total)
 
     def _load(

@@ -115,7 +115,7 @@ class Prepared:
     ) -> RunArrays:
         """Simulate, and return the recorded variables alone: bit for bit as in the result of `simulate`.
 
-        Nothing is judged: whether the energy account closes, or how large the error is, `simulate` says.
+        Nothing is judged: whether the energy account closes, `simulate` says.
 
         Args:
             values: One for each key, in their order; by default the scenario's own.

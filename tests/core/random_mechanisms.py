@@ -241,3 +241,15 @@ def kinds_of(mechanism):
     """Indices of positions, velocities of joints and of lumps, and states in a packed state, by kind."""
     q, v, z = mechanism.split(np.arange(mechanism.size))
     return [each for each in (q, *np.split(v, [mechanism.body.model.nv]), z) if len(each)]
+
+
+def by_listing(mechanism, order):
+    """Return the mechanism with its tables listed in another order, and where its numbers of a packed state stand."""
+    tables = [mechanism.rows[k] for k in order]
+    listed = Mechanism(mechanism.body, tables, mechanism.lumps, mechanism.inertia, mechanism.channels)
+    places = np.arange(mechanism.size)
+    of = {table.group: part for table, part in zip(mechanism.rows, mechanism.states, strict=True)}
+    moving = mechanism.size - mechanism.state_count
+    for table, part in zip(listed.rows, listed.states, strict=True):
+        places[moving:][part] = moving + np.arange(mechanism.state_count)[of[table.group]]
+    return listed, places

@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from core_cases import Bound, relative
-from random_mechanisms import kinds_of, random_mechanism, random_states, with_other_numbers
+from random_mechanisms import by_listing, kinds_of, random_mechanism, random_states, with_other_numbers
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
@@ -113,18 +113,6 @@ def test_islands_found_for_other_numbers_of_the_same_wiring_select_the_same_tabl
 
 def leaves(table):
     return [leaf for each in table for leaf in (leaves(each) if isinstance(each, tuple) else [each])]
-
-
-def by_listing(mechanism, order):
-    """Return the mechanism with its tables listed in another order, and where its numbers of a packed state stand."""
-    tables = [mechanism.rows[k] for k in order]
-    listed = Mechanism(mechanism.body, tables, mechanism.lumps, mechanism.inertia, mechanism.channels)
-    places = np.arange(mechanism.size)
-    of = {table.group: part for table, part in zip(mechanism.rows, mechanism.states, strict=True)}
-    moving = mechanism.size - mechanism.state_count
-    for table, part in zip(listed.rows, listed.states, strict=True):
-        places[moving:][part] = moving + np.arange(mechanism.state_count)[of[table.group]]
-    return listed, places
 
 
 @pytest.mark.parametrize("seed", SEEDS)

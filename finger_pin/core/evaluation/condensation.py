@@ -104,13 +104,19 @@ def _add_motion(
 
 
 @njit_inline
-def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) -> bool:
-    """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time).
+def _push(tables: Tables, linear: Linear, k: int, full: int, row: Vector) -> None:
+    """Add A^T d phi of a row."""
+    for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
+        arm, target = linear.arm[e], linear.force[linear.blocks.place[tables.arm_at[e]]]
+        for c in range(full):
+            target[c] += arm * row[c]
 
-    Return false if the states that rows read of each other cannot be told.
-    """
+
+@njit_inline
+def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) -> bool:
+    """Fill the gains of a block's rows and states, and sum up A^T d phi; false if states that are read are singular."""
     tables, linear, slopes, blocks = model.tables, model.linear, model.work.slopes, model.linear.blocks
-    load, command, force, place = linear.load, linear.command, linear.force, blocks.place
+    load, command = linear.load, linear.command
     own_places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
     full = wide + tables.read_states.size
     _outside(model, address, g, b, width, wide)
@@ -166,10 +172,7 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
         _add_motion(model, k, width, of_length, of_speed, of_curvature, row)
         if reads:
             add_readings(tables, k, slopes[at.F_READING, k], wide, row)
-        for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-            arm, target = linear.arm[e], force[place[tables.arm_at[e]]]
-            for c in range(full):
-                target[c] += arm * row[c]
+        _push(tables, linear, k, full, row)
     return full == wide or resolve_readings(tables, linear, b, width, wide)
 
 

@@ -122,11 +122,6 @@ class Stepper:
         return any(part.drives is not None for part in self.parts)
 
     @property
-    def repeats(self) -> bool:
-        """Whether it takes given steps."""
-        return any(part.steps is not None for part in self.parts)
-
-    @property
     def held(self) -> bool:
         """Whether inputs are held."""
         return any(part.control.kind == HELD for part in self.parts)
