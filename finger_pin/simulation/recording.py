@@ -24,7 +24,7 @@ from finger_pin.simulation.sampled_trajectory import BASE_FRAME, SampledTrajecto
 from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
 from finger_pin.typing import Array
 
-_PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
+_PACKAGES = ("finger-pin", "pin", "numba", "numpy", "scipy", "xarray")
 
 #: Variables by name: dimensions, of which time is the first, values and attributes.
 Recorded = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
@@ -103,7 +103,7 @@ def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> di
         "atol_scale": scenario.simulation.atol_scale,
         "end_time": float(trajectory.breakpoints[-1]),
         **statistics,
-        **_versions(),
+        **versions(),
     }
 
 
@@ -119,7 +119,8 @@ def is_tracking(result: xr.Dataset) -> bool:
 
 
 @cache
-def _versions() -> Mapping[str, str]:
+def versions() -> Mapping[str, str]:
+    """Return the attributes of a result about the versions of the packages that it depends on."""
     return {f"version_{name.replace('-', '_')}": metadata.version(name) for name in _PACKAGES}
 
 

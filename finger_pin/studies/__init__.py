@@ -2,8 +2,8 @@
 
 From the question to the answer: ``keys`` of a scenario; ``designs`` (and the ``parsing`` of a command line) or the
 ``problem`` of a ``search``; ``metrics``; ``records`` of runs, and the ``fingerprint`` that they are found by; the
-``executor`` in threads or elsewhere; the ``store`` that keeps them; the ``dataset`` of all. ``sweeping`` and
-``optimising`` put these together. ``batch`` returns whole runs instead of metrics.
+``executor`` in threads or elsewhere; the ``dataset`` of all. ``sweeping`` and ``optimising`` put these together.
+``batch`` returns whole runs instead of metrics.
 """
 
 from finger_pin.studies.designs import Grid, LatinHypercube, PointList, Range

@@ -26,7 +26,7 @@ from finger_pin.simulation.recording import refuse_unknown
 from finger_pin.simulation.sampled_trajectory import Quantity
 from finger_pin.simulation.simulate import simulate
 from finger_pin.simulation.variables import variables as known_variables
-from finger_pin.studies.executor import FailedTask, compile_for, open_executor, run_tasks
+from finger_pin.studies.executor import compile_for, one_line, open_executor, run_tasks
 
 _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
 
@@ -71,13 +71,13 @@ def simulate_many(
     _check_kept(runs, variables or (), finger)
     run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
-    found: dict[int, xr.Dataset | FailedTask] = {}
+    found: dict[int, xr.Dataset | BaseException] = {}
     texts = [""] * len(runs)
     with CancelToken() as token, open_executor(executor, workers) as pool:
         compile_for(pool, lambda: runs[0])
         for index, result in run_tasks(pool, run, runs, token):
-            if isinstance(result, FailedTask) and isinstance(result.error, InputError):
-                raise result.error
+            if isinstance(result, InputError):
+                raise result
             found[index] = result
             # Here this thread would wait for the others.
             texts[index] = to_toml(runs[index])
@@ -164,7 +164,9 @@ def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | 
     refuse_unknown("variables", keep, known)
 
 
-def _stack(runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | FailedTask], texts: Sequence[str]) -> xr.Dataset:
+def _stack(
+    runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | BaseException], texts: Sequence[str]
+) -> xr.Dataset:
     order, results = list(done), list(done.values())
     found = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
     longest = max(found.values(), key=lambda result: result.sizes["time"], default=xr.Dataset(coords={"time": []}))
@@ -197,7 +199,7 @@ def _stack(runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | FailedTask]
     for name in _PER_RUN:
         numbers = [result.attrs.get(name, np.nan) if isinstance(result, xr.Dataset) else np.nan for result in results]
         stacked[name] = (("run",), np.array(numbers), {"long_name": name})
-    failures = [result.reason if isinstance(result, FailedTask) else result.attrs["failure"] for result in results]
+    failures = [one_line(each) if isinstance(each, BaseException) else each.attrs["failure"] for each in results]
     stacked["failure"] = (("run",), np.array(failures, dtype=str), {"long_name": "failure"})
     described = np.array([texts[index] for index in order], dtype=str)
     stacked["scenario"] = (("run",), described, {"long_name": "resolved scenario, TOML"})

@@ -12,11 +12,11 @@ import xarray as xr
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import Interrupted, StudyError
+from finger_pin.simulation.recording import versions
 from finger_pin.studies.designs import SAMPLE, Design
-from finger_pin.studies.fingerprint import versions
 from finger_pin.studies.keys import describe
 from finger_pin.studies.metrics import Metric
-from finger_pin.studies.store import FAILED, RunRecord
+from finger_pin.studies.records import FAILED, RunRecord
 
 MISSING = "missing"
 
@@ -79,5 +79,4 @@ def checked(result: xr.Dataset, interrupted: bool) -> xr.Dataset:
 
 def origin(scenario: Scenario) -> Mapping[str, str]:
     """Return the attributes of a Dataset about its origin: the scenario and the versions of packages."""
-    used = {f"version_{name.replace('-', '_')}": version for name, version in versions().items()}
-    return {"title": scenario.title or scenario.name, "scenario": to_toml(scenario), **used}
+    return {"title": scenario.title or scenario.name, "scenario": to_toml(scenario), **versions()}

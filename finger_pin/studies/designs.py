@@ -38,9 +38,6 @@ class Design(Protocol):
     def points(self) -> list[Point]:
         """Return the points, the last dimension varying fastest."""
 
-    def describe(self) -> dict[str, Any]:
-        """Return the design as a table of a TOML file."""
-
 
 @dataclass(frozen=True)
 class Grid:
@@ -74,10 +71,6 @@ class Grid:
         """Return the points, the last key varying fastest."""
         return [dict(zip(self.values, point, strict=True)) for point in itertools.product(*self.values.values())]
 
-    def describe(self) -> dict[str, Any]:
-        """Return the design as a table of a TOML file."""
-        return {"kind": "grid", "values": {key: list(axis) for key, axis in self.values.items()}}
-
 
 @dataclass(frozen=True)
 class PointList:
@@ -110,10 +103,6 @@ class PointList:
     def points(self) -> list[Point]:
         """Return the points."""
         return [dict(zip(self.values, point, strict=True)) for point in zip(*self.values.values(), strict=True)]
-
-    def describe(self) -> dict[str, Any]:
-        """Return the design as a table of a TOML file."""
-        return {"kind": "list", "values": {key: list(axis) for key, axis in self.values.items()}}
 
 
 @dataclass(frozen=True)
@@ -205,14 +194,6 @@ class LatinHypercube:
     def points(self) -> list[Point]:
         """Return the points."""
         return PointList(self.values).points()
-
-    def describe(self) -> dict[str, Any]:
-        """Return the design as a table of a TOML file."""
-        ranges = {
-            key: {"low": each.low, "high": each.high, "logarithmic": each.logarithmic}
-            for key, each in self.ranges.items()
-        }
-        return {"kind": "latin", "samples": self.samples, "seed": self.seed, "ranges": ranges}
 
 
 def _checked(values: Mapping[str, Sequence[Value]]) -> dict[str, tuple[Value, ...]]:

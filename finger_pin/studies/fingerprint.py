@@ -1,43 +1,29 @@
-"""Digests of a run's dependencies besides its scenario: source, other packages, metrics, a custom finger."""
+"""Digests by value, alike in all processes: of the package, and of what else a run depends on."""
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-import pickle
-import site
+import copyreg
 import sys
-import sysconfig
-from functools import cache
-from importlib import metadata
+from functools import _lru_cache_wrapper, cache
 from pathlib import Path
-from types import BuiltinFunctionType, CodeType, EllipsisType, FunctionType, MethodType, ModuleType, NoneType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import joblib
-import numpy as np
+from numba.core.dispatcher import Dispatcher
+from pydantic import BaseModel
 
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.recording import versions
 
-#: Packages whose versions results depend on, and say.
-PACKAGES = ("finger-pin", "numba", "numpy", "pin", "scipy", "xarray")
 # Imports point down, so nothing above the studies affects their results.
 _ABOVE = {"views", "commands"}
-# What a class has besides what is written in it, what wrappers of functions hold, and what a name says enough of.
-_OF_CLASSES = {"__dict__", "__weakref__", "__dataclass_fields__", "__dataclass_params__", "__firstlineno__"}
-_PARTS = ("func", "args", "keywords", "__self__", "__func__", "fget", "fset")
-_NAMED = (type, BuiltinFunctionType, np.ufunc)
-_PLAIN = (NoneType, bool, int, float, complex, str, bytes, EllipsisType)
+_PLAIN = (type(None), bool, int, float, complex, str, bytes, type(...))
+_WRAPPED = ("fget", "fset", "fdel", "__wrapped__", "targetoptions")
 
 
 class UnknownDependency(Exception):
     """Dependency without a digest; the message names it."""
-
-
-@cache
-def versions() -> dict[str, str]:
-    """Return the versions of `PACKAGES`."""
-    return {name: metadata.version(name) for name in PACKAGES}
 
 
 @cache
@@ -48,77 +34,85 @@ def source_digest() -> str:
     return str(joblib.hash((versions(), [each.read_bytes() for each in files])))
 
 
-def code_digest(function: Any) -> str:
-    """Return a digest of a function: its code, the values that it encloses, the user code that it calls.
+def digest(thing: Any) -> str:
+    """Return a digest of a value: of functions the code, what they enclose, and the user code that they call.
 
-    What is installed counts by its name and version. Files that a function reads are not seen.
+    What installed packages call counts by their names and versions. Files that a function reads are not seen.
 
     Raises:
-        UnknownDependency: If it depends on something that has no digest, such as an object of a user's class.
+        UnknownDependency: If it depends on something without a lasting content, such as a lock or an open file.
     """
-    try:
-        return str(joblib.hash(_content(function, frozenset(), {})))
-    except (ValueError, RecursionError, pickle.PicklingError) as error:
-        raise UnknownDependency(str(error)) from None
+    return _digest(thing, frozenset(), {})
 
 
 def finger_digest(finger: Finger) -> str:
-    """Return a digest of a custom finger: description, rigid body, rows and their laws, objects, replaced tables.
-
-    Raises:
-        UnknownDependency: If a law depends on something that has no digest.
-    """
-    given = finger.constructor_args
-    model = None if given.rigid_body is None else given.rigid_body.model.saveToString()
-    described = {name: each.model_dump_json() for name, each in (given.objects or {}).items()}
-    return code_digest((finger.description.model_dump_json(), model, given.rows, described, dict(given.tables)))
+    """Return a digest of a custom finger: description, rigid body, rows and their laws, objects, replaced tables."""
+    return digest(finger)
 
 
-def _content(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Any:
-    """Return a thing in values that joblib can hash; of a user's module, only the parts used by one of some names."""
-    if isinstance(thing, FunctionType | type | ModuleType | CodeType):
-        # Pickle, and so joblib, knows these by their names alone.
-        if (id(thing), names) in seen:
-            return None
-        # Kept, so that no other thing gets its identity meanwhile.
-        seen[id(thing), names] = thing
-    installed = _is_installed(getattr(thing, "__module__", None))
-    inner: list[Any]
+def _digest(thing: Any, names: frozenset[str], seen: dict[Any, tuple[Any, str]]) -> str:
+    """Return a digest of a thing; of a user's module, only of the parts used by one of some names."""
+    if type(thing) in _PLAIN:
+        # A text such as "module:NAME" may be that of a user's law.
+        module, _, name = str(thing).partition(":")
+        named = vars(sys.modules[module]).get(name) if module in sys.modules else None
+        return str(joblib.hash((type(thing).__name__, thing, named and _digest(named, names, seen))))
+    names = _names(thing.__code__) if isinstance(thing, FunctionType) else names
+    key = id(thing), names
+    if key not in seen:
+        # Kept, so that no other thing gets its identity meanwhile. In a circle it counts as such.
+        seen[key] = thing, "circle"
+        try:
+            parts = _parts(thing, names)
+        except (TypeError, ValueError):
+            raise UnknownDependency(f"an object of type {type(thing).__name__}") from None
+        # joblib tells one thing twice from two equal ones, but not so for texts, and orders sets by their seed.
+        digests = [_digest(part, names, seen) for part in parts]
+        digests = sorted(digests) if isinstance(thing, dict | set | frozenset) else digests
+        seen[key] = thing, str(joblib.hash([type(thing).__qualname__, *digests]))
+    return seen[key][1]
+
+
+def _parts(thing: Any, names: frozenset[str]) -> list[Any]:
+    """Return what determines a thing, of which code uses some names."""
+    module = getattr(thing, "__module__", None)
     match thing:
-        case tuple() | list():
-            inner = list(thing)
-        case set() | frozenset():
-            inner = sorted(thing, key=repr)
         case dict():
-            inner = [each for item in thing.items() for each in item]
+            return [*thing.items()]
+        case tuple() | list() | set() | frozenset():
+            return [*thing]
         case CodeType():
-            inner = [thing.co_code, thing.co_varnames, thing.co_names, *thing.co_consts]
+            return [thing.co_code, thing.co_exceptiontable, thing.co_varnames, thing.co_names, thing.co_consts]
         case ModuleType():
-            inner = [thing.__name__, getattr(thing, "__version__", None)]
-            if not _is_installed(thing.__name__):
-                inner += [vars(thing)[name] for name in sorted(names & vars(thing).keys())]
+            used = {} if _is_installed(thing.__name__) else _chosen(vars(thing), names)
+            return [thing.__name__, vars(thing).get("__version__"), used]
         case FunctionType():
+            seat = module if _is_installed(module) else _chosen(thing.__globals__, names)
             cells = [each.cell_contents for each in thing.__closure__ or ()]
-            inner = [thing.__defaults__, thing.__kwdefaults__, *cells]
-            if installed:
-                inner += [thing.__module__, thing.__qualname__]
-            else:
-                names = _names(thing.__code__)
-                used = sorted(names & thing.__globals__.keys())
-                inner += [thing.__code__, *(thing.__globals__[name] for name in used)]
-        case functools.partial() | MethodType() | staticmethod() | classmethod() | property():
-            inner = [getattr(thing, part, None) for part in _PARTS]
-        case type() if not installed:
-            inner = [thing.__bases__, {name: each for name, each in vars(thing).items() if name not in _OF_CLASSES}]
-        case _ if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-            inner = [type(thing), vars(thing)]
-        case np.ndarray() | np.generic() if thing.dtype != object:
-            return thing
-        case _ if isinstance(thing, _PLAIN) or (installed and isinstance(thing, _NAMED)):
-            return thing
-        case _:
-            raise UnknownDependency(f"an object of type {type(thing).__name__}")
-    return [type(thing).__name__, *(_content(each, names, seen) for each in inner)]
+            return [seat, thing.__code__, thing.__defaults__, thing.__kwdefaults__, cells]
+        case type() if _is_installed(module):
+            return [module, thing.__qualname__]
+        case type():
+            written = {each: value for each, value in vars(thing).items() if callable(value) or each[:2] != "__"}
+            return [thing.__bases__, written]
+        case property() | staticmethod() | classmethod() | _lru_cache_wrapper() | Dispatcher():
+            return [getattr(thing, each, None) for each in _WRAPPED]
+        case Finger():
+            return [thing.description, thing.constructor_args]
+        case BaseModel():
+            return [type(thing), thing.model_dump()]
+    known = copyreg.dispatch_table.get(type(thing))
+    reduced = known(thing) if known else thing.__reduce_ex__(4)
+    if not isinstance(reduced, str):
+        return [*reduced]
+    # By name, as builtin functions; one that NumPy makes of a user's has none.
+    if not (reduced.isidentifier() and _is_installed(module or type(thing).__module__)):
+        raise TypeError
+    return [module, reduced]
+
+
+def _chosen(space: dict[str, Any], names: frozenset[str]) -> dict[str, Any]:
+    return {name: space[name] for name in names & space.keys()}
 
 
 def _names(code: CodeType) -> frozenset[str]:
@@ -131,8 +125,6 @@ def _names(code: CodeType) -> frozenset[str]:
 def _is_installed(module: str | None) -> bool:
     """Return true for modules of this package, of Python and of installed packages, not the user's."""
     top = (module or "").partition(".")[0]
-    if top in sys.stdlib_module_names or top == "finger_pin":
-        return True
-    file = getattr(sys.modules.get(top), "__file__", None)
-    places = [*site.getsitepackages(), site.getusersitepackages(), *map(sysconfig.get_path, ("purelib", "platlib"))]
-    return file is not None and any(Path(file).is_relative_to(place) for place in places)
+    file = getattr(sys.modules.get(top), "__file__", None) or ""
+    known = top == "finger_pin" or top in sys.stdlib_module_names
+    return known or not {"site-packages", "dist-packages"}.isdisjoint(Path(file).parts)

@@ -16,6 +16,7 @@ from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_table, write_text
 from finger_pin.mechanism.coerce import FingerLike
+from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import PointList
@@ -31,9 +32,8 @@ from finger_pin.studies.problem import (
     radii,
     start_of,
 )
-from finger_pin.studies.records import Progress, evaluate, open_study
+from finger_pin.studies.records import DONE, Progress, RunRecord, Study, open_study
 from finger_pin.studies.search import HOPELESS, Search, nondominated
-from finger_pin.studies.store import DONE, RunRecord, Store, describe_study, write
 from finger_pin.typing import Array
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]
@@ -97,7 +97,7 @@ def optimise(
         effort: Effort of the search.
         overrides: Entries of the scenario that hold for all designs.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
-        output: Folder for ``study.toml``, ``runs.jsonl``, ``optimise.nc``, ``front.csv``, ``front/*.toml``; or nothing.
+        output: Folder for ``runs.jsonl``, ``optimise.nc``, ``front.csv``, ``front/*.toml``; or nothing.
         executor: Executor of the runs, any of `concurrent.futures`; by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         progress: Called with the numbers of finished, failed and all runs; in a notebook there is a bar by default.
@@ -120,14 +120,12 @@ def optimise(
     metrics_of(base.scenario, goals.metrics)
     variables = _variables(over, base)
     own = start_of(variables, base)
-    described = {**goals.describe(), **vars(effort), "variables": [variable.describe() for variable in variables]}
-    asked = {} if output is None else describe_study(base, goals.metrics, {"optimise": described})
-    with open_study(output, asked, PRODUCTS, executor, stop, restart) as (store, pool, token):
-        course = _Course(base, goals, variables, store, pool, effort, progress or notebook_bar("runs"), token)
-        result = _assembled(base, goals, *course.follow(own))
+    with open_study(base, goals.metrics, output, PRODUCTS, executor, stop, restart) as study:
+        course = _Course(study, goals, variables, effort, progress or notebook_bar("runs"))
+        result = _assembled(base, goals, *course.follow(own)).assign_attrs(vars(effort))
         if output is not None:
             _write(result, base, Path(output))
-    return checked(result, token.cancelled)
+    return checked(result, study.token.cancelled)
 
 
 def _variables(over: Iterable[Variable | str] | None, base: BaseScenario) -> list[Variable]:
@@ -142,14 +140,11 @@ def _variables(over: Iterable[Variable | str] | None, base: BaseScenario) -> lis
 class _Course:
     """Progress of a search, generation by generation."""
 
-    base: BaseScenario
+    study: Study
     goals: Goals
     variables: Sequence[Variable]
-    store: Store
-    executor: Executor
     effort: Effort
     progress: Progress | None
-    stop: Stop | None
 
     def follow(self, own: Mapping[str, float]) -> tuple[list[Point], list[RunRecord | None]]:
         """Return all points with their records, the scenario's own first."""
@@ -158,7 +153,7 @@ class _Course:
         points: list[Point] = [own]
         records = self._evaluate(points, [])
         for _ in range(self.effort.generations):
-            if records[-1] is None or (self.stop is not None and self.stop()):
+            if records[-1] is None or self.study.token():
                 break
             asked = [point_at(self.variables, shares) for shares in search.ask()]
             found = self._evaluate(asked, records)
@@ -178,9 +173,7 @@ class _Course:
             if self.progress is not None:
                 self.progress(len(earlier) + finished, failed + failures, total)
 
-        return evaluate(
-            self.base, points, self.goals.metrics, self.store, self.executor, progress=report, stop=self.stop
-        )
+        return self.study.evaluate(points, report)
 
     def _judge(self, record: RunRecord) -> tuple[Array, Array]:
         """Return objectives and excesses, `HOPELESS` for a design that cannot be run."""
@@ -224,7 +217,7 @@ def _assembled(base: BaseScenario, goals: Goals, points: list[Point], records: l
         front[rows[once]] = 1 + np.arange(len(once))
     result["feasible"] = ("sample", feasible, {"long_name": "whether the design keeps all constraints"})
     result["front"] = ("sample", front, {"long_name": "number of the design on the front, from 1; 0 for the others"})
-    return result.assign_attrs({name: ", ".join(listed) for name, listed in goals.describe().items()})
+    return result.assign_attrs(goals.describe())
 
 
 def _write(result: xr.Dataset, base: BaseScenario, folder: Path) -> None:
@@ -233,7 +226,7 @@ def _write(result: xr.Dataset, base: BaseScenario, folder: Path) -> None:
     Raises:
         OSError: If they cannot be written.
     """
-    write(result, folder / "optimise.nc")
+    save(result, folder / "optimise.nc")
     keys = [str(key) for key in result.coords]
     columns = [*(str(name) for name in result.data_vars if "units" in result[name].attrs), *keys]
     scenarios = folder / "front"

@@ -43,11 +43,6 @@ class Variable:
         value = float(self.range.at(share))
         return {key: sign * value for key, sign in zip(self.keys, self.signs, strict=True)}
 
-    def describe(self) -> dict[str, Any]:
-        """Return it for a TOML file."""
-        own = {"low": self.range.low, "high": self.range.high, "logarithmic": self.range.logarithmic}
-        return {"keys": list(self.keys), "signs": list(self.signs), **own}
-
 
 def parse_variable(text: str) -> Variable:
     """Return the variable of ``KEY=LOW:HIGH`` or, for keys that go together, ``KEY,KEY2,-KEY3=LOW:HIGH``.
@@ -226,10 +221,9 @@ class Goals:
         """Return the excesses of a run over the constraints."""
         return np.array([each.excess(metrics[each.name]) for each in self.constraints])
 
-    def describe(self) -> dict[str, Any]:
-        """Return them for a TOML file."""
-        return {
-            "minimise": [each.name for each in self.objectives if each.sign > 0],
-            "maximise": [each.name for each in self.objectives if each.sign < 0],
-            "constraints": [str(each) for each in self.constraints],
-        }
+    def describe(self) -> dict[str, str]:
+        """Return the names of the metrics, and the constraints, by kind."""
+        minimise = [each.name for each in self.objectives if each.sign > 0]
+        maximise = [each.name for each in self.objectives if each.sign < 0]
+        told = {"minimise": minimise, "maximise": maximise, "constraints": map(str, self.constraints)}
+        return {kind: ", ".join(names) for kind, names in told.items()}

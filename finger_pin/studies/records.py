@@ -1,120 +1,232 @@
-"""Runs of a study: recorded as soon as they end, and not repeated once they are recorded."""
+"""Runs of a study: a line of JSON each, written as soon as they end, and found again by all that they depend on."""
 
 from __future__ import annotations
 
+import json
+import os
+import sys
 import time
 import uuid
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
+import filelock
 import joblib
 
 from finger_pin.cancellation import CancelToken, Stop
-from finger_pin.description.loading import to_toml
-from finger_pin.exceptions import FingerPinError
-from finger_pin.studies.executor import FailedTask, compile_for, open_executor, run_tasks
-from finger_pin.studies.fingerprint import UnknownDependency, code_digest, finger_digest, source_digest, versions
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import FingerPinError, InputError
+from finger_pin.mechanism.finger import Finger
+from finger_pin.studies.executor import compile_for, one_line, open_executor, run_tasks
+from finger_pin.studies.fingerprint import UnknownDependency, digest, source_digest
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric
 from finger_pin.studies.response import Run
-from finger_pin.studies.store import DONE, FAILED, RunRecord, Store, open_store
+from finger_pin.version import __version__
 
 #: Called with the numbers of finished, failed and all runs.
 Progress = Callable[[int, int, int], None]
+DONE, FAILED = "done", "failed"
+_RUNS, _LOCK, _FIRST = "runs.jsonl", ".lock", b'{"key": '
 
 
 class ExecutorError(FingerPinError):
     """An executor cannot go on: a pool is broken, a cluster is lost; finished runs are recorded."""
 
 
-class VersionError(FingerPinError):
-    """A worker has another version of the package than the process that asks."""
+@dataclass(frozen=True)
+class RunRecord:
+    """Record of a run: its key, varied values, `DONE` or `FAILED` and why, metrics by name, and wall time, s."""
+
+    key: str
+    point: Point
+    status: str
+    reason: str
+    metrics: Mapping[str, float]
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Runs of a scenario, each done and recorded once.
+
+    Attributes:
+        base: The scenario that is varied.
+        metrics: Metrics of every run.
+        path: File of the records; without one they are in memory alone.
+        digest: Digest of what all runs depend on; with a point's values it is a run's key.
+        records: Records by key.
+        executor: Executor of the runs.
+        token: Ends the study; Ctrl-C and a `Stop` cancel it.
+    """
+
+    base: BaseScenario
+    metrics: tuple[Metric, ...]
+    path: Path | None
+    digest: str
+    records: dict[str, RunRecord]
+    executor: Executor
+    token: CancelToken
+
+    def evaluate(
+        self, points: Sequence[Point], progress: Progress | None = None, *, retry_failed: bool = False
+    ) -> list[RunRecord | None]:
+        """Do the runs that are missing, and return the records of all, None where the study was ended before.
+
+        Args:
+            points: Points of the study.
+            progress: Called with the numbers of finished, failed and all runs, first with those found.
+            retry_failed: Whether runs that failed before count as missing.
+
+        Raises:
+            ExecutorError: If the executor cannot go on.
+            OSError: If a record cannot be written, such as on a full disk.
+        """
+        keys = [self._key(point) for point in points]
+        records = {key: self.records[key] for key in keys if key in self.records}
+        if retry_failed:
+            records = {key: record for key, record in records.items() if record.status != FAILED}
+        tasks = [(key, point) for key, point in dict(zip(keys, points, strict=True)).items() if key not in records]
+
+        def report() -> None:
+            if progress is not None:
+                done = [records[key] for key in keys if key in records]
+                progress(len(done), sum(record.status == FAILED for record in done), len(points))
+
+        report()
+        if tasks:
+            compile_for(self.executor, lambda: self.base.at(tasks[0][1]))
+        work = partial(execute, base=self.base, metrics=self.metrics, source=source_digest())
+        for index, outcome in run_tasks(self.executor, work, tasks, self.token):
+            record = _failed(*tasks[index], outcome) if isinstance(outcome, BaseException) else outcome
+            self.append(record)
+            records[record.key] = record
+            report()
+        return [records.get(key) for key in keys]
+
+    def _key(self, point: Point) -> str:
+        """Return the digest of everything that determines a run."""
+        named = [each for each in point.values() if isinstance(each, str)]
+        if any(":" in each and each.partition(":")[0] not in sys.modules for each in named):
+            _import_laws(lambda: self.base.at(point))
+        content = [_lasting_digest(f"the value {each}", each, warn=self.path is not None) for each in named]
+        return str(joblib.hash((self.digest, dict(point), content)))
+
+    def append(self, record: RunRecord) -> None:
+        """Keep a record; once this returns, it is on disk."""
+        if self.path is not None:
+            with filelock.FileLock(self.path.with_name(_LOCK)), self.path.open("ab+") as file:
+                _cut_off_half_line(file)
+                file.write(json.dumps(vars(record)).encode() + b"\n")
+                file.flush()
+                os.fsync(file.fileno())
+        self.records[record.key] = record
 
 
 @contextmanager
 def open_study(
+    base: BaseScenario,
+    metrics: Sequence[Metric],
     output: str | Path | None,
-    asked: Mapping[str, Any],
     products: Sequence[str],
     executor: Executor | None,
     stop: Stop | None,
     restart: bool,
-) -> Iterator[tuple[Store, Executor, CancelToken]]:
-    """Open the store of a study, its executor, and a token that Ctrl-C and a `Stop` cancel.
+) -> Iterator[Study]:
+    """Open a study in a folder, which other processes may share, or in memory alone.
 
-    Args:
-        output: Its folder; without one its records are in memory alone.
-        asked: From `describe_study`.
-        products: Patterns of the files that a study with other settings replaces.
-        executor: By default one thread for each core.
-        stop: Asked now and then.
-        restart: Whether to drop what the folder holds of a study.
-    """
-    with ExitStack() as stack:
-        token = stack.enter_context(CancelToken(stop))
-        pool = stack.enter_context(open_executor(executor))
-        store = Store() if output is None else stack.enter_context(open_store(output, asked, products, restart=restart))
-        yield store, pool, token
-
-
-def evaluate(
-    base: BaseScenario,
-    points: Sequence[Point],
-    metrics: tuple[Metric, ...],
-    store: Store,
-    executor: Executor,
-    *,
-    progress: Progress | None = None,
-    stop: Stop | None = None,
-    retry_failed: bool = False,
-) -> list[RunRecord | None]:
-    """Do the missing runs of a store, keep each as it finishes, and return all in the order of the points.
-
-    Args:
-        base: The scenario that is varied.
-        points: Points of the study.
-        metrics: Metrics of every run.
-        store: Store of the records.
-        executor: Executor of the runs.
-        progress: Called with the numbers of finished, failed and all runs, first with those found.
-        stop: When it returns true, runs that have not been done are None.
-        retry_failed: Whether runs that failed before count as not done.
+    ``products`` are patterns of the files that are made of its records, such as ``figures/sweep.png``; ``restart``
+    removes both. The executor is by default one thread for each core.
 
     Raises:
-        ExecutorError: If the executor cannot go on.
+        InputError: If the folder cannot be written, or has files of these names that no study wrote.
+
+    Warns:
+        UserWarning: If runs cannot be found again, or lines are no records.
     """
-    study = _study_digest(base, metrics)
-    keys = [joblib.hash((study, dict(point))) for point in points]
-    found = {key: store.records[key] for key in keys if key in store.records}
-    records = {key: each for key, each in found.items() if not (retry_failed and each.status == FAILED)}
-    tasks = [(key, point) for key, point in dict(zip(keys, points, strict=True)).items() if key not in records]
-
-    def report() -> None:
-        if progress is not None:
-            done = [records[key] for key in keys if key in records]
-            progress(len(done), sum(record.status == FAILED for record in done), len(points))
-
-    report()
-    if tasks:
-        compile_for(executor, lambda: base.at(tasks[0][1]))
-    work = partial(execute, base=base, metrics=metrics, source=source_digest())
-    for index, done in run_tasks(executor, work, tasks, stop or (lambda: False)):
-        record = _failed(*tasks[index], done) if isinstance(done, FailedTask) else done
-        store.append(record)
-        records[record.key] = record
-        report()
-    return [records.get(key) for key in keys]
+    with CancelToken(stop) as token, open_executor(executor) as pool:
+        path, records = (None, {}) if output is None else _open_folder(Path(output), products, restart)
+        common = _common_digest(base, metrics, warn=path is not None)
+        yield Study(base, tuple(metrics), path, common, records, pool, token)
 
 
-def _failed(key: str, point: Point, failed: FailedTask) -> RunRecord:
+def _open_folder(folder: Path, products: Sequence[str], restart: bool) -> tuple[Path, dict[str, RunRecord]]:
+    path, records = folder / _RUNS, dict[str, RunRecord]()
+    try:
+        present = [each for pattern in (*products, _RUNS) for each in folder.glob(pattern)]
+        foreign = [each.name for each in folder.glob("study.toml")]
+        if present and not (path.exists() and _FIRST.startswith(path.read_bytes()[: len(_FIRST)])):
+            foreign.append(present[0].name)
+        if foreign:
+            what = f"holds a {foreign[0]} of an earlier version or of something else; name another folder"
+            raise InputError("output", what, str(folder))
+        for each in present if restart else ():
+            each.unlink()
+        folder.mkdir(parents=True, exist_ok=True)
+        with filelock.FileLock(folder / _LOCK), path.open("ab+") as file:
+            dropped = _cut_off_half_line(file)
+            file.seek(0)
+            lines = file.read().splitlines()
+    except OSError as error:
+        raise InputError("output", f"cannot be written: {error.strerror or error}", str(folder)) from None
+    for line in lines:
+        try:
+            record = RunRecord(**json.loads(line))
+            records[record.key] = record
+        except (TypeError, ValueError):
+            dropped += 1
+    if dropped:
+        message = f"{path}: lines that are not whole, or no records: {dropped}; their runs are done again"
+        warnings.warn(message, stacklevel=5)
+    return path, records
+
+
+def _cut_off_half_line(file: BinaryIO) -> int:
+    """Cut off what a process that was killed in the middle of a line has left; return the number of such lines."""
+    file.seek(max(file.seek(0, os.SEEK_END) - 1, 0))
+    if file.read() in (b"", b"\n"):
+        return 0
+    file.seek(0)
+    file.truncate(file.read().rfind(b"\n") + 1)
+    return 1
+
+
+def _common_digest(base: BaseScenario, metrics: Sequence[Metric], warn: bool) -> str:
+    """Return a digest of what all runs depend on."""
+    _import_laws(lambda: base.scenario)
+    parts: dict[str, Any] = {f"the metric {each.name}": each for each in metrics}
+    parts |= {"the scenario": base.scenario, "the finger": base.finger}
+    return str(joblib.hash([source_digest(), *(_lasting_digest(name, part, warn) for name, part in parts.items())]))
+
+
+def _import_laws(scenario: Callable[[], Scenario]) -> None:
+    """Import the laws that a scenario names, so that their content is known."""
+    # Its run reports why a scenario cannot be simulated.
+    with suppress(FingerPinError):
+        Finger(scenario().finger)
+
+
+def _lasting_digest(name: str, part: Any, warn: bool) -> str:
+    """Return the digest of a part of a study, a unique one if its content cannot be known."""
+    try:
+        return digest(part)
+    except UnknownDependency as error:
+        if warn:
+            warnings.warn(f"{name} uses {error}, so its runs are done anew whenever they are asked for", stacklevel=6)
+        return uuid.uuid4().hex
+
+
+def _failed(key: str, point: Point, error: BaseException) -> RunRecord:
     """Return the record of a run that killed its workers, or raise if the executor failed."""
-    if type(failed.error).__name__ == "KilledWorker":
-        return RunRecord(key, dict(point), FAILED, f"the workers that ran it died: {failed.error}", {}, 0.0)
-    raise ExecutorError(f"the executor cannot go on: {failed.reason}; give an output to keep what it has finished")
+    if type(error).__name__ == "KilledWorker":
+        return RunRecord(key, dict(point), FAILED, f"the workers that ran it died: {error}", {}, 0.0)
+    raise ExecutorError(f"the executor cannot go on: {one_line(error)}; give an output to keep what it has finished")
 
 
 def execute(
@@ -123,30 +235,18 @@ def execute(
     """Simulate a point and measure it; an exception becomes the reason of a failed run.
 
     Raises:
-        VersionError: If this package is not the one that asked.
+        ExecutorError: If this package is not the one that asked.
         Interrupted: If it was told to stop.
     """
     if source != source_digest():
-        own = f"{versions()['finger-pin']}, source {source_digest()}"
-        raise VersionError(f"a worker has another finger_pin ({own}), not that of source {source}")
+        other = f"{__version__}, source {source_digest()}"
+        raise ExecutorError(f"a worker has another finger_pin ({other}), not that of source {source}")
     key, point = task
-    start = time.perf_counter()
-    values, status, reason = dict[str, float](), DONE, ""
+    start, values, reason = time.perf_counter(), dict[str, float](), ""
     try:
         scenario = base.at(point)
         run = Run(scenario, stop, base.finger_at(scenario))
         values = {metric.name: float(metric.measure(run)) for metric in metrics}
     except Exception as error:
-        kind = "" if isinstance(error, FingerPinError) else f"{type(error).__name__}: "
-        status, reason = FAILED, " ".join(f"{kind}{error}".split())
-    return RunRecord(key, dict(point), status, reason, values, time.perf_counter() - start)
-
-
-def _study_digest(base: BaseScenario, metrics: Sequence[Metric]) -> str:
-    """Return a digest of the common input of a study's runs, a unique one if it cannot be known."""
-    try:
-        codes = [code_digest(metric) for metric in metrics]
-        finger = base.finger and finger_digest(base.finger)
-    except UnknownDependency:
-        return uuid.uuid4().hex
-    return str(joblib.hash((to_toml(base.scenario), codes, finger, source_digest())))
+        reason = one_line(error)
+    return RunRecord(key, dict(point), FAILED if reason else DONE, reason, values, time.perf_counter() - start)

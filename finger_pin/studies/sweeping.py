@@ -15,13 +15,13 @@ from finger_pin.description.loading import ScenarioLike
 from finger_pin.description.parametrised_scenario import split
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike
+from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.progress import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
 from finger_pin.studies.keys import BaseScenario, Value
 from finger_pin.studies.metrics import Metric, metrics_of
-from finger_pin.studies.records import Progress, evaluate, open_study
-from finger_pin.studies.store import describe_study, write
+from finger_pin.studies.records import Progress, open_study
 
 PRODUCTS = ["sweep.nc", "figures/sweep.png"]
 
@@ -55,7 +55,7 @@ def sweep(
             scenario has no reference.
         overrides: Entries of the scenario that hold at all points.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
-        output: Folder for ``study.toml``, ``runs.jsonl`` and ``sweep.nc``; by default nothing is kept.
+        output: Folder for ``runs.jsonl`` and ``sweep.nc``; by default nothing is kept.
         executor: Executor of the runs, any of `concurrent.futures`; by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         retry_failed: Whether to repeat runs that failed before.
@@ -78,14 +78,12 @@ def sweep(
     chosen = metrics_of(base.scenario, metrics)
     for key, values in design.values.items():
         base.check(key, values, alone=len(design.values) == 1)
-    asked = {} if output is None else describe_study(base, chosen, {"sweep": design.describe()})
-    with open_study(output, asked, PRODUCTS, executor, stop, restart) as (store, pool, token):
-        shown, points = progress or notebook_bar("runs"), design.points()
-        records = evaluate(base, points, chosen, store, pool, progress=shown, stop=token, retry_failed=retry_failed)
+    with open_study(base, chosen, output, PRODUCTS, executor, stop, restart) as study:
+        records = study.evaluate(design.points(), progress or notebook_bar("runs"), retry_failed=retry_failed)
         result = assemble(base.scenario, design, chosen, records)
         if output is not None:
-            write(result, Path(output) / "sweep.nc")
-    return checked(result, token.cancelled)
+            save(result, Path(output) / "sweep.nc")
+    return checked(result, study.token.cancelled)
 
 
 def _refuse_varied(overrides: Mapping[str, Any], design: Design) -> None:

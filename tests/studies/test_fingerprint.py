@@ -1,13 +1,17 @@
 """Digests of what a run depends on: alike for the same code and values, and different for any other."""
 
 import functools
+import os
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.fingerprint import UnknownDependency, code_digest, finger_digest, source_digest
+from finger_pin.studies.fingerprint import UnknownDependency, digest, finger_digest, source_digest
 from finger_pin.studies.metrics import METRICS
 
 
@@ -44,16 +48,38 @@ PAIRS = {
 }
 
 
+CLASS = """
+class A:
+  def __init__(self): self.here, self.sizes = self, {'a': %s}
+  def __call__(self, x): return x
+f = A()
+"""
+PAIRS |= {
+    "an object": (CLASS % 1, CLASS % 2),
+    "a property": tuple(f"class A:\n  @property\n  def b(self): return {n}\nf = A()" for n in (1, 2)),
+    "a compiled function": tuple(f"import numba\n@numba.njit\ndef f(x): return {n}" for n in (1, 2)),
+    "how it is compiled": tuple(f"import numba\n@numba.njit(fastmath={n})\ndef f(x): return x" for n in (True, False)),
+    "a function with a memory": tuple(f"import functools\nf = functools.lru_cache(lambda x: {n})" for n in (1, 2)),
+    "a NumPy function": ("import numpy\nf = numpy.sin", "import numpy\nf = numpy.cos"),
+    "random numbers": tuple(f"import numpy\nf = numpy.random.default_rng({n}).normal" for n in (1, 2)),
+    "a zero's sign": ("f = 0.0", "f = -0.0"),
+    "the kind of a number": ("f = 1", "f = 1.0"),
+    "a scenario": tuple(
+        f"import finger_pin\nf = finger_pin.load_scenario('reversals', {{'controller.gain': {n}}})" for n in (1, 2)
+    ),
+}
+
+
 @pytest.mark.parametrize("what", PAIRS)
 def test_a_digest_tells_apart_what_differs_in(what):
     one, other = PAIRS[what]
-    assert code_digest(defined(one)) == code_digest(defined(one))
-    assert code_digest(defined(one)) != code_digest(defined(other))
+    assert digest(defined(one)) == digest(defined(one))
+    assert digest(defined(one)) != digest(defined(other))
 
 
 def test_a_partial_is_told_by_its_arguments():
     function = defined("def f(a, b): return a + b")
-    digests = {code_digest(functools.partial(function, number)) for number in (1, 2, 2)}
+    digests = {digest(functools.partial(function, number)) for number in (1, 2, 2)}
     assert len(digests) == 2
 
 
@@ -65,18 +91,21 @@ def test_a_module_of_ones_own_counts_by_what_is_used_of_it(tmp_path, monkeypatch
         (tmp_path / f"helper_{name}.py").write_text(text)
         module = __import__(f"helper_{name}")
         module.__name__ = "helper"
-        found[name] = code_digest(defined("def f(x): return helper.A", helper=module))
+        found[name] = digest(defined("def f(x): return helper.A", helper=module))
     assert found["first"] == found["second"] != found["third"]
 
 
-@pytest.mark.parametrize("mystery", [object(), threading.Lock(), np.array([None]), functools.lru_cache(lambda: 1)])
+MYSTERIES = [threading.Lock(), (each for each in ()), np.frompyfunc(abs, 1, 1)]
+
+
+@pytest.mark.parametrize("mystery", MYSTERIES)
 def test_what_cannot_be_compared_has_no_digest(mystery):
     with pytest.raises(UnknownDependency):
-        code_digest(defined("def f(x): return A", A=mystery))
+        digest(defined("def f(x): return A", A=mystery))
 
 
 def test_all_metrics_of_the_package_have_digests_of_their_own():
-    assert len({code_digest(metric.measure) for metric in METRICS.values()}) == len(METRICS)
+    assert len({digest(metric.measure) for metric in METRICS.values()}) == len(METRICS)
     assert source_digest() == source_digest()
 
 
@@ -88,3 +117,26 @@ def test_runs_with_a_law_of_ones_own_are_kept_under_a_digest_of_it():
     ]
     first, other, again = map(finger_digest, fingers)
     assert first == again != other and first != finger_digest(fp.Finger("ub_stand_in"))
+
+
+ALIKE = """
+import sys
+sys.path[:0] = sys.argv[1:]
+import finger_pin as fp
+from test_fingerprint import PAIRS, defined
+from finger_pin.studies.fingerprint import digest
+
+texts = [text for pair in PAIRS.values() for text in pair]
+constants = "def f(x): return x in {'a', 'b', 'c', 'd'} or x == S, (1, 2), (1, 2), float('nan')"
+things = [*map(defined, texts), defined(constants, S={"a", "b", "c"}), fp.Finger("ub_stand_in")]
+print(list(map(digest, things)))
+"""
+
+
+def test_equal_values_have_equal_digests_in_processes_that_order_sets_and_texts_otherwise():
+    told = []
+    for seed in ("1", "2"):
+        command = [sys.executable, "-c", ALIKE, str(Path(__file__).parent)]
+        environment = os.environ | {"PYTHONHASHSEED": seed}
+        told.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert told[0] == told[1] != ""

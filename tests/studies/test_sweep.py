@@ -4,6 +4,7 @@ import importlib
 import json
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -92,6 +93,15 @@ def test_the_same_again_repeats_no_run(grid):
     assert again.identical(result)
     assert (folder / "runs.jsonl").read_bytes() == before
     assert seen == [(6, 3, 6)]
+
+
+def test_more_points_in_the_same_folder_cost_only_their_own_runs_whatever_kind_of_number_asks(tmp_path):
+    for gains, count in (([1, 2], 2), ([2.0, np.float64(1.0), np.int64(3)], 3)):
+        result = fp.sweep(
+            "reversals", {"controller.gain": gains}, metrics=[GAIN], overrides=SHORT, output=tmp_path, executor=TWO
+        )
+        np.testing.assert_array_equal(result["gain"], gains)
+        assert len(lines(tmp_path)) == count
 
 
 def test_samples_have_every_key_as_a_coordinate():
@@ -188,12 +198,33 @@ def test_a_metric_that_was_edited_is_measured_anew_and_one_that_was_not_is_not(t
 
 
 def test_what_depends_on_something_unknown_is_done_anew_and_said(tmp_path):
-    mystery = object()
-    metric = fp.studies.Metric("odd", "1", "odd", lambda run: float(mystery is not None))
-    for count in (1, 2):
-        with pytest.warns(UserWarning, match="the metric odd uses an object of type object, so its runs are done anew"):
-            fp.sweep("reversals", {"controller.gain": [1.0]}, metrics=[metric], output=tmp_path, executor=TWO)
-        assert len(lines(tmp_path)) == count
+    numbers = tmp_path / "numbers.txt"
+    numbers.touch()
+    with numbers.open() as mystery:
+        metric = fp.studies.Metric("odd", "1", "odd", lambda run: float(mystery is not None))
+        for count in (1, 2):
+            with pytest.warns(
+                UserWarning, match="the metric odd uses an object of type TextIOWrapper, so its runs are"
+            ):
+                fp.sweep("reversals", {"controller.gain": [1.0]}, metrics=[metric], output=tmp_path, executor=TWO)
+            assert len(lines(tmp_path)) == count
+
+
+def test_a_law_that_a_scenario_names_counts_by_its_code(tmp_path, monkeypatch):
+    name = "laws_of_ones_own:LAW"
+    designs = {
+        "base": ({"controller.gain": [1.0]}, {"finger.joint_friction.law": name}),
+        "varied": ({"finger.joint_friction.law": [name]}, {}),
+    }
+    for number, count in ((1, 1), (1, 1), (2, 2)):
+        module = ModuleType("laws_of_ones_own")
+        exec(f"def force(row, p):\n    return {number} * row.speed, 0.0", vars(module))
+        module.LAW = fp.Law("own", (), module.force, module.force, module.force)
+        monkeypatch.setitem(sys.modules, "laws_of_ones_own", module)
+        for folder, (over, more) in designs.items():
+            options = {"metrics": [GAIN], "overrides": SHORT | more, "output": tmp_path / folder}
+            fp.sweep("reversals", over, executor=TWO, **options)
+            assert len(lines(tmp_path / folder)) == count
 
 
 def test_another_source_of_the_package_does_all_anew(tmp_path, monkeypatch):

@@ -54,7 +54,7 @@ def test_a_sweep_writes_its_results_and_says_what_came_out(script, tmp_path, mon
     (folder,) = (tmp_path / "results").iterdir()
     assert folder.name.startswith("sweep-reversals-duration-0.02-gain-0.5to2to2-tendons.T3.")
     found = {str(each.relative_to(folder)) for each in folder.rglob("*") if each.is_file()}
-    assert found == {"study.toml", "runs.jsonl", "sweep.nc", "figures/sweep.png"}
+    assert found == {".lock", "runs.jsonl", "sweep.nc", "figures/sweep.png"}
     assert dict(fp.load(folder / "sweep.nc").sizes) == {"controller.gain": 2, radius: 2}
 
 
@@ -144,16 +144,22 @@ def test_wrong_options_are_one_line_and_write_nothing(script, refuses, arguments
     refuses(script, arguments, says)
 
 
-def test_another_study_in_the_folder_is_refused_and_left_as_it_is(script, tmp_path, monkeypatch, capsys):
+def test_another_study_in_the_folder_does_its_own_runs_and_one_of_an_earlier_version_is_left_as_it_is(
+    script, tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     common = ["--metric", "self_locking_margin", "--workers", "1", "--output", "out", "--quiet", *SHORT]
     assert script.main(["--over", "controller.gain=1,2", *common]) == 0
-    before = {each: each.read_bytes() for each in Path("out").rglob("*") if each.is_file()}
-    assert script.main(["--over", "controller.gain=1,3", *common]) == 2
-    assert "--restart" in capsys.readouterr().err
-    assert {each: each.read_bytes() for each in Path("out").rglob("*") if each.is_file()} == before
-    assert script.main(["--over", "controller.gain=1,3", *common, "--restart"]) == 0
+    before = Path("out/runs.jsonl").read_bytes()
+    assert script.main(["--over", "controller.gain=1,3", *common]) == 0
+    after = Path("out/runs.jsonl").read_bytes()
+    assert after.startswith(before)
+    assert [line["point"]["controller.gain"] for line in lines(Path("out/runs.jsonl"))] == [1, 2, 3]
     assert fp.load("out/sweep.nc")["controller.gain"].values.tolist() == [1.0, 3.0]
+    Path("out/study.toml").touch()
+    assert script.main(["--over", "controller.gain=1,4", *common]) == 2
+    assert "name another folder" in capsys.readouterr().err
+    assert Path("out/runs.jsonl").read_bytes() == after
 
 
 def test_metrics_are_listed(script, capsys):
