@@ -73,7 +73,7 @@ def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
     """
     finger = as_finger(finger)
     theta = finite_vector("position", position, len(finger.routing.joints))
-    if not finger.paths.routes:
+    if not finger.routing.through_space.any():
         return finger
     if finger.tendons.at_bends:
         allowed = 'must be "canal" for statics of tendons along paths through space'
@@ -86,6 +86,7 @@ def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
         coupling=coupling,
         strand_coupling=np.concatenate([coupling[:actuated], finger.routing.strand_coupling[actuated:]]),
         curvature_offset=finger.routing.curvature_offset + added,
+        through_space=np.zeros_like(finger.routing.through_space),
     )
     twin = copy.copy(finger)
     twin.routing, twin.tendons = routing, replace(finger.tendons, routing=routing)

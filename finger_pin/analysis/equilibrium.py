@@ -184,7 +184,7 @@ def _refuse_restless(finger: Finger) -> None:
     if found:
         allowed = "must be one finger with ideal sources of tension, without free objects"
         raise InputError("finger", f"{allowed}; it has {found}")
-    for name, each in description.tree_or_empty.actuators.items():
+    for name, each in description.tree.actuators.items():
         if each.integrates or each.integral:
             raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")
 

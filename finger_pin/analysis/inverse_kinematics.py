@@ -11,10 +11,9 @@ import scipy
 
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.finger import one_finger
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.path_elements import path_kinematics
 from finger_pin.typing import Array

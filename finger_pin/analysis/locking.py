@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from finger_pin.analysis.directions import directions_of_motion, sliding_velocity
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.finger import one_finger
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, description_of
+from finger_pin.mechanism.coerce import FingerLike, description_of, one_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array

@@ -18,10 +18,9 @@ from itertools import product
 import numpy as np
 
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.finger import one_finger
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array, Indices
 

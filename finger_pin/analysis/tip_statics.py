@@ -39,10 +39,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from finger_pin.description.finger import one_finger
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.mechanism.coerce import one_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array

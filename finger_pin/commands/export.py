@@ -85,10 +85,10 @@ def described(source: str, settings: list[str]) -> FingerDescription | Scenario:
 
 def written(described: FingerDescription | Scenario, ending: str) -> str:
     """Return a description as the text of a file."""
-    from finger_pin.description.finger import one_finger
     from finger_pin.description.loading import to_toml
     from finger_pin.description.scenario import Scenario
     from finger_pin.exchange.mjcf import to_mjcf
+    from finger_pin.mechanism.coerce import one_finger
     from finger_pin.mechanism.urdf import to_urdf
 
     if ending == ".toml":

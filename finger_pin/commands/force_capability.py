@@ -38,9 +38,9 @@ def force_capability(
 
     import finger_pin as fp
     from finger_pin.analysis import Friction, force_polytope, tension_for_force, tension_limits
-    from finger_pin.description.finger import one_finger
     from finger_pin.description.loading import describe
     from finger_pin.description.validation import finite_vector
+    from finger_pin.mechanism.coerce import one_finger
     from finger_pin.views.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
 
     finite_vector("--force", wish, 3)

@@ -121,7 +121,6 @@ def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
             # It is in the list that is printed.
             warnings.simplefilter("ignore", LeftOutWarning)
         description = from_mujoco(path, path.stem)
-    assert description.tree is not None
     if not quiet and description.tree.left_out:
         print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))
     return read_scenario(demo_motion(description), changed)

@@ -72,7 +72,7 @@ def _built(scenario: Scenario, routing: Routing, finger: Finger | None) -> LoopC
     settings = scenario.controller
     if settings.kind == "tensions":
         return OpenLoopTensions.from_scenario(scenario, routing)
-    if any(tendon.along for tendon in scenario.finger.tendons.values()):
+    if scenario.finger.through_space:
         return _routed(scenario, finger or Finger(scenario.finger))
     taut = routing.force_closure().holds
     if settings.is_paper and taut:

@@ -26,7 +26,7 @@ def input_ranges(finger: Finger) -> tuple[Array, Array]:
         else (own.min(), own.max() + (each.maximum_tension or _STRONGEST) / each.winch.stiffness)
         for each, own in zip(description.tendons.values(), drawn, strict=False)
     ]
-    for name, each in description.tree_or_empty.actuators.items():
+    for name, each in description.tree.actuators.items():
         reach = each.reach(description.joints[each.joint].range if each.joint else None)
         if reach is None:
             raise InputError(

@@ -124,4 +124,4 @@ def _input(value: float) -> InputSignal:
 
 
 def _actuators(scenario: Scenario) -> tuple[str, ...]:
-    return tuple(scenario.finger.tree_or_empty.actuators)
+    return tuple(scenario.finger.tree.actuators)

@@ -227,7 +227,7 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
 
 
 def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> None:
-    actuators = tuple(finger.tree_or_empty.actuators)
+    actuators = tuple(finger.tree.actuators)
     for name in settings.inputs or {}:
         if name not in actuators:
             hint = f"; give controller.spool_angle.{name}" if name in finger.actuators else suggestion(name, actuators)

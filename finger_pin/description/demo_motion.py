@@ -26,7 +26,6 @@ def demo_motion(description: FingerDescription, duration: float = 4.0) -> dict[s
         duration: s.
     """
     tree = description.tree
-    assert tree is not None
     count = len(tree.actuators) + len(description.actuated_names)
     phases = iter(range(count))
 

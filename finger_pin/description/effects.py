@@ -60,10 +60,7 @@ OF_FINGER = (
         "tendon_friction", (), lambda finger, _: finger.tendons or finger.canals, "has no effect where no tendon rubs"
     ),
     Rule(
-        "joint_friction",
-        (),
-        lambda finger, _: finger.tree is None or any(each.bearing for each in finger.tree.joints.values()),
-        "has no effect without a joint that has a bearing",
+        "joint_friction", (), lambda finger, _: any(finger.bearings), "has no effect without a joint that has a bearing"
     ),
     Rule(
         "joint_friction",
@@ -89,14 +86,11 @@ OF_FINGER = (
     Rule(
         "",
         ("touches_itself",),
-        lambda finger, _: finger.tree_or_empty.touching or (finger.tree is None and len(finger.joints) > 2),
+        lambda finger, _: finger.tree.touching or len(finger.links) > 2,
         "has no effect where no two parts but neighbours could touch",
     ),
     Rule(
-        "joints.*",
-        ("link",),
-        lambda finger, _: finger.tree is None,
-        "has no effect beside a tree, whose bodies are the links",
+        "joints.*", ("link",), lambda finger, _: finger.links, "has no effect beside a tree, whose bodies are the links"
     ),
     Rule(
         "actuators.*",
@@ -164,7 +158,7 @@ OF_SCENARIO = (
     Rule(
         "controller",
         _CORRECTIONS,
-        lambda scenario, _: not any(tendon.along for tendon in scenario.finger.tendons.values()),
+        lambda scenario, _: not scenario.finger.through_space,
         "has no effect where tendons run along paths",
     ),
     Rule(

@@ -6,13 +6,21 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import (
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from finger_pin.description.actuators import Actuator, check_actuators
 from finger_pin.description.caching import memoised
+from finger_pin.description.cords import Cord
 from finger_pin.description.effects import OF_FINGER, OF_HAND, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.parameters import Joint, PassiveTendon, StrokeLimiterSettings, Tendon
@@ -27,7 +35,6 @@ from finger_pin.description.placement import (
 )
 from finger_pin.description.tree import EMPTY, Tree
 from finger_pin.description.validation import IN_RADIANS, Description, Name, check_size, problem, quantity, real, vector
-from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
 
@@ -63,7 +70,14 @@ class FingerDescription(Description):
         description="Whether links that are not neighbours touch each other, where there are contacts.",
     )
     _hand: HandSettings | None = PrivateAttr(None)
-    tree: Tree | None = Field(None, description="Bodies in place of links, with joints, tendons and actuators.")
+    tree: Tree = Field(EMPTY, description="Bodies in place of links, with joints, tendons and actuators.")
+
+    @model_serializer(mode="wrap")
+    def _written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        written: dict[str, Any] = write(self)
+        if not self.tree.bodies:
+            written.pop("tree", None)
+        return written
 
     @field_validator("tendons")
     @classmethod
@@ -73,21 +87,23 @@ class FingerDescription(Description):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         joints, tendons = tuple(self.joints), tuple(self.tendons)
-        if not self.tendons and self.tree is None:
+        if not self.tendons and not self.tree.bodies:
             raise problem("tendons", "must have at least one entry")
-        if self.tree is not None and tuple(self.tree.joints) != joints:
+        if self.tree.bodies and tuple(self.tree.joints) != joints:
             raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
-        paths = tuple(self.tree_or_empty.tendons)
+        paths = tuple(self.tree.tendons)
         for name, tendon in self.tendons.items():
             if tendon.along is not None and tendon.along not in paths:
                 allowed = f"no such tendon of the tree; there are {', '.join(paths) or 'none'}"
                 raise problem(f"tendons.{name}.along", allowed, tendon.along)
+            if name in paths and tendon.along != name:
+                raise problem(f"tendons.{name}", "a tendon of the tree has this name; choose another")
             for joint in tendon.crossings:
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
-        driven = (*self.actuated_names, *self.tree_or_empty.actuators)
-        for key, keyframe in self.tree_or_empty.keyframes.items():
+        driven = (*self.actuated_names, *self.tree.actuators)
+        for key, keyframe in self.tree.keyframes.items():
             for name in keyframe.inputs:
                 if name not in driven:
                     allowed = f"no such actuator or tendon; there are {', '.join(driven)}"
@@ -109,10 +125,19 @@ class FingerDescription(Description):
         refuse_idle(self, OF_FINGER)
         return self
 
+    def cord(self, name: str) -> Cord:
+        """Return one of its tendons as a cord, or else a tendon of its tree that something else pulls."""
+        tendon = self.tendons.get(name)
+        if tendon is None or tendon.along is not None:
+            cord = self.tree.cord(name if tendon is None else str(tendon.along))
+            offset = 0.0 if tendon is None else tendon.curvature_offset
+            return cord._replace(curvature_offset=cord.curvature_offset + offset)
+        return Cord.of_crossings(tendon)
+
     @property
-    def tree_or_empty(self) -> Tree:
-        """Its tree; of a finger of links one without anything."""
-        return self.tree or EMPTY
+    def through_space(self) -> bool:
+        """Whether any of its tendons runs along a path through space, so that its arms depend on the posture."""
+        return any(self.cord(name).through_space for name in self.tendons)
 
     @property
     def outline(self) -> str:
@@ -120,7 +145,7 @@ class FingerDescription(Description):
         if self.hand is not None:
             sizes = f"{len(self.joints)} joints, {len(self.tendons)} tendons"
             return f"{self.name}: fingers {', '.join(self.hand.fingers)}; {sizes}"
-        if self.tree is not None:
+        if self.tree.bodies:
             tree, pulled = self.tree, len(self.tendons)
             sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
             return f"{self.name}: a tree of {sizes}, {len(tree.actuators)} actuators"
@@ -133,9 +158,19 @@ class FingerDescription(Description):
         return self._hand
 
     @property
+    def bearings(self) -> tuple[bool, ...]:
+        """Whether each joint is a pin or a guide that rubs."""
+        return tuple(name not in self.tree.joints or self.tree.joints[name].bearing for name in self.joints)
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of the joints that carry links; in place of links a tree has bodies."""
+        return tuple(name for name in self.joints if name not in self.tree.joints)
+
+    @property
     def canals(self) -> tuple[str, ...]:
         """Names of the tree's tendons that something else than ideal sources pulls: they rub as all tendons do."""
-        return self.tree_or_empty.rubbing
+        return self.tree.rubbing
 
     @property
     def passive_names(self) -> tuple[str, ...]:
@@ -156,7 +191,7 @@ class PlacedFinger(Description):
     @field_validator("finger")
     @classmethod
     def _made_of_links(cls, value: FingerDescription) -> FingerDescription:
-        if value.tree is not None:
+        if value.tree.bodies:
             raise problem("tree", "a tree of bodies cannot be placed on a palm; it is a hand of its own")
         return value
 
@@ -264,15 +299,3 @@ def _placed_finger(name: str, placed: PlacedFinger, gravity: tuple[float, float,
     own = placed.rotation.T @ np.array(gravity)
     finger = scaled(placed.finger, placed.scale)
     return finger.updated(name=name, gravity=tuple(own.tolist()))
-
-
-def one_finger(description: FingerDescription) -> None:
-    """Refuse to give a hand's fingers together for a single one.
-
-    Raises:
-        InputError: If it is a hand of several fingers.
-    """
-    hand = description.hand
-    if hand is not None and len(hand.fingers) > 1:
-        allowed = f"is a hand; take one of its fingers: scenario.parts()[NAME] with {', '.join(hand.fingers)}"
-        raise InputError("finger", allowed, hand.name)

@@ -6,6 +6,7 @@ then for each passive tendon its proximal and its distal half, since friction ma
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +14,8 @@ import scipy
 from numpy.typing import NDArray
 
 from finger_pin.description.caching import cached_property, memoised
+from finger_pin.description.cords import CordElement
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.parameters import Tendon
 from finger_pin.typing import Array, Indices
 
 # Below this share of the largest, an internal tension counts as none.
@@ -43,6 +44,7 @@ class Routing:
         loads: Shape (n, s), one where a strand loads a joint, equation (17).
         fingers: Of every finger the indices of its joints and of its tendons; of one finger all.
         winched: Which actuated tendons an ideal winch winds: their input is a length, m; shape (a,).
+        through_space: Which tendons have arms that depend on the posture beside those of H_c, shape (t,).
     """
 
     joints: tuple[str, ...]
@@ -55,6 +57,7 @@ class Routing:
     loads: Array
     fingers: tuple[tuple[Indices, Indices], ...]
     winched: NDArray[np.bool_]
+    through_space: NDArray[np.bool_]
 
     @classmethod
     @memoised(_parts)
@@ -63,38 +66,47 @@ class Routing:
         joints, tendons = tuple(description.joints), tuple(description.tendons)
         names = [""] if description.hand is None else [f"{name}." for name in description.hand.fingers]
         column = {name: index for index, name in enumerate(joints)}
-        coupling, curvature, strands, loads = [], [], [], []
-        for tendon in description.tendons.values():
-            radii, bends, crossed = np.zeros((3, len(joints), len(tendon.crossings)))
-            rubbing = _rubbing(description, tendon)
-            for order, (joint, crossing) in enumerate(tendon.crossings.items()):
-                radii[column[joint], order] = crossing.radius
-                bends[column[joint], order] = crossing.bends if joint in rubbing else 0.0
-                crossed[column[joint], order] = 1.0
-            if tendon.along is not None:
-                # Its arms depend on the posture; which joints it crosses does not.
-                parts = description.tree_or_empty.crossed(tendon.along)
-                crossed = np.array([[sum(1.0 / divisor for divisor, own in parts if j in own)] for j in joints])
-            coupling.append(radii.sum(axis=1))
-            curvature.append(bends.sum(axis=1))
+        cords = [description.cord(name) for name in tendons]
+        # Where tendons rub at their bends, none does beyond the last element that moves it.
+        at_bends = description.tendon_friction.place == "bends"
+        elements = [
+            cord.parts[0].sliding() if at_bends and tendon.kind == "actuated" else cord.elements
+            for cord, tendon in zip(cords, description.tendons.values(), strict=True)
+        ]
+
+        def sums(elements: Iterable[CordElement], value: str) -> Array:
+            row = np.zeros(len(joints))
+            for element in elements:
+                if element.radius is not None:
+                    row[column[element.name]] += getattr(element, value)
+            return row
+
+        strands, loads = [], []
+        for cord, tendon in zip(cords, description.tendons.values(), strict=True):
             split = tendon.proximal_crossings
-            halves = [slice(None)] if tendon.kind == "actuated" else [slice(None, split), slice(split, None)]
-            for half in halves:
-                strands.append(radii[:, half].sum(axis=1))
-                loads.append(crossed[:, half].sum(axis=1))
+            ends = [(0, None)] if tendon.kind == "actuated" else [(0, split), (split, None)]
+            for first, last in ends:
+                strands.append(sums(cord.elements[first:last], "radius"))
+                loads.append(list(cord.shares(joints, first, last)))
         return cls(
             joints=joints,
             tendons=tendons,
             actuated=len(description.actuated_names),
-            coupling=np.array(coupling).reshape(-1, len(joints)),
+            coupling=np.array([sums(cord.elements, "radius") for cord in cords]).reshape(-1, len(joints)),
             strand_coupling=np.array(strands).reshape(-1, len(joints)),
-            curvature_matrix=np.array(curvature).reshape(-1, len(joints)),
-            curvature_offset=np.array([_offset(description, each) for each in description.tendons.values()]),
-            loads=np.array(loads).reshape(-1, len(joints)).T,
+            curvature_matrix=np.array([sums(each, "turn") for each in elements]).reshape(-1, len(joints)),
+            curvature_offset=np.array(
+                [
+                    cord.curvature_offset + sum(element.curvature_offset for element in each)
+                    for cord, each in zip(cords, elements, strict=True)
+                ]
+            ),
+            loads=np.array(loads, dtype=float).reshape(-1, len(joints)).T,
             fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
             winched=np.array(
                 [description.tendons[name].winch is not None for name in description.actuated_names], bool
             ),
+            through_space=np.array([cord.through_space for cord in cords], bool),
         )
 
     @property
@@ -141,7 +153,7 @@ class Routing:
 
     @cached_property
     def _force_closure(self) -> ForceClosure:
-        if not np.any(self.coupling, axis=1).all():
+        if self.through_space.any() or not np.any(self.coupling, axis=1).all():
             return ForceClosure(
                 np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons, posed=False
             )
@@ -226,22 +238,6 @@ class ForceClosure:
             balance = _largest_one(self.null_space[:, 0])
         worst = [name for name, tension in zip(self.tendons, balance, strict=True) if tension <= _SLACK]
         return f"no force closure: {', '.join(worst)} cannot be kept taut at zero joint torque"
-
-
-def _offset(description: FingerDescription, tendon: Tendon) -> float:
-    """Return the curvature of a tendon at theta = 0 that does not show: its own, its crossings', its path's."""
-    along = description.tree_or_empty.tendons[tendon.along].curvature_offset if tendon.along else 0.0
-    own = _rubbing(description, tendon)
-    return tendon.curvature_offset + along + sum(tendon.crossings[each].curvature_offset for each in own)
-
-
-def _rubbing(description: FingerDescription, tendon: Tendon) -> list[str]:
-    """Return the joints at whose crossings a tendon may rub: at bends, none beyond the last one that moves it."""
-    crossed = list(tendon.crossings)
-    if description.tendon_friction.place != "bends" or tendon.kind != "actuated":
-        return crossed
-    moving = [k for k, name in enumerate(crossed) if tendon.crossings[name].radius]
-    return crossed[: moving[-1] + 1] if moving else crossed
 
 
 def _beginning(names: tuple[str, ...], start: str) -> Indices:

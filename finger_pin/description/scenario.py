@@ -81,7 +81,7 @@ class Scenario(Description):
         if self.hand is None and self.controller.tendon_winding:
             object.__setattr__(self, "finger", with_winches(self.finger, tuple(self.controller.tendon_winding)))
         tree, objects = self.finger.tree, self.environment.objects
-        if tree is not None and tree.objects:
+        if tree.objects:
             environment = self.environment.updated(objects={**tree.objects, **(objects or {})})
             object.__setattr__(self, "environment", environment)
         self._check_names()
@@ -109,14 +109,15 @@ class Scenario(Description):
 
     def _is_open(self) -> bool:
         """Return whether a finger is given tensions, or can be driven by them in open loop alone."""
-        finger, tree = self.finger, self.finger.tree
+        finger = self.finger
         given = any(getattr(self.controller, table) for table in BY_SOURCE)
         wound = given or any(tendon.winch for tendon in finger.tendons.values())
-        if wound or (tree is not None and (tree.actuators or not finger.tendons)):
+        if wound or finger.tree.actuators or not finger.tendons:
             return True
         routing, springs = Routing.from_description(finger), any(joint.spring for joint in finger.joints.values())
-        routed = any(tendon.along for tendon in finger.tendons.values())
-        return springs and not routed and not routing.force_closure().holds and not self._tautness(routing).holds
+        if not springs or finger.through_space:
+            return False
+        return not routing.force_closure().holds and not self._tautness(routing).holds
 
     def _check_effects(self) -> None:
         """Refuse what has no effect: on no finger of a hand, or, in a finger's own table, on that one."""
@@ -142,7 +143,7 @@ class Scenario(Description):
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         table: dict[str, Any] = handler(self)
-        of_tree = self.finger.tree_or_empty.objects
+        of_tree = self.finger.tree.objects
         around = table.get("environment", {}).get("objects") or {}
         for name in {*of_tree} & {*around}:
             # It stands in the tree, where it can be changed.
@@ -203,14 +204,14 @@ class Scenario(Description):
     @property
     def keyframe(self) -> Keyframe | None:
         """The posture of a tree that the run starts from, and the inputs that go with it; None without any."""
-        known, initial = self.finger.tree_or_empty.keyframes, self.simulation.initial
+        known, initial = self.finger.tree.keyframes, self.simulation.initial
         name = initial.keyframe if initial else None
         return known[name] if name else next(iter(known.values()), None)
 
     def _check_names(self) -> None:
         """Refuse a table for a joint or a finger that is not there."""
         initial = self.simulation.initial or InitialSettings()
-        keyframes = tuple(self.finger.tree_or_empty.keyframes)
+        keyframes = tuple(self.finger.tree.keyframes)
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
             "reference.joints": (self.reference.joints, "joint", joints),
@@ -251,8 +252,7 @@ class Scenario(Description):
             followers = self.coupling(routing).followers
         except InputError as error:
             raise problem(error.entry, error.allowed) from None
-        routed = any(tendon.along for tendon in self.finger.tendons.values())
-        if self.controller.kind == "proportional" and not closure.holds and not routed:
+        if self.controller.kind == "proportional" and not closure.holds and not self.finger.through_space:
             self._check_taut(routing, str(closure))
         check_sources(self.finger, self.controller.tensions or {})
         rest = expand(self.controller.minimum_tension, len(routing.tendons))

@@ -8,16 +8,18 @@ joints' coefficients are positive. Quaternions are x, y, z, w.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Self
 
 from pydantic import Field, model_validator
 
+from finger_pin.description.cords import Cord, CordElement, CordPart
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.objects import Object
 from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeJoint, TreeTendon
 from finger_pin.description.validation import Description, Name, problem, suggestion
+from finger_pin.description.waypoints import Waypoint
 
 #: What is more is no radius that a cord winds at, as `Crossing` has it, m.
 LARGEST_RADIUS = 0.5
@@ -88,43 +90,42 @@ class Tree(Description):
             if owner[pair[0]] == owner[pair[1]]:
                 raise problem("touching", "shapes of one body do not touch each other", list(pair))
 
-    def crossed(self, tendon: str) -> list[tuple[float, frozenset[str]]]:
-        """Return the joints that each part of a tendon crosses: those that move one piece of its path and not the next.
-
-        The first part is what comes before its first pulley; each with the divisor of its tension.
-        """
+    def cord(self, tendon: str) -> Cord:
+        """Return a tendon as a cord: its arms on joints, where it winds about them, then the legs of its path."""
         described = self.tendons[tendon]
-        around = {name for name, coefficient in (described.joints or {}).items() if coefficient}
-        found: list[tuple[float, set[str]]] = [(1.0, around)]
-        before: set[str] | None = None
-        for each in (described.path or {}).values():
-            if each.kind == "pulley":
-                before = None
-                found.append((each.divisor, set()))
-                continue
-            movers = self._movers(each.body)
-            found[-1][1].update(movers ^ before if before is not None else set())
-            before = movers
-        return [(divisor, frozenset(joints)) for divisor, joints in found]
+        path, coefficients = described.path, described.joints or {}
+        # A sum of joint positions that is no cord, or that stands beside a path, shows no bend.
+        winds = path is None and self._is_cord(tendon)
+        arms = (
+            CordElement.on_joint(joint, -gain, float(winds), bends=winds)
+            for joint, gain in coefficients.items()
+            if gain
+        )
+        (divisor, trunk), *branches = self._legs(path or {})
+        parts = [(divisor, (*arms, *trunk)), *branches]
+        cord_parts = tuple(CordPart(divisor, tuple(elements)) for divisor, elements in parts)
+        return Cord(cord_parts, described.curvature_offset, through_space=path is not None)
 
-    def legs(self, tendon: str) -> list[list[tuple[bool, frozenset[str]]]]:
-        """Return for each part of a tendon's path and every leg whether it wraps, and the joints that change it."""
-        found: list[list[tuple[bool, frozenset[str]]]] = [[]]
+    def _legs(self, path: Mapping[str, Waypoint]) -> list[tuple[float, list[CordElement]]]:
+        """Return divisor and legs of every part of a path: a leg crosses what moves one of its places and not all."""
+        parts: list[tuple[float, list[CordElement]]] = [(1.0, [])]
         before: set[str] | None = None
         wrapped: set[str] | None = None
-        for each in (self.tendons[tendon].path or {}).values():
-            if each.kind == "pulley":
+        for waypoint in path.values():
+            if waypoint.kind == "pulley":
                 before, wrapped = None, None
-                found.append([])
-            elif each.kind != "point":
-                wrapped = self._movers(each.body)
+                parts.append((waypoint.divisor, []))
+            elif waypoint.kind != "point":
+                wrapped = self._movers(waypoint.body)
             else:
-                movers = self._movers(each.body)
+                movers, legs = self._movers(waypoint.body), parts[-1][1]
                 if before is not None:
                     about = before if wrapped is None else wrapped
-                    found[-1].append((wrapped is not None, frozenset((movers ^ before) | (about ^ before))))
+                    crossed = frozenset((movers ^ before) | (about ^ before))
+                    bends = bool(legs) or wrapped is not None
+                    legs.append(CordElement(str(len(legs) + 1), crossed, bool(crossed), bends))
                 before, wrapped = movers, None
-        return found
+        return parts
 
     @property
     def rubbing(self) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ def with_winches(finger: FingerDescription, tendons: Sequence[str]) -> FingerDes
     Tendons of a tree that nothing drives are among them.
     """
     driven = {tendon for each in finger.actuators.values() for tendon in each.tendons}
-    tree, taken = finger.tree_or_empty, {*finger.tendons, *(each.along for each in finger.tendons.values())}
+    tree, taken = finger.tree, {*finger.tendons, *(each.along for each in finger.tendons.values())}
     taken |= {each.tendon for each in tree.actuators.values()}
     added = {name: Tendon(along=name, winch=Winch()) for name in tree.tendons if name in tendons and name not in taken}
     added |= {
@@ -72,7 +72,7 @@ def check_winding(
     for name in lengths:
         entry = f"controller.tendon_winding.{name}"
         instead = f"controller.spool_angle.{name}" if name in motors else ""
-        for servo, each in finger.tree_or_empty.actuators.items():
+        for servo, each in finger.tree.actuators.items():
             if each.tendon == name:
                 instead = f"the input of its actuator, controller.inputs.{servo}"
         _check_name(entry, name, "actuated tendon", names, instead)

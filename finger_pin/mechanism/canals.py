@@ -94,7 +94,7 @@ class Canals:
         self.tables: list[Rows] = []
         self.loads: dict[str, Array] = {}
         self.wraps: dict[str, Array] = {}
-        self._description, self._tree, self._tendons = description, description.tree_or_empty, tendons
+        self._description, self._tree, self._tendons = description, description.tree, tendons
         self._joints, self._width = tuple(description.joints), width
         self._known = {table.group: table for table in rows}
         # They load the pins by themselves.
@@ -112,11 +112,7 @@ class Canals:
         trunks = [self._trunk(name, routes) for name in self._tree.rubbing]
         left |= {each.name: {} for each in trunks}
         self._rub(CANALS, trunks, left)
-        branches = [branch for each in trunks for branch in self._behind(each, each.name, left[each.name])]
-        for each in own:
-            along = description.tendons[each.name].along
-            if along is not None:
-                branches += self._behind(each, along, left[each.name])
+        branches = [branch for each in (*trunks, *own) for branch in self._behind(each, left[each.name])]
         self._rub(BRANCHES, branches, {each.name: {} for each in branches})
 
     def _rub(
@@ -159,17 +155,13 @@ class Canals:
 
     def _own(self, index: int, name: str, routes: TendonPaths, drive_matrices: Mapping[str, Array]) -> _Canal:
         """Return the canal of an actuated tendon of the finger, pulled by its drives besides what its source leaves."""
-        tendon = self._description.tendons[name]
         drives = {
             (group, self._known[group].names[k]): float(weights[index, k])
             for group, weights in drive_matrices.items()
             for k in np.flatnonzero(weights[index])
         }
-        route = TendonPath(-self._tendons.routing.coupling[index], ())
-        if tendon.along is not None:
-            route = routes.routes[tendon.along]
         bends, wraps = self._tendons.routing.curvature_matrix[index], self._tendons.wraps[index]
-        return _Canal(name, index, route, True, frozenset(), drives, bends=bends, wraps=wraps)
+        return _Canal(name, index, routes.pulled[name], True, frozenset(), drives, bends=bends, wraps=wraps)
 
     def _trunk(self, name: str, routes: TendonPaths) -> _Canal:
         """Return the canal of a tendon of the tree before its first pulley, at the first of its wraps."""
@@ -191,22 +183,25 @@ class Canals:
                 one_way &= each.only_pulls
         if tree.linked(name):
             sources[CORDS, name] = 1.0
-        bends = np.array([float(bool(tendon.wound.get(joint))) for joint in self._joints])
+        cord = self._description.cord(name)
+        turns = {element.name: element.turn for element in cord.elements}
+        bends = np.array([turns.get(joint, 0.0) for joint in self._joints])
         index = len(self._tendons.routing.tendons) + tree.rubbing.index(name)
-        crossed, wraps = tree.crossed(name)[0][1], find_wraps(self._description, name)
+        crossed, wraps = cord.parts[0].crossed, find_wraps(self._description, name)
         route = routes.routes[name]
         return _Canal(name, index, route, one_way, crossed, sources, 0.0, bends, tendon.friction, wraps)
 
-    def _behind(self, trunk: _Canal, tendon: str, friction: dict[tuple[str, str], float]) -> list[_Canal]:
+    def _behind(self, trunk: _Canal, friction: dict[tuple[str, str], float]) -> list[_Canal]:
         """Return the branches of a tendon: what pulls them is what the trunk's friction leaves, divided."""
-        found, parts = [], zip(trunk.route.branches, self._tree.crossed(tendon)[1:], strict=True)
-        for number, ((divisor, legs), (_, crossed)) in enumerate(parts, start=1):
+        parts = self._description.cord(trunk.name).parts[1:]
+        found, behind = [], zip(trunk.route.branches, parts, strict=True)
+        for number, ((divisor, legs), part) in enumerate(behind, start=1):
             if legs:
                 sources = {key: weight / divisor for key, weight in (trunk.sources | friction).items()}
                 route = TendonPath(np.zeros(len(self._joints)), legs)
-                wraps = find_wraps(self._description, tendon, number)
+                wraps = find_wraps(self._description, trunk.name, number)
                 name = f"{trunk.name}.{number}"
-                found.append(_Canal(name, trunk.tendon, route, trunk.one_way, crossed, sources, wraps=wraps))
+                found.append(_Canal(name, trunk.tendon, route, trunk.one_way, part.crossed, sources, wraps=wraps))
         return found
 
     def _cords(self, cords: Mapping[str, Mapping[str, float]]) -> Rows:
@@ -250,8 +245,8 @@ class Canals:
 
     def _press(self, own: str, canals: Sequence[_Canal], *, whole: bool) -> None:
         """Record how the friction of canals, and as a whole what pulls through them, load the joints they cross."""
-        for joint, name in enumerate(self._joints):
-            if name in self._tree.joints and not self._tree.joints[name].bearing:
+        for joint, (name, rubs) in enumerate(zip(self._joints, self._description.bearings, strict=True)):
+            if not rubs:
                 continue
             for each in canals:
                 pressing = each.sources if whole else {}

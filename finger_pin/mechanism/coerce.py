@@ -135,3 +135,15 @@ def as_inputs(finger: Finger, given: Mapping[str, float] | ArrayLike, name: str 
         raise InputError(name, "must name an input once", list(given))
     values = np.array([named.get(each, 0.0) for each in names], dtype=float)
     return np.array(finite_vector(name, values, finger.mechanism.channels))
+
+
+def one_finger(description: FingerDescription) -> None:
+    """Refuse to give a hand's fingers together for a single one.
+
+    Raises:
+        InputError: If it is a hand of several fingers.
+    """
+    hand = description.hand
+    if hand is not None and len(hand.fingers) > 1:
+        allowed = f"is a hand; take one of its fingers: scenario.parts()[NAME] with {', '.join(hand.fingers)}"
+        raise InputError("finger", allowed, hand.name)

@@ -20,9 +20,8 @@ from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 from finger_pin.mechanism.scene import Scene
 from finger_pin.mechanism.state import Motion, as_floats
-from finger_pin.mechanism.tendon_paths import Excursions, TendonPaths
-from finger_pin.mechanism.tree import build_tree, tree_rows
-from finger_pin.mechanism.urdf import build_rigid_body
+from finger_pin.mechanism.tendon_paths import Excursions
+from finger_pin.mechanism.tree import build_body, tree_rows
 from finger_pin.mechanism.wiring import replaced
 from finger_pin.typing import Array
 
@@ -41,7 +40,7 @@ class Finger:
         springs: The springs of the joints.
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
-        paths: The tendons of a tree as functions of the posture; none without a tree.
+        paths: The tendons as functions of the posture.
         extra_rows: Tables of rows that were added, those of a tree first.
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
@@ -76,11 +75,7 @@ class Finger:
         """
         self.description = description = describe(description)
         self.constructor_args = ConstructorArgs(rigid_body, tuple(rows), objects, dict(tables or {}))
-        if description.tree is None:
-            self.rigid_body = rigid_body or build_rigid_body(description)
-            self.paths = TendonPaths(self.rigid_body, {}, {}, {})
-        else:
-            self.rigid_body, self.paths = build_tree(description)
+        self.rigid_body, self.paths = build_body(description, rigid_body)
         check_joints(self.rigid_body, description)
         parts = Parts.of(description)
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
@@ -108,7 +103,7 @@ class Finger:
             self.routing.actuated,
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
-        self.scene = Scene.around(mechanism, objects, description, self.paths.placed or None)
+        self.scene = Scene.around(mechanism, objects, description, self.paths.placed)
         self.mechanism = mechanism if self.scene is None else self.scene.joined(mechanism)
         layers = self.tendons, self.joint_friction, self.actuators
         self.layout = state_layout(*layers, last, self.scene, before, canals.tables, self.rigid_body.slides)
@@ -199,7 +194,7 @@ class Finger:
         """Names of the inputs u: the actuated tendons, of winches what is wound, then the actuators of a tree."""
         names = zip(self.routing.tendons, self.routing.winched, strict=False)
         inputs = (f"tendon_winding.{name}" if winched else name for name, winched in names)
-        return (*inputs, *self.description.tree_or_empty.actuators)
+        return (*inputs, *self.description.tree.actuators)
 
     def evaluate(
         self,

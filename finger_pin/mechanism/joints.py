@@ -78,8 +78,7 @@ class JointFriction:
     def from_description(cls, description: FingerDescription, loads: Array) -> JointFriction:
         """Read one number per joint; ``loads`` comes from the routing."""
         law, size = description.joint_friction, len(description.joints)
-        tree = description.tree
-        bearing = np.array([tree is None or tree.joints[name].bearing for name in description.joints])
+        bearing = np.array(description.bearings)
         numbers = bristles(law, size)
         numbers["viscous"] = bearing * numbers["viscous"]
         chosen = joint_law(law.law)

@@ -31,10 +31,11 @@ POSE, VELOCITY = 7, 6
 
 def _links(description: FingerDescription) -> dict[str, Link]:
     links: dict[str, Link] = {}
-    for name, joint in description.joints.items():
-        if joint.link is None:
+    for name in description.links:
+        link = description.joints[name].link
+        if link is None:
             raise InputError(f"finger.joints.{name}.link", "is needed for contacts, which take its size from there")
-        links[name] = joint.link
+        links[name] = link
     return links
 
 
@@ -86,12 +87,12 @@ class Scene:
         mechanism: Mechanism,
         objects: Mapping[str, Object] | None,
         description: FingerDescription,
-        placed: Mapping[str | None, Placed] | None,
+        placed: Mapping[str | None, Placed],
     ) -> Scene | None:
         """Return the scene of a finger with a tree's own objects and given ones; None if nothing can touch anything."""
-        hand, tree = description.hand, description.tree
-        if tree is not None and tree.objects:
-            objects = {**tree.objects, **(objects or {})}
+        hand = description.hand
+        if description.tree.objects:
+            objects = {**description.tree.objects, **(objects or {})}
         if objects is None and (description.touches_itself or (hand is not None and hand.fingers_touch)):
             objects = {}
         return None if objects is None else cls.of(objects, description, mechanism, placed)
@@ -102,7 +103,7 @@ class Scene:
         objects: Mapping[str, Object],
         description: FingerDescription,
         mechanism: Mechanism,
-        placed: Mapping[str | None, Placed] | None = None,
+        placed: Mapping[str | None, Placed],
     ) -> Scene:
         """Put objects around a finger.
 
@@ -110,7 +111,7 @@ class Scene:
             objects: By name.
             description: The finger.
             mechanism: The finger alone.
-            placed: Places of a tree's bodies; None for a finger that is made of links.
+            placed: Places of a tree's bodies.
 
         Raises:
             InputError: If an object has the name of a joint or a shape, or a link has no size.
@@ -133,14 +134,11 @@ class Scene:
         description: FingerDescription,
         extended: RigidBody,
         width: int,
-        placed: Mapping[str | None, Placed] | None,
+        placed: Mapping[str | None, Placed],
     ) -> Rows:
         """Return the contacts of links and objects."""
-        hand, tree = description.hand, description.tree
-        if tree is not None and placed is not None:
-            own = tree_solids(tree, placed, extended)
-        else:
-            own = finger_solids(_links(description), extended)
+        hand, links = description.hand, _links(description)
+        own = [*tree_solids(description.tree, placed, extended), *finger_solids(links, extended)]
         if hand is not None and hand.fingers_touch is False:
             own = [replace(each, group=hand.name) for each in own]
         for name in objects:

@@ -136,15 +136,15 @@ def tree_solids(tree: Tree, placed: Mapping[str | None, Placed], body: RigidBody
 
 def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
     """Return the names of links, or of shapes, of one finger that touch each other: no neighbours among links."""
-    if description.tree is not None:
-        return {frozenset(pair) for pair in description.tree.touching if description.touches_itself}
     hand = description.hand
     fingers = {"": description} if hand is None else {f"{key}.": each.finger for key, each in hand.fingers.items()}
-    found = set()
+    pairs: set[frozenset[str]] = set()
     for prefix, finger in fingers.items():
-        names = [prefix + name for name in finger.joints] if finger.touches_itself else []
-        found |= {frozenset((names[i], names[k])) for k in range(len(names)) for i in range(k - 1)}
-    return found
+        if finger.touches_itself:
+            names = [prefix + name for name in finger.links]
+            pairs |= {frozenset((names[i], names[k])) for k in range(len(names)) for i in range(k - 1)}
+            pairs |= {frozenset(pair) for pair in finger.tree.touching}
+    return pairs
 
 
 def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:

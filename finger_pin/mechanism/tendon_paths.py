@@ -1,4 +1,4 @@
-"""The tendons of a tree as functions of the posture: sums of joint positions, or paths through space."""
+"""Tendons as functions of the posture: sums of joint positions, or paths through space."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.caching import cached_property
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
-from finger_pin.description.tree import Tree
 from finger_pin.description.waypoints import Waypoint
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -67,32 +67,49 @@ class TendonPath:
 
 @dataclass(frozen=True, eq=False)
 class TendonPaths:
-    """All tendons of a tree; t tendons, n joints.
+    """All tendons of a finger; t tendons of its tree, n joints.
 
     Attributes:
         body: The rigid body.
-        routes: By name.
+        routes: Those of its tree, by name.
+        pulled: Those of the finger, by name: on joints, or along one of the tree's.
         placed: Places of the tree's bodies, by name.
         middles: Of the joints' ranges, by name, rad or m.
+        references: Positions of the tree's joints at which its bodies are where their placements say, shape (n,).
     """
 
     body: RigidBody
     routes: Mapping[str, TendonPath]
+    pulled: Mapping[str, TendonPath]
     placed: Mapping[str | None, Placed]
     middles: Mapping[str, float]
+    references: Array
 
     @classmethod
     def of(
-        cls, tree: Tree, body: RigidBody, placed: Mapping[str | None, Placed], middles: Mapping[str, float]
+        cls, description: FingerDescription, body: RigidBody, placed: Mapping[str | None, Placed] | None = None
     ) -> TendonPaths:
-        """Read the tendons of a tree whose bodies are placed, and whose joints' ranges have some middles."""
-        routes, joints = {}, list(tree.joints)
+        """Read the tendons of a finger on a rigid body, on which the bodies of its tree have their places."""
+        tree, joints = description.tree, list(description.joints)
+        routes = {}
         for name, tendon in tree.tendons.items():
             coefficients = np.zeros(len(joints))
             for joint, coefficient in (tendon.joints or {}).items():
                 coefficients[joints.index(joint)] = coefficient
-            routes[name] = _route(coefficients, tendon.path or {}, placed)
-        return cls(body, routes, placed, middles)
+            routes[name] = _route(coefficients, tendon.path or {}, placed or {})
+        crossing = zip(description.tendons.items(), Routing.from_description(description).coupling, strict=True)
+        pulled = {
+            name: TendonPath(-arms, ()) if tendon.along is None else routes[tendon.along]
+            for (name, tendon), arms in crossing
+        }
+        middles = {name: 0.5 * sum(joint.range) for name, joint in description.joints.items()}
+        references = np.array([joint.reference for joint in tree.joints.values()])
+        return cls(body, routes, pulled, placed or {}, middles, references)
+
+    @cached_property
+    def reference_lengths(self) -> dict[str | None, float]:
+        """Lengths of the tree's tendons with the joints at their references, m; what is drawn in counts from there."""
+        return dict(zip(self.routes, self.length(self.references).tolist(), strict=True))
 
     @property
     def fixed(self) -> Array:
@@ -169,36 +186,33 @@ class Excursions:
     """Excursions of all t tendons, zero in the joints' reference posture."""
 
     def __init__(self, routing: Routing, description: FingerDescription, paths: TendonPaths) -> None:
-        """Find the tendons that go along paths.
+        """Find the tendons that go through space.
 
         Args:
             routing: H_c.
             description: Of the finger.
-            paths: The paths of its tree.
+            paths: Its tendons.
         """
-        self._coupling = routing.coupling
-        self._rest = np.array([joint.reference for joint in description.tree_or_empty.joints.values()])
-        tendons = enumerate(description.tendons.values())
-        along = {k: tendon.along for k, tendon in tendons if tendon.along is not None}
-        names = list(dict.fromkeys(along.values()))
-        # Of every tendon that goes along a path, which one.
-        self._along = {k: names.index(name) for k, name in along.items()}
-        self._paths = replace(paths, routes={name: paths.routes[name] for name in names})
+        self._coupling, self._whole = routing.coupling, paths
+        self._along = [tendon.along for tendon in description.tendons.values()]
+        self._through_space = np.flatnonzero(routing.through_space)
+        routes = {routing.tendons[k]: paths.pulled[routing.tendons[k]] for k in self._through_space}
+        self._paths = replace(paths, routes=routes)
 
     def lengths(self, position: Array) -> Array:
         """Return the excursions of the tendons at theta, shape (..., n): shape (..., t), m."""
         drawn = np.asarray(position @ self._coupling.T)
-        if self._along:
-            lengths = self._paths.length(self._rest) - self._paths.length(position)
-            for k, path in self._along.items():
-                drawn[..., k] = lengths[..., path]
+        if self._whole.routes:
+            if self._through_space.size:
+                drawn[..., self._through_space] = -self._paths.length(position)
+            drawn += [self._whole.reference_lengths.get(name, 0.0) for name in self._along]
         return drawn
 
     def slopes(self, position: Array) -> Array:
         """Return their derivatives by theta, shape (..., n): shape (..., t, n), m."""
         coupling = np.broadcast_to(self._coupling, (*position.shape[:-1], *self._coupling.shape)).copy()
-        if self._along:
-            coupling[..., [*self._along], :] = -self._paths.arms(position)[..., [*self._along.values()], :]
+        if self._through_space.size:
+            coupling[..., self._through_space, :] = -self._paths.arms(position)
         return coupling
 
     def torque(self, x: Array, tendons: RowSignals) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from finger_pin.description.cords import CordPart
 from finger_pin.description.finger import FingerDescription
 
 
@@ -12,7 +13,7 @@ class Wrap(NamedTuple):
 
     Attributes:
         name: Of its first joint; along a path its number, from 1.
-        first: Index of its first crossing or leg.
+        first: Index of its first leg along a path.
         last: Index after its last one.
         offset: Curvature that its joints and its path do not show, rad.
         crossed: The joints that the tendon crosses from here on.
@@ -27,43 +28,6 @@ class Wrap(NamedTuple):
     share: float
 
 
-class _Stretch(NamedTuple):
-    """A crossing or a leg.
-
-    Attributes:
-        name: Of its joint, or its number.
-        bends: Whether the tendon bends there.
-        moves: Whether it changes the tendon's length.
-        offset: Curvature of its own, rad.
-        crossed: The joints that it crosses.
-    """
-
-    name: str
-    bends: bool
-    moves: bool
-    offset: float
-    crossed: frozenset[str]
-
-
-def _stretches(description: FingerDescription, tendon: str, branch: int) -> tuple[list[_Stretch], float]:
-    """Return the stretches of a tendon, or of a branch of it, and the curvature that is not of any one of them."""
-    own, tree = description.tendons.get(tendon), description.tree_or_empty
-    if own is not None and own.along is None:
-        found = [
-            _Stretch(name, each.bends > 0.0 or offset > 0.0, bool(each.radius), offset, frozenset({name}))
-            for name, each in own.crossings.items()
-            for offset in [each.curvature_offset]
-        ]
-        return found, own.curvature_offset
-    route = tree.tendons[str(own.along) if own else tendon]
-    offset = 0.0 if branch else route.curvature_offset + (own.curvature_offset if own else 0.0)
-    if route.path is None:
-        around = route.wound.items()
-        return [_Stretch(name, bool(r), bool(r), 0.0, frozenset({name})) for name, r in around], offset
-    legs = enumerate(tree.legs(str(own.along) if own else tendon)[branch], start=1)
-    return [_Stretch(str(k), k > 1 or wraps, bool(crossed), 0.0, crossed) for k, (wraps, crossed) in legs], offset
-
-
 def find_wraps(description: FingerDescription, tendon: str, branch: int = 0) -> tuple[Wrap, ...]:
     """Return the places where a tendon of a finger, or else one of its tree, rubs.
 
@@ -75,26 +39,28 @@ def find_wraps(description: FingerDescription, tendon: str, branch: int = 0) -> 
         tendon: Name of one of its tendons, or of a tendon of its tree.
         branch: Behind which of its pulleys, from 1; before the first one by default.
     """
-    stretches, offset = _stretches(description, tendon, branch)
-    own, starts, end = description.tendons.get(tendon), [0], len(stretches)
-    if description.tendon_friction.place == "bends" and (own is None or own.kind == "actuated"):
-        # What is beyond the last stretch that changes its length never slides.
-        end = max((k + 1 for k, each in enumerate(stretches) if each.moves), default=end)
-        for k, each in enumerate(stretches[:end]):
-            if each.bends and any(before.moves for before in stretches[starts[-1] : k]):
+    cord = description.cord(tendon)
+    described, part = description.tendons.get(tendon), cord.parts[branch]
+    elements, starts = part.elements, [0]
+    if description.tendon_friction.place == "bends" and (described is None or described.kind == "actuated"):
+        elements = part.sliding()
+        for k, element in enumerate(elements):
+            if element.bends and any(before.moves for before in elements[starts[-1] : k]):
                 starts.append(k)
-    places = list(zip(starts, [*starts[1:], end], strict=True))
-    bent = [any(each.bends for each in stretches[first:last]) for first, last in places]
+    places = list(zip(starts, [*starts[1:], len(elements)], strict=True))
+    bent = [any(element.bends for element in elements[first:last]) for first, last in places]
     bent = bent if any(bent) else [True, *bent[1:]]
+    offset = 0.0 if branch else cord.curvature_offset
+    arms = sum(element.radius is not None for element in part.elements)
     return tuple(
         Wrap(
-            next((each.name for each in stretches[first:last] if each.bends), stretches[first].name)
-            if stretches
+            next((element.name for element in elements[first:last] if element.bends), elements[first].name)
+            if elements
             else "",
-            first,
-            last,
-            sum(each.offset for each in stretches[first:last]) + offset * bends / sum(bent),
-            frozenset().union(*(each.crossed for each in stretches[first:])),
+            max(first - arms, 0),
+            max(last - arms, 0),
+            sum(element.curvature_offset for element in elements[first:last]) + offset * bends / sum(bent),
+            CordPart(1.0, part.elements[first:]).crossed,
             1.0 / len(places),
         )
         for (first, last), bends in zip(places, bent, strict=True)

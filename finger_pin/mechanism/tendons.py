@@ -89,7 +89,7 @@ class Tendons:
         law, passive = description.tendon_friction, description.passive_tendon
         size, among = len(routing.tendons), len(routing.tendons) + len(description.canals)
         friction = {"surface": expand(law.coulomb, among), "stiction_ratio": expand(law.stiction_ratio, among)}
-        losses = [description.tree_or_empty.tendons[name].friction for name in description.canals]
+        losses = [description.tree.tendons[name].friction for name in description.canals]
         friction |= bristles(law, among, np.array([0.0] * size + losses)) | {"drag": expand(law.drag, among)}
         wraps = [find_wraps(description, name) for name in (*routing.tendons, *description.canals)]
         return cls(
@@ -99,8 +99,8 @@ class Tendons:
             wraps=tuple(wraps),
             several={
                 k: _places(routing, k, wraps[k])
-                for k, tendon in enumerate(description.tendons.values())
-                if len(wraps[k]) > 1 and tendon.along is None
+                for k, through_space in enumerate(routing.through_space)
+                if len(wraps[k]) > 1 and not through_space
             },
             half_stiffness=2.0 * expand(passive.stiffness, routing.passive),
             hysteresis=expand(passive.hysteresis, routing.passive),

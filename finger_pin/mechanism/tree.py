@@ -29,6 +29,7 @@ from finger_pin.mechanism.spans import ANGLE, RISE
 from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, rotation
 from finger_pin.mechanism.tendon_wraps import find_wraps
 from finger_pin.mechanism.tendons import SOURCES
+from finger_pin.mechanism.urdf import build_rigid_body
 from finger_pin.typing import Array
 
 #: The tables of actuators without and with a state.
@@ -63,14 +64,27 @@ _EXCHANGED = {
 }
 
 
-def build_tree(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
-    """Return the rigid body of a tree, with the description's gravity, and its tendons.
+def build_body(description: FingerDescription, body: RigidBody | None = None) -> tuple[RigidBody, TendonPaths]:
+    """Return the rigid body that a finger's links or bodies make, with its gravity, and the tendons on it.
+
+    Args:
+        description: Of the finger.
+        body: In place of the body that its links would make.
 
     Raises:
-        InputError: If a joint moves nothing that has inertia.
+        InputError: If a joint moves nothing that has inertia, or a body is given beside those of a tree.
     """
+    if not description.tree.bodies:
+        body = body or build_rigid_body(description)
+        return body, TendonPaths.of(description, body)
+    if body is not None:
+        raise InputError("rigid_body", "has no place beside a tree, whose bodies are its own")
+    body, placed = _body_of_tree(description)
+    return body, TendonPaths.of(description, body, placed)
+
+
+def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[str | None, Placed]]:
     tree = description.tree
-    assert tree is not None
     model = pin.Model()
     model.name = description.name
     model.gravity.linear[:] = description.gravity
@@ -101,42 +115,29 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
     for name, moment in zip(tree.joints, np.diag(data.M), strict=True):
         if not moment > 0.0:
             raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
-    rigid_body = RigidBody(model, _TIP)
-    middles = {name: 0.5 * sum(each.range) for name, each in description.joints.items()}
-    return rigid_body, TendonPaths.of(tree, rigid_body, placed, middles)
+    return RigidBody(model, _TIP), placed
 
 
-def along_paths(description: FingerDescription, routes: TendonPaths, table: Rows) -> Rows:
+def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows) -> Rows:
     """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter.
 
     The curvature of driven ones is that of the first place where they rub.
     """
-    if table.group != "driven_tendons" and not table.pulls:
+    if (table.group != "driven_tendons" and not table.pulls) or not paths.routes:
         return table
-    arm, offset, paths = table.arm.copy(), table.offset.copy(), list(table.paths)
-    names, joints = table.pulls or table.names, len(description.joints)
-    if all(description.tendons[name].along is None for name in names):
-        return table
-    lengths = _reference_lengths(description.tree_or_empty, routes)
-    for k, name in enumerate(names):
-        along = description.tendons[name].along
-        if along is not None:
-            route, first = routes.routes[along].times(-1.0), find_wraps(description, name)[0]
-            route = route.beyond(first, route.coefficients)
-            arm[k, :joints], paths[k] = route.coefficients, route.legs
-            offset[k] += lengths[along]
-    return replace(table, arm=arm, measure=arm, offset=offset, paths=tuple(paths))
-
-
-def _reference_lengths(tree: Tree, routes: TendonPaths) -> dict[str, float]:
-    """Return the lengths of all tendons with the joints at their references, m."""
-    rest = np.array([joint.reference for joint in tree.joints.values()])
-    return dict(zip(routes.routes, routes.length(rest).tolist(), strict=True))
+    arm, offset, legs, joints = table.arm.copy(), table.offset.copy(), [], len(description.joints)
+    for k, name in enumerate(table.pulls or table.names):
+        drawn = paths.pulled[name].times(-1.0)
+        drawn = drawn.beyond(find_wraps(description, name)[0], drawn.coefficients)
+        arm[k, :joints] = drawn.coefficients
+        legs.append(drawn.legs)
+        offset[k] += paths.reference_lengths.get(description.tendons[name].along, 0.0)
+    return replace(table, arm=arm, measure=arm, offset=offset, paths=tuple(legs))
 
 
 def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -> list[Rows]:
     """Return the rows of a tree but for friction of loaded tendons, as wide as there are coordinates."""
-    tree = description.tree_or_empty
+    tree = description.tree
     joints = {name: TendonPath(row, ()) for name, row in zip(tree.joints, np.eye(len(tree.joints)), strict=True)}
 
     def table(
@@ -159,9 +160,8 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
             tables.append(table(group, law, along, numbers))
     cords = {name: each for name, each in tree.tendons.items() if each.slack is not None}
     if cords:
-        lengths = _reference_lengths(tree, routes)
         along = {name: routes.routes[name].times(-1.0) for name in cords}
-        offset = np.array([lengths[name] + (each.slack or 0.0) for name, each in cords.items()])
+        offset = np.array([routes.reference_lengths[name] + (each.slack or 0.0) for name, each in cords.items()])
         numbers = [(each.stiffness, each.damping) for each in cords.values()]
         tables.append(table(ELASTIC, ELASTIC_TENDON, along, numbers, offset=offset, unit="m"))
     first = len(description.actuated_names)
@@ -247,7 +247,7 @@ def _loops(tree: Tree, routes: TendonPaths) -> _Described:
 
 def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
     """Return the forces that hold up a part of bodies' weight."""
-    tree, gravity = description.tree_or_empty, np.array(description.gravity)
+    tree, gravity = description.tree, np.array(description.gravity)
     size = float(np.linalg.norm(gravity))
     held = {
         name: each

@@ -80,7 +80,7 @@ def exported(described: DescriptionLike | Scenario) -> FingerDescription:
         InputError: If it is none of them, or has a tree of bodies.
     """
     described = describe(described.finger if isinstance(described, Scenario) else described)
-    if described.tree is not None:
+    if described.tree.bodies:
         allowed = "is not written: bodies in place of links; a model read from MuJoCo has its own MJCF"
         raise InputError("finger.tree", allowed, described.name)
     return described

@@ -33,8 +33,7 @@ def summarize(result: xr.Dataset) -> str:
     """
     require_samples(result)
     head = [*_head(result), *_own(result), *_warnings(result)]
-    tree = read_scene(result.attrs).finger.tree
-    tracks = tree is None and is_tracking(result)
+    tracks = read_scene(result.attrs).finger.links and is_tracking(result)
     motion = [_tracking(result)] if tracks else [*_joints(result), *_actuators(result)]
     pulled = [_tension(result)] if result.sizes["tendon"] else []
     blocks = [

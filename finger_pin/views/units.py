@@ -50,7 +50,6 @@ def actuators_by_unit(result: xr.Dataset, group: str) -> dict[str, list[str]]:
         group: The table of the actuators, such as ``actuator``.
     """
     tree, slides = read_scene(result.attrs).finger.tree, _slides(result)
-    assert tree is not None
 
     def units() -> Iterator[tuple[str, str]]:
         for name in map(str, result[group].values):
@@ -61,8 +60,8 @@ def actuators_by_unit(result: xr.Dataset, group: str) -> dict[str, list[str]]:
 
 
 def _slides(result: xr.Dataset) -> set[str]:
-    tree = read_scene(result.attrs).finger.tree
-    return set() if tree is None else {name for name, joint in tree.joints.items() if joint.kind == "slide"}
+    joints = read_scene(result.attrs).finger.tree.joints
+    return {name for name, joint in joints.items() if joint.kind == "slide"}
 
 
 def _grouped(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:

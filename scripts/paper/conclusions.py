@@ -44,8 +44,8 @@ def conclusions(
 ) -> None:
     """Put the paper's three conclusions to the test: figures, and a table of claims, measurements and verdicts."""
     shown = talks(quiet)
-    from finger_pin.description.finger import one_finger
     from finger_pin.description.loading import load_scenario
+    from finger_pin.mechanism.coerce import one_finger
     from finger_pin.views.plots import save_figure
     from paper.findings import findings_table, write_findings
 

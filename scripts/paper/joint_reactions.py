@@ -14,9 +14,9 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.finger import one_finger
 from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import one_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 from paper.pin_wrench import pin_wrench

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure, SubFigure
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
-from finger_pin.description.finger import one_finger
-from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger
 from finger_pin.typing import Array
 from finger_pin.views.plots.axes_3d import AXES, space
 from finger_pin.views.plots.panels import sheet, title

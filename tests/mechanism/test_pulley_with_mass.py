@@ -172,5 +172,6 @@ def test_a_block_without_mass_is_a_pulley_that_divides_the_tension():
 
 def test_a_cord_loads_the_joints_that_its_coefficients_and_each_of_its_strands_cross():
     tree = turning(1e-3).description.tree
-    assert tree.crossed("cord") == [(1.0, {"block"}), (1.0, {"a"}), (1.0, {"b"})]
+    parts = tree.cord("cord").parts
+    assert [(part.divisor, part.crossed) for part in parts] == [(1.0, {"block"}), (1.0, {"a"}), (1.0, {"b"})]
     assert tree.rubbing == ("cord",)

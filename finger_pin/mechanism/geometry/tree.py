@@ -20,7 +20,7 @@ from finger_pin.mechanism.path_elements import PathElement, PathTerm
 from finger_pin.mechanism.shapes import MATERIALS
 from finger_pin.mechanism.spans import CYLINDER, STRAIGHT
 from finger_pin.mechanism.tendon_paths import rotation
-from finger_pin.mechanism.tree import build_tree
+from finger_pin.mechanism.tree import build_body
 from finger_pin.typing import Array
 
 # Points of a stretch that may wrap.
@@ -48,9 +48,8 @@ class TreeGeometry:
 
     def __init__(self, description: FingerDescription) -> None:
         """Place the solids of a description with a tree."""
-        assert description.tree is not None
         self.description = description
-        body, routes = build_tree(description)
+        body, routes = build_body(description)
         self.model = body.model
         frames = [self.model.frames[tip] for tip in body.tips]
         self.tips = tuple((int(tip.parentJoint), np.array(tip.placement.translation)) for tip in frames)

@@ -31,7 +31,7 @@ FIGURES_OF_TREES = {"motion": plot_hand_motion, "energy": plot_energy}
 def figures_of(result: xr.Dataset) -> dict[str, Callable[..., Figure]]:
     """Return the figures that are drawn of a result, by name."""
     figures: dict[str, Callable[..., Figure]] = dict(
-        FIGURES if read_scene(result.attrs).finger.tree is None else FIGURES_OF_TREES
+        FIGURES if read_scene(result.attrs).finger.links else FIGURES_OF_TREES
     )
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence

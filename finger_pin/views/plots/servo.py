@@ -74,19 +74,15 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
 
 def _turned(finger: FingerDescription, tendons: Iterable[str]) -> set[str]:
     """Return the joints that tendons turn."""
-    found: set[str] = set()
-    for tendon in (finger.tendons[name] for name in tendons):
-        if tendon.along is not None:
-            found |= frozenset().union(*(joints for _, joints in finger.tree_or_empty.crossed(tendon.along)))
-        found |= {joint for joint, crossing in tendon.crossings.items() if crossing.radius != 0.0}
-    return found
+    parts = [part for name in tendons for part in finger.cord(name).parts]
+    return {joint for part in parts for element in part.elements if element.moves for joint in element.crossed}
 
 
 def _loop(axes: Axes, result: xr.Dataset, motor: str, finger: FingerDescription, turned: set[str]) -> None:
     spool = np.rad2deg(result["motor_position"].sel(motor=motor).values)
     for index, joint in enumerate(names(result, "joint")):
         if joint in turned:
-            of_tree = finger.tree_or_empty.joints.get(joint)
+            of_tree = finger.tree.joints.get(joint)
             slides = of_tree is not None and of_tree.kind == "slide"
             position = result["joint_position"].sel(joint=joint).values
             shown = 1e3 * position if slides else np.rad2deg(position)

@@ -72,7 +72,7 @@ def shown(finger: FingerLike) -> TendonGeometry | TreeGeometry:
     """
     own = finger if isinstance(finger, Finger) else None
     description = description_of(finger)
-    if description.tree is not None:
+    if not description.links:
         return TreeGeometry(description)
     visuals = None if own is None else own.visuals
     body = None if own is None or visuals is None else own.rigid_body
@@ -241,10 +241,11 @@ class Scene:
         Args:
             name: Of a path; that of a further branch has a dot and a number after the tendon's.
         """
-        if self.geometry.description.tree is not None:
-            name = name.split(".")[0]
-        labels = (name, f"{name} proximal", f"{name} distal")
-        return [index for index, label in enumerate(self.strands) if label in labels] or [len(self.strands)]
+        for tendon in (name, name.rpartition(".")[0]):
+            labels = (tendon, f"{tendon} proximal", f"{tendon} distal")
+            if strands := [index for index, label in enumerate(self.strands) if label in labels]:
+                return strands
+        return [len(self.strands)]
 
     def view(self) -> Array:
         """Return the rotation from the base frame to the frame in which the finger is looked at, shape (3, 3)."""
