@@ -8,26 +8,26 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 from scipy.stats import norm
 
 from finger_pin.identification.problem import Problem, minus_twice_likelihood, pooled
 from finger_pin.typing import Array
 
-# Rounds of steps and weights in turn; steps in each, and how many of them in a row may fail.
+# Rounds of weights, steps in a round, and trials in a row that may fail.
 _ROUNDS, _STEPS, _FAILS = 5, 40, 3
-# Where steps end, by how much minus twice the likelihood may still fall: of motions, whose own errors it feels, where
-# only means count, where it is felt, where it is hardly felt; and of closed forms.
-_ROUGHLY, _NEARLY, _GAIN, _EXACT = 1.0, 0.05, 1e-3, 1e-9
-# The longest step, of the range of a parameter.
-_FARTHEST = 0.3
-# Damping at first and at the least, of the information; how it falls and rises (Levenberg, Marquardt).
-_DAMPING, _LESS, _MORE = 1e-3, 0.2, 30.0
-# What a motion's own errors may hide of what a step gains: mostly, at the most, and of every sample where it is far
-# from what was recorded.
-_FEIGNED, _MOST_FEIGNED, _BY_SAMPLE = 0.05, 1.0, 1e-3
-# Parts of what a step promises: from what gain on it is taken; up to what error of it its slopes serve again, or bent
-# ones from what gain on.
-_TAKEN, _SERVED = 0.05, 0.3
+# Gain of minus twice the log-likelihood that is not worth a step. A gain g leaves parameters within sqrt(g) of their
+# standard deviation: one for means of motions, 0.2 for motions, 0.03 for those computed finely, none for closed forms.
+_GAIN_ROUGH, _GAIN, _GAIN_FINE, _GAIN_CLOSED = 1.0, 0.05, 1e-3, 1e-9
+# Difference of minus twice the log-likelihood that errors of runs hide: half the 0.1 by which fine ones make it jump.
+_JUMP = 0.05
+# Largest step, and the least that limits of parameters on each other cut it to, part of a parameter's range.
+_RADIUS, _LEAST_RADIUS = 0.3, 1e-6
+# Ratio of gained to promised from which on slopes are kept; below it the radius is that part of the step (Nocedal and
+# Wright, Numerical Optimization, algorithm 4.1).
+_RATIO = 0.25
+# Gain per sample that errors of slopes promise: slopes that searches ask for err by 0.01 to 0.03, and this is squared.
+_FEIGNED = 1e-3
 # Median size of what is normally distributed with a deviation of one.
 _MEDIAN = float(norm.ppf(0.75))
 #: What a squared residual u counts for where outliers are to count less, and how fast that grows.
@@ -123,49 +123,55 @@ def _descend(
 ) -> tuple[Array, Sequence[Array], Sequence[Array], bool]:
     """Return the place of the greatest likelihood, its residuals, the slopes of the last step, and success.
 
-    Steps are those of Gauss and Newton, damped. A run costs less than its slopes: these are made anew only where a
-    step does not gain what they promise. Of motions they are bent to agree with it while far from the end: over whole
-    steps the little leaps of a motion count less than in slopes at one place.
+    Steps are those of Gauss and Newton in a box of trust. A run costs less than its slopes: these are made anew only
+    where a step does not gain what they promise. Of motions they are bent to agree with it while far from the end: over
+    whole steps the little leaps of a motion count less than in slopes at one place.
     """
-    fresh, damping, failed = slopes is None, _DAMPING, 0
+    fresh, radius, failed = slopes is None, _RADIUS, 0
     slopes = problem.slopes(z) if slopes is None else list(slopes)
-    moves = problem.moves
-    gain = _GAIN if problem.finely else _ROUGHLY if problem.means else _NEARLY
-    enough, feigned = (gain, _FEIGNED) if moves else (_EXACT, 0.0)
+    gain, bending = _least_gain(problem), problem.moves and not problem.finely
+    jump = max(gain, _JUMP) if problem.moves else gain
     count = float(sum(w * len(e) for w, e in zip(shares, residuals, strict=True)))
-    hidden = _MOST_FEIGNED if problem.finely else max(_MOST_FEIGNED, _BY_SAMPLE * count)
-    bending = moves and not problem.finely
+    feigned = max(_GAIN_ROUGH, 0.0 if problem.finely else _FEIGNED * count)
     for _ in range(_STEPS):
         noise = _noise(problem, residuals, robust=loss != "linear") if scale is None else scale
-        met, inner, pull = _normal(problem, residuals, slopes, shares, noise, loss)
-        move, promised = _step(problem, z, free, inner, pull, damping)
-        if promised < 0.0:
-            # The bounds have cut it wrongly.
-            damping *= _MORE
+        met, system = _normal(problem, residuals, slopes, shares, noise, loss)
+        move, promised = _step(problem, z, free, system, radius)
+        if promised < 0.0 and radius > _LEAST_RADIUS:
+            # Limits that parameters set each other have cut it wrongly.
+            radius *= _RATIO
             continue
-        if promised < enough:
+        if promised < gain:
             return z, residuals, slopes, True
         there = problem.residuals(z + move)
         both = met, _counted(there, noise, loss)[0]
         sums = [_objective(problem, each, shares, noise, loss) for each in both]
         gained = sums[0] - sums[1]
-        taken, served = gained > _TAKEN * promised, abs(gained - promised) < _SERVED * promised + feigned
-        if bending:
-            served = gained > _SERVED * promised - feigned
-        if taken:
+        away = promised - gained if bending else abs(promised - gained)
+        ratio, served = gained / promised, away < (1.0 - _RATIO if bending else _RATIO) * promised + jump
+        if ratio > 0.0:
             before = residuals
-            z, residuals, failed, damping = z + move, there, 0, max(damping * _LESS, _DAMPING)
+            z, residuals, failed = z + move, there, 0
+            radius = min(2.0 * radius, _RADIUS) if ratio > _RATIO else radius
         elif fresh:
-            failed, damping = failed + 1, damping * _MORE
-        if failed > (_FAILS if promised > hidden else 0):
-            return z, residuals, slopes, promised <= hidden
-        if not taken and promised < feigned:
+            failed += 1
+            radius = _RATIO * float(np.max(np.abs(move) / np.subtract(*reversed(problem.box))))
+        if ratio <= 0.0 and promised < jump:
             return z, residuals, slopes, True
-        if not served and (taken or not fresh):
+        if failed > (_FAILS if promised > feigned else 0):
+            return z, residuals, slopes, promised <= feigned
+        if not served and (ratio > 0.0 or not fresh):
             slopes, fresh = problem.slopes(z), True
-        elif taken:
+        elif ratio > 0.0:
             slopes, fresh = _bent(problem, slopes, move, before, there) if bending else slopes, False
     return z, residuals, slopes, False
+
+
+def _least_gain(problem: Problem) -> float:
+    """Return the gain of minus twice the log-likelihood that is not worth a step."""
+    if not problem.moves:
+        return _GAIN_CLOSED
+    return _GAIN_FINE if problem.finely else _GAIN_ROUGH if problem.means else _GAIN
 
 
 def _bent(
@@ -180,14 +186,13 @@ def _bent(
 
 def _normal(
     problem: Problem, residuals: Sequence[Array], slopes: Sequence[Array], shares: Array, scale: Array, loss: str
-) -> tuple[Sequence[Array], Array, Array]:
-    """Return the weighed residuals, and half of the curvature and slope of minus twice the likelihood there."""
+) -> tuple[Sequence[Array], Array]:
+    """Return the weighed residuals, and slopes beside residuals, triangular: shape (q, p + 1), q at most p + 1."""
     met, growth = _counted(residuals, scale, loss)
-    factors = shares / (_noise(problem, met) if loss == "linear" else scale) ** 2
-    grown = [each[:, None] * j for each, j in zip(growth, slopes, strict=True)]
-    inner = sum(f * j.T @ j for f, j in zip(factors, grown, strict=True))
-    pull = sum(f * j.T @ e for f, j, e in zip(factors, grown, met, strict=True))
-    return met, np.asarray(inner), np.asarray(pull)
+    factors = np.sqrt(shares) / (_noise(problem, met) if loss == "linear" else scale)
+    rows = zip(factors, growth, slopes, met, strict=True)
+    whole = np.concatenate([f * np.column_stack([g[:, None] * j, e]) for f, g, j, e in rows])
+    return met, np.asarray(np.linalg.qr(whole, mode="r"))
 
 
 def _objective(problem: Problem, counted: Sequence[Array], shares: Array, scale: Array, loss: str) -> float:
@@ -201,28 +206,18 @@ def _objective(problem: Problem, counted: Sequence[Array], shares: Array, scale:
     return float(sum(w * (e @ e / s**2 + 2.0 * len(e) * math.log(s)) for e, w, s in by_signal))
 
 
-def _step(
-    problem: Problem, z: Array, free: NDArray[np.bool_], inner: Array, pull: Array, damping: float
-) -> tuple[Array, float]:
+def _step(problem: Problem, z: Array, free: NDArray[np.bool_], system: Array, radius: float) -> tuple[Array, float]:
     """Return a step within the bounds, and the fall of minus twice the likelihood with it to second order."""
     low, high = problem.box
     width = high - low
-    size = np.diag(inner) * width**2
-    damped = inner + np.diag(damping * np.maximum(size, 1e-12 * np.max(size)) / width**2)
-    move = np.zeros(len(z))
-    loose = free & ~((z <= low) & (pull > 0.0)) & ~((z >= high) & (pull < 0.0))
-    while loose.any():
-        rest = pull[loose] + inner[np.ix_(loose, ~loose)] @ move[~loose]
-        scaled = damped[np.ix_(loose, loose)] * np.outer(width[loose], width[loose])
-        move[loose] = -width[loose] * (np.linalg.pinv(scaled, rcond=1e-14, hermitian=True) @ (width[loose] * rest))
-        beyond = loose & ((z + move < low) | (z + move > high))
-        move = np.clip(z + move, low, high) - z if beyond.any() else move
-        if not beyond.any():
-            break
-        loose &= ~beyond
-    move *= min(1.0, _FARTHEST / max(float(np.max(np.abs(move) / width, initial=0.0)), 1e-300))
-    move = problem.feasible(z + move, free) - z
-    return move, -float(2.0 * pull @ move + move @ inner @ move)
+    # Strictly apart, as `lsq_linear` asks: at a bound by what is lost when the step is added.
+    least = np.minimum(np.maximum((low - z) / width, -radius), -1e-12)
+    most = np.maximum(np.minimum((high - z) / width, radius), 1e-12)
+    slopes, residuals, move = system[:, :-1] * width, system[:, -1], np.zeros(len(z))
+    move[free] = lsq_linear(slopes[:, free], -residuals, (least[free], most[free]), method="bvls", tol=1e-12).x
+    move = problem.feasible(np.clip(z + width * move, low, high), free) - z
+    left = system[:, :-1] @ move + residuals
+    return move, float(residuals @ residuals - left @ left)
 
 
 def _counted(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[Array], list[Array]]:

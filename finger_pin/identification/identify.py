@@ -54,7 +54,7 @@ def identify(
 
     Every signal has a noise of its own, estimated with the parameters. Neighbouring residuals of a motion are
     correlated: n of them count as n (1 - rho) / (1 + rho) (Bartlett). Parameters whose least value is positive are
-    searched for as logarithms, from the scenario's own numbers and from the best of a Latin hypercube.
+    searched for as logarithms, from the scenario's own numbers and from the best of Sobol points.
 
     Args:
         bench: Name of a bench or scenario that ships, or path of a TOML file; its table ``[identify]`` says the rest.

@@ -15,16 +15,18 @@ from finger_pin.identification.estimate import Fit, fit, information
 from finger_pin.identification.problem import Problem
 from finger_pin.typing import Array
 
-#: 95 % of the chi-squared distribution with one degree of freedom.
+#: Rise of minus twice the log-likelihood at the ends of an interval: 95 % of chi-squared with one degree of freedom.
 LEVEL = 3.841
-# Where the search for an end stops: so near to the level that the root of the rise is straight, or after so many fits.
-_NEAR, _MOST = 0.06, 8
-# How far below the minimum another one must be to count as one: more than a motion's own errors feign.
-_BELOW = 0.2
-# A direction is free where its standard deviation is this part of the range that was given, or more.
-_FREE = 0.25
-# Entries of a direction that are not worth a word, of the largest.
-_SMALL = 0.15
+# Relative error of the rise at an end: half of it is that of the half width, as its root is straight there.
+# And the number of refits after which a search for an end gives up.
+_LEVEL_ERROR, _REFITS = 0.06, 8
+# Fall of minus twice the log-likelihood from which on a refit is another minimum: twice the 0.1 by which errors of fine
+# runs make it jump.
+_DEEPER = 0.2
+# Standard deviation, part of the range, from which on a direction is free: an interval of 95 % is as wide as the range.
+_FREE_DEVIATION = 0.25
+# Entries of a direction that are left out of its words, part of the largest.
+_SMALL_ENTRY = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +130,7 @@ def profile(
     slopes: Sequence[Array] = problem.slopes(found.z)
     # The farthest place within the interval: refits start there, not from one beyond that may have failed.
     within, end = found, math.inf * way
-    for _ in range(_MOST if room > 1e-9 * (high[k] - low[k]) else 0):
+    for _ in range(_REFITS if room > 1e-9 * (high[k] - low[k]) else 0):
         at = found.z[k] + way * reach
         guess = np.clip(within.z + tilt * (at - within.z[k]), low, high)
         refit = partial(fit, problem, held={k: at}, weights=found.weights, scale=found.noise, loss=loss)
@@ -137,7 +139,7 @@ def profile(
             there = refit(there.z)
         rise = (there.objective - found.objective) / inflation
         path.append((at, rise))
-        if rise * inflation < -_BELOW:
+        if rise * inflation < -_DEEPER:
             return ProfileBound(end, np.array(path), there)
         if rise >= LEVEL:
             # A refit that has not come to its end tells that the end is before it, not how near.
@@ -146,7 +148,7 @@ def profile(
             inner, within, slopes = (reach, math.sqrt(max(rise, 0.0))), there, there.slopes or slopes
             if reach >= room * (1.0 - 1e-12):
                 break
-        crossing, near = _crossing(inner, outer), there.converged and abs(rise - LEVEL) < _NEAR * LEVEL
+        crossing, near = _crossing(inner, outer), there.converged and abs(rise - LEVEL) < _LEVEL_ERROR * LEVEL
         if near or math.isfinite(outer[0]):
             end = found.z[k] + way * min(crossing, room)
         if near:
@@ -173,10 +175,10 @@ def free_directions(problem: Problem, found: Fit) -> list[tuple[str, list[int]]]
     values, vectors = np.linalg.eigh(information(problem, found) * np.outer(width, width))
     found_free = []
     for value, vector in zip(values, vectors.T, strict=True):
-        if 1.0 / math.sqrt(max(value, 1e-300)) >= _FREE:
+        if 1.0 / math.sqrt(max(value, 1e-300)) >= _FREE_DEVIATION:
             direction = vector * width
             size = np.abs(direction) / np.max(np.abs(direction))
-            shown = [k for k in range(len(size)) if size[k] > _SMALL]
+            shown = [k for k in range(len(size)) if size[k] > _SMALL_ENTRY]
             found_free.append((_in_words(problem, direction, shown), shown))
     return found_free
 

@@ -29,13 +29,14 @@ from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates
 from finger_pin.typing import Array
 
-# Slopes are those of runs at so much larger tolerances, with errors of about 1e-2: a search needs no more, and at its
-# end residuals and slopes are nearly orthogonal.
-_SLOPES = 10.0
-# Between which tolerances are, unless a scenario asks for others.
-_FINEST, _ROUGHEST = 1e-10, 1e-4
-# Where slopes are wilder than so many ranges of the signal, a larger change and steps of their own serve.
-_WILD, _COARSE = 30.0, 1e-3
+# Tolerances of runs for slopes over the scenario's: slopes err by about 1e-2, and a search needs no more, as residuals
+# and slopes are nearly orthogonal at its end.
+_SLOPE_TOLERANCE = 10.0
+# Least and greatest tolerance, unless the scenario's is beyond.
+_LEAST_TOLERANCE, _GREATEST_TOLERANCE = 1e-10, 1e-4
+# Slope, in ranges of the signal over the range of the parameter, from which on it is made by runs with steps of their
+# own, and the change for that, part of the parameter's range.
+_STEEP, _LARGE_CHANGE = 30.0, 1e-3
 
 
 class RecordedMotion:
@@ -108,7 +109,7 @@ class RecordedMotion:
             sizes: Sizes of changes of the values, shape (p,).
         """
         here = at(values)
-        factor = max(self._factor, _SLOPES)
+        factor = max(self._factor, _SLOPE_TOLERANCE)
         plain, motion = self._made(*here, factor)
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
@@ -129,10 +130,10 @@ class RecordedMotion:
                 found = self._outputs(others.get(k, same), near.get(k, base), there[k][1])
                 slopes = [(f - c) / changes[k] for f, c in zip(found, computed, strict=True)]
                 pairs = zip(slopes, ranges, strict=True)
-                if all(np.max(np.abs(each)) * float(sizes[k]) <= _WILD * size for each, size in pairs):
+                if all(np.max(np.abs(each)) * float(sizes[k]) <= _STEEP * size for each, size in pairs):
                     return slopes
             # Of a motion that hunts what counts is the mean trend; one that sticks need not bear the steps of another.
-            change = np.where(np.arange(len(values)) == k, np.sign(changes[k]) * _COARSE * float(sizes[k]), 0.0)
+            change = np.where(np.arange(len(values)) == k, np.sign(changes[k]) * _LARGE_CHANGE * float(sizes[k]), 0.0)
             for moved in (values + change, values - change):
                 # At the edge of what goes together there is no such change.
                 with suppress(InputError):
@@ -229,6 +230,7 @@ def _tuned(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario with tolerances multiplied by a factor."""
     own = scenario.simulation
     rtol, atol = (
-        min(max(factor * each, min(each, _FINEST)), max(each, _ROUGHEST)) for each in (own.rtol, own.atol_scale)
+        min(max(factor * each, min(each, _LEAST_TOLERANCE)), max(each, _GREATEST_TOLERANCE))
+        for each in (own.rtol, own.atol_scale)
     )
     return scenario.updated(simulation={"rtol": rtol, "atol_scale": atol})

@@ -9,7 +9,8 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
-import scipy
+from scipy.linalg import eigh
+from scipy.stats import qmc
 
 from finger_pin.core.threads import in_threads
 from finger_pin.description.recordings.bench import IdentifySettings
@@ -23,25 +24,22 @@ from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.identification.scenario_parameters import entry_of
 from finger_pin.typing import Array
 
-# Directions that samples tell so much more surely than means over cycles do, and how many of them are looked along.
-_SURER, _MOST = 4.0, 2
-# How far, in deviations by the means and at the most in those by the samples, and how closely.
-_FAR, _FARTHEST, _APART = 3.0, 30.0, 3.0
-# What keeps directions that nothing tells from being divided by.
-_LITTLE, _LEAST = 1e-4, 1e-12
-
 #: Called with what is being done, how much of it is finished, and how much there is.
 Progress = Callable[[str, int, int], None]
 _Found = TypeVar("_Found")
-# Where in the bounds of a parameter it is asked whether anything feels it.
-_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
-# So many places are tried for each further search, by one evaluation each; by how much minus twice the likelihood jumps
-# where the motion hunts, for a change of this part of the bounds.
-_TRIED, _JUMP, _TINY = 4, 10.0, 1e-5
-# By how much more than the best a rough search misses the recordings that is given up.
+# Sobol points tried for every further search, by one evaluation.
+_TRIED = 4
+# A motion hunts where minus twice the log-likelihood jumps by so much for a change of this part of the bounds.
+_JUMP, _TINY = 10.0, 1e-5
+# Minus twice the log-likelihood above the best rough search at which another one is given up: exp(-50) as likely.
 _HOPELESS = 100.0
-# From how many valleys beside the best place searches go on, and how much deeper one must be.
+# Lines through the best place: directions that samples tell so many times as surely as means over cycles do (beyond the
+# second it makes no difference), the number of lines, and the deviations of samples between places.
+_SURER, _SUREST, _LINES, _SPACING = 4.0, 10.0, 2, 3.0
+# Neighbouring minima that searches go on from, and the fall of minus twice the log-likelihood that counts as deeper.
 _VALLEYS, _DEEPER = 2, 1.0
+# Places in the bounds of a parameter at which it is asked whether an output depends on it.
+_PLACES = 5
 
 
 class FitPipeline:
@@ -216,12 +214,11 @@ class FitPipeline:
 
 
 def starting_points(problem: Problem, count: int, seed: int) -> list[Array]:
-    """Return the points to start from, in turn: the scenario's own numbers, and a Latin hypercube to choose from."""
+    """Return the points to start from: the scenario's own numbers, then scrambled Sobol points to choose from."""
     low, high = problem.box
-    rng = np.random.default_rng(seed)
     further = _TRIED * max(count - 1, 0)
-    cells = np.array([rng.permutation(further) for _ in low]).T + rng.uniform(size=(further, len(low)))
-    return [problem.start, *map(problem.feasible, low + (high - low) * cells / max(further, 1))]
+    shares = qmc.Sobol(len(low), rng=seed).random_base2(max(further - 1, 0).bit_length())[:further]
+    return [problem.start, *map(problem.feasible, low + (high - low) * shares)]
 
 
 def _met(problem: Problem, residuals: Sequence[Array]) -> float:
@@ -243,7 +240,7 @@ def _check_felt(problem: Problem, fits: Sequence[Fit], places: Sequence[Array]) 
     best = best_of(problem, fits)
     for k in np.flatnonzero(~felt):
         # What is not felt at one place may be at another, such as friction that holds wherever searches have been.
-        for share in _SHARES:
+        for share in np.linspace(0.0, 1.0, _PLACES):
             place = best.z.copy()
             place[k] = low[k] + share * (high - low)[k]
             moved = problem.residuals(problem.feasible(place))
@@ -266,15 +263,16 @@ def beside(problem: Problem, z: Array) -> list[Array]:
         size * sum(j.T @ j / max(float(np.mean(e * e)), 1e-300) for e, j in zip(*each, strict=True))
         for each in ((residuals, slopes), (problem.averaged(residuals), problem.averaged(slopes)))
     )
-    least = _LITTLE * by_samples + _LEAST * np.trace(by_samples) * np.eye(len(z))
-    values, vectors = scipy.linalg.eigh(by_samples, by_means + least)
+    rounding = 1e-12 * np.trace(by_samples) * np.eye(len(z))
+    values, vectors = eigh(by_means + rounding, by_samples + rounding)
     lines = []
-    for value, vector in zip(values[-_MOST:], vectors.T[-_MOST:], strict=True):
-        if value < _SURER**2:
+    for value, vector in zip(values[:_LINES], vectors.T[:_LINES], strict=True):
+        surer = min(1.0 / np.sqrt(max(value, 1e-300)), _SUREST)
+        if surer < _SURER:
             continue
-        one = (high - low) * vector / np.sqrt(vector @ by_samples @ vector)
-        count = int(min(_FAR * np.sqrt(value), _FARTHEST) / _APART)
-        places = z + _APART * np.arange(-count, count + 1)[:, None] * one
+        one = _SPACING * (high - low) * vector / np.sqrt(vector @ by_samples @ vector)
+        count = int(surer)
+        places = z + np.arange(-count, count + 1)[:, None] * one
         lines.append(places[np.all((places >= low) & (places <= high), axis=1)])
     return lines
 

@@ -20,8 +20,9 @@ from finger_pin.identification.recordings import At, RecordedSignal, RecordingMo
 from finger_pin.identification.scenario_parameters import ScenarioPart, check_apart, is_of_scenario, owner
 from finger_pin.typing import Array
 
-# Errors of what is computed finely and roughly, of those asked for; means of every output that roughly count.
-_FINER, _ROUGHER, _MEANS = 0.1, 10.0, 40
+# Tolerances of fine and rough runs over the scenario's, and the number of means of every output that rough searches
+# compare, at least twice that of parameters: where something rings each is over some cycles.
+_FINE_TOLERANCE, _ROUGH_TOLERANCE, _MEAN_COUNT = 0.1, 10.0, 40
 
 
 class Stopped(Exception):
@@ -186,7 +187,7 @@ class Problem:
 
         Where thousands of samples tell a number, it jumps by as much as a quarter of what ends an interval.
         """
-        twin = self._tuned(_FINER)
+        twin = self._tuned(_FINE_TOLERANCE)
         twin.finely = True
         return twin
 
@@ -196,7 +197,7 @@ class Problem:
         Where something rings, a likelihood of samples has a minimum for every cycle by which a model is late; that of
         means over some cycles has few.
         """
-        twin = self._tuned(_ROUGHER)
+        twin = self._tuned(_ROUGH_TOLERANCE)
         twin.means = self._stretches()
         return twin
 
@@ -208,7 +209,7 @@ class Problem:
         """Return the number of samples in a row whose mean counts in rough searches, by signal."""
         groups, count = self.groups, [len(signal.measured) for signal in self.signals]
         size = np.bincount(groups, count)[groups]
-        share = np.minimum(size / max(_MEANS, 2 * len(self.keys)), count)
+        share = np.minimum(size / max(_MEAN_COUNT, 2 * len(self.keys)), count)
         return [max(int(n), 1) if s.ordered else 1 for s, n in zip(self.signals, share, strict=True)]
 
     def _tuned(self, factor: float) -> Problem:

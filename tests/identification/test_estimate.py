@@ -1,0 +1,65 @@
+"""Minima of readings in closed form, against scipy's least squares."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.stats import norm
+
+from finger_pin.description.loading import load_bench
+from finger_pin.identification.estimate import LOSSES, fit
+from finger_pin.identification.models import build_problem
+from finger_pin.identification.pipeline import starting_points
+from finger_pin.identification.recordings import read_recording
+
+COULOMB, DRAG, TURN = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag", 2.5
+LOAD = np.repeat([3.0, 6.0, 9.0, 12.0, 15.0], 6)
+
+
+def delivered(values):
+    """Tension that leaves a canal, by the capstan law and a drag."""
+    coulomb, drag = values
+    return LOAD * np.exp(-coulomb * TURN) - drag / (1.0 + np.tanh(coulomb * TURN / 2.0))
+
+
+def problem_of(measured, bounds):
+    columns = {"inputs": {"tendon_command.T1": "in"}, "outputs": {"tendon_tension.T1": "out"}}
+    entries = {"parameters": bounds, "recordings": {"pull": {"kind": "steady", "speed": 0.05, **columns}}}
+    scenario, settings = load_bench("canal", {"finger.tendons.T1.curvature_offset": TURN}, entries)
+    data = {"in": LOAD, "out": measured}
+    return build_problem(scenario, settings, [read_recording("pull", settings.recordings["pull"], data)])
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+@pytest.mark.parametrize("greatest", [3.0, 0.3], ids=["inside", "at a bound"])
+def test_a_minimum_is_that_of_least_squares_with_the_same_loss_and_bounds(loss, greatest):
+    measured = delivered((0.12, 0.4)) + np.random.default_rng(5).normal(0.0, 0.05, LOAD.size)
+    measured[[4, 20]] += 0.4
+    bounds = {COULOMB: (0.005, 1.0), DRAG: (0.0, greatest)}
+    problem = problem_of(measured, bounds)
+    for start in starting_points(problem, 3, 0):
+        found = fit(problem, start, loss=loss)
+        # The deviation beyond which readings are outliers: 1.4826 median sizes of a normal distribution.
+        size = np.median(np.abs(found.residuals[0])) / norm.ppf(0.75)
+        expected = least_squares(
+            lambda values: measured - delivered(values),
+            (0.2, 0.1),
+            bounds=np.transpose(list(bounds.values())),
+            loss=loss,
+            f_scale=size,
+            xtol=1e-12,
+            ftol=1e-14,
+        )
+        assert found.converged
+        np.testing.assert_allclose(problem.values(found.z), expected.x, rtol=2e-4)
+
+
+def test_starts_fill_the_bounds_evenly_and_again_alike_from_the_same_seed():
+    """Of eight Sobol points every eighth of every range has one (a (0, 3)-net in base 2)."""
+    problem = problem_of(delivered((0.12, 0.4)), {COULOMB: (0.005, 1.0), DRAG: (0.0, 3.0)})
+    low, high = problem.box
+    first, again, other = (np.array(starting_points(problem, 3, seed)[1:]) for seed in (0, 0, 1))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+    eighths = np.sort(np.floor(8.0 * (first - low) / (high - low)), axis=0)
+    np.testing.assert_array_equal(eighths, np.transpose([np.arange(8.0)] * 2))
+    assert len(starting_points(problem, 1, 0)) == 1
