@@ -111,7 +111,7 @@ def _stored(text: str, scenario: Scenario) -> list[str]:
 
 def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
     """Return a scenario that moves the hand of a MuJoCo model; print the elements that are not carried over."""
-    from finger_pin.description.demo_motion import demo_motion
+    from finger_pin.description.demo_motion import demo_motion, idle_inputs
     from finger_pin.description.loading import read_scenario
     from finger_pin.exceptions import LeftOutWarning
     from finger_pin.exchange.from_mujoco import from_mujoco
@@ -123,6 +123,8 @@ def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
         description = from_mujoco(path, path.stem)
     if not quiet and description.tree.left_out:
         print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))
+    if not quiet and (idle := idle_inputs(description)):
+        print_text(f"Held at zero, as their controls have no range: {', '.join(idle)}\n")
     return read_scenario(demo_motion(description), changed)
 
 

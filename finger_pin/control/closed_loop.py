@@ -132,7 +132,7 @@ class ClosedLoop:
         initial, keyframe = scenario.simulation.initial, scenario.keyframe
         if initial is not None or keyframe is not None:
             given = (keyframe.position if keyframe else {}) | (initial.position if initial else {})
-            speeds = initial.velocity if initial else {}
+            speeds = (keyframe.velocity if keyframe else {}) | (initial.velocity if initial else {})
             joints = finger.routing.joints
             position = loop.reference.at(0.0).position
             moved = [given.get(name, own) for name, own in zip(joints, position, strict=True)]

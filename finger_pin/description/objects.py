@@ -13,7 +13,7 @@ from finger_pin.description.by_finger import dump_set_fields
 from finger_pin.description.placement import PathSignal
 from finger_pin.description.signals import ForceSignal, of_axes
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
-from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
+from finger_pin.description.validation import Description, FullName, Name, choice, problem, quantity, real, vector
 
 Array = NDArray[np.float64]
 #: The coordinates of an object's path.
@@ -44,6 +44,7 @@ class Object(Shaped):
     path: dict[Name, PathSignal] | None = Field(
         None, description="Path along which it is moved: growth of x, y and z of its position over time, base frame."
     )
+    apart: tuple[FullName, ...] = Field((), description="Links, shapes and other objects that it never touches.")
 
     @field_validator("shape", mode="before")
     @classmethod

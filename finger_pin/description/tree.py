@@ -68,8 +68,9 @@ class Tree(Description):
             _check(f"loops.{name}.body", loop.body, self.bodies, "body")
             _check(f"loops.{name}.other", loop.other, self.bodies, "body")
         for name, keyframe in self.keyframes.items():
-            for joint_name in keyframe.position:
-                _check(f"keyframes.{name}.position.{joint_name}", joint_name, self.joints, "joint")
+            for entry in ("position", "velocity"):
+                for joint_name in getattr(keyframe, entry):
+                    _check(f"keyframes.{name}.{entry}.{joint_name}", joint_name, self.joints, "joint")
         for name, actuator in self.actuators.items():
             _check(f"actuators.{name}.joint", actuator.joint, self.joints, "joint")
             _check(f"actuators.{name}.tendon", actuator.tendon, self.tendons, "tendon")

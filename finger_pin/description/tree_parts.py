@@ -269,6 +269,9 @@ class Keyframe(Description):
     position: dict[Name, Annotated[float, real(-1e6, 1e6)]] = quantity(
         {}, unit="rad", source="design", doc="By joint; others are at their references."
     )
+    velocity: dict[Name, Annotated[float, real(-1e4, 1e4)]] = quantity(
+        {}, unit="rad/s", source="design", doc="By joint; others are at rest."
+    )
     inputs: dict[Name, Annotated[float, real(-_LARGE, _LARGE)]] = quantity(
         {}, unit="1", source="design", doc="Inputs of actuators, by name, that go with it."
     )

@@ -16,22 +16,22 @@ from numpy.typing import NDArray
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.meshes import Mesh
-from finger_pin.description.validation import validate
+from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.exchange.mujoco_actuators import ActuatorReader
-from finger_pin.exchange.mujoco_equalities import read_equalities
+from finger_pin.exchange.mujoco_compliance import stop_stiffness
+from finger_pin.exchange.mujoco_equalities import linked_bodies, read_equalities
 from finger_pin.exchange.mujoco_free import FreeBodies
-from finger_pin.exchange.mujoco_names import Names, Table, distinct, entry_name, free_name, quaternion
+from finger_pin.exchange.mujoco_keyframes import read_keyframes
+from finger_pin.exchange.mujoco_names import Names, Table, entry_name, free_name, quaternion
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
-from finger_pin.exchange.mujoco_tendons import STOP, TendonReader
+from finger_pin.exchange.mujoco_tendons import TendonReader, within_margin
 from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest, apply_flags
 from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.typing import Array
 from finger_pin.version import installing
 
-# Stiffness with which the range of a joint stops it where it slides, N/m.
-_STOP_SLIDING = 1e4
 _LEAST_FRICTION = 1e-7
 # Groups from this one on are hidden in MuJoCo's viewer, unless one asks for them.
 _HIDDEN = 3
@@ -46,9 +46,10 @@ def from_mujoco(
     their path and slack; their tension is their force, N. Other actuators exert what MuJoCo's do. Friction of tendons
     and joints, which MuJoCo has not, gets this package's defaults, but for viscous friction of joints, which is the
     model's. Other tendons rub alike where springs, ranges, servos or what drives their joint pull them. Ranges, less
-    their margins, are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level of
-    (9). A free body that a tendon passes moves by three slides and three hinges, of which the second must not come to a
-    right angle; others, and geoms of the world, become objects. Names keep letters, digits and underscores: ``a/b`` is
+    their margins, are guarded by (2), which is as stiff as ``solref`` and ``solimp`` ask at the model's own inertia, as
+    are equalities. Joints' friction loss is the least level of (9). Without a keyframe, the reference is one. A free
+    body that a tendon passes moves by three slides and three hinges, of which the second must not come to a right
+    angle; others, and geoms of the world, become objects. Names keep letters, digits and underscores: ``a/b`` is
     ``a_b``. What is not carried over stands in ``tree.left_out``, and is warned of where it moves or carries anything.
 
     Args:
@@ -117,8 +118,10 @@ class _Reader:
         actuators, pulled = self.actuators.table(), self.actuators.pulled()
         couplings, loops, differences = read_equalities(self._read)
         joints, moving, loss = self._joints()
-        stops = [_STOP_SLIDING if each["kind"] == "slide" else STOP for each in moving.values()]
-        pairs, keyframes = self.shapes.pairs(bodies), self._keyframes()
+        stops = [stop_stiffness(self._read, name) for name in joints]
+        keyframes = read_keyframes(self._read, self.actuators, self.free, self.kept_joints)
+        objects, pairs = self.shapes.objects(self.free.loose), self.shapes.pairs(bodies)
+        self.shapes.set_apart(objects, bodies)
         return {
             "name": entry_name(name),
             "gravity": model.opt.gravity.tolist(),
@@ -135,7 +138,7 @@ class _Reader:
                 "loops": loops,
                 "actuators": actuators,
                 "keyframes": keyframes,
-                "objects": self.shapes.objects(self.free.loose),
+                "objects": objects,
                 "tip": self._tip(),
                 "touching": pairs,
                 "meshes": self._meshes(bodies),
@@ -164,22 +167,11 @@ class _Reader:
                     loss.append(0.0)
         return joints, moving, loss
 
-    def _keyframes(self) -> Table:
-        """Return the postures that the model comes with."""
-        model, found = self.model, []
-        for k in range(model.nkey):
-            qpos = model.key_qpos[k]
-            position = {self.names.joints[i]: float(qpos[model.jnt_qposadr[i]]) for i in self.kept_joints}
-            for i in self.free.kept:
-                position |= self.free.position(i, qpos)
-            found.append({"position": position, "inputs": self.actuators.inputs(model.key_ctrl[k])})
-        return dict(zip(distinct("keyframe", [model.key(k).name for k in range(model.nkey)]), found, strict=True))
-
     def _bodies(self) -> list[int]:
         """Return the bodies that move, are passed by tendons, or carry such bodies, parents first."""
         model = self.model
         # What lies around does not carry a tip.
-        needed = self._passed() | {self._tip_body()[0]} | self.shapes.still()
+        needed = self._passed() | {self._tip_body()[0]} | self.shapes.still() | linked_bodies(self.mujoco, model)
         sides = [int(each) for each in model.wrap_prm[self._wraps()] if each >= 0]
         needed |= {int(each) for each in model.site_bodyid[sides]}
         moved: set[int] = set()
@@ -255,10 +247,15 @@ class _Reader:
             "rest": float(model.qpos_spring[model.jnt_qposadr[i]]),
             "damping": float(model.dof_damping[int(model.jnt_dofadr[i])]),
         }
-        limited, margin = bool(model.jnt_limited[i]), float(model.jnt_margin[i])
+        limited, ends = bool(model.jnt_limited[i]), within_margin(model.jnt_range[i], float(model.jnt_margin[i]))
+        if limited and max(map(abs, ends)) > MOST_ANGLE:
+            name = self.names.joints[i]
+            self.rest.add(f"joint {name}: its range {ends} is cut to {-MOST_ANGLE} and {MOST_ANGLE}")
+            ends = np.clip(ends, -MOST_ANGLE, MOST_ANGLE).tolist()
+            limited = ends[0] < ends[1]
         reach = math.pi if model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE else 1.0
         return {
-            "range": (model.jnt_range[i] + (margin, -margin)).tolist() if limited else [-reach, reach],
+            "range": ends if limited else [-reach, reach],
             "limited": limited,
             **({"spring": spring} if spring["stiffness"] or spring["damping"] else {}),
         }

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from finger_pin.description.caching import cached_property
 from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.description.tree_actuators import Muscle
-from finger_pin.exchange.mujoco_names import Table, distinct
+from finger_pin.exchange.mujoco_names import Table
 from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
 from finger_pin.typing import Array
 
@@ -35,7 +35,7 @@ class ActuatorReader(ElementReader):
             why = is_disabled(self.mujoco, self.model, i) or self._foreign(i)
             law = self._law(i) if why is None else why
             if isinstance(law, str):
-                self.rest.add(f"actuator {self.model.actuator(i).name or f'actuator_{i}'}: {law}")
+                self._leave_out(i, law)
             else:
                 found[i] = law
         return found
@@ -48,6 +48,7 @@ class ActuatorReader(ElementReader):
     def table(self) -> Table:
         """Return all others, by name."""
         model, found = self.model, {}
+        self._list_shared_limits()
         for i in self.laws:
             if i in self.pulling:
                 continue
@@ -63,30 +64,29 @@ class ActuatorReader(ElementReader):
                 found[i]["input_range"] = (np.clip(ends, 0.0, 1.0) if "muscle" in found[i] else ends).tolist()
             bounds = self._bounds(i)
             if np.isfinite(bounds).any() and "muscle" in found[i]:
-                self.rest.add(f"actuator {model.actuator(i).name or f'actuator_{i}'}: the limit on a muscle's force")
+                self._leave_out(i, "the limit on a muscle's force")
             elif np.isfinite(bounds).any():
                 found[i]["force_range"] = np.clip(bounds, -_LARGE, _LARGE).tolist()
-        names = distinct("actuator", [model.actuator(i).name for i in found])
-        return dict(zip(names, found.values(), strict=True))
+        return {self.names.actuators[i]: each for i, each in found.items()}
 
     def inputs(self, controls: Array) -> dict[str, float]:
         """Return the inputs for a model's controls, by the names of actuators and of tendons that are pulled."""
         found = {}
-        for chosen in ([i for i in self.laws if i not in self.pulling], self.pulling):
-            names = distinct("actuator", [self.model.actuator(i).name for i in chosen])
-            for name, i in zip(names, chosen, strict=True):
-                value = float(controls[self._control(i)])
-                pulls = -float(self.model.actuator_gear[i, 0]) * self.laws[i].get("gain", 0.0)
-                found[name] = value * pulls if i in self.pulling else value
+        for i in sorted(self.laws, key=self.pulling.__contains__):
+            value = float(controls[self._control(i)])
+            pulls = -float(self.model.actuator_gear[i, 0]) * self.laws[i].get("gain", 0.0)
+            found[self.names.actuators[i]] = value * pulls if i in self.pulling else value
         return found
+
+    def _leave_out(self, i: int, why: str) -> None:
+        self.rest.add(f"actuator {self.model.actuator(i).name or f'actuator_{i}'}: {why}")
 
     def pulled(self) -> Table:
         """Return the tendons that motors pull, by the names of these."""
-        model = self.model
-        names = distinct("actuator", [model.actuator(i).name for i in self.pulling])
         found = {}
-        for name, i in zip(names, self.pulling, strict=True):
-            found[name] = self._route(int(model.actuator_trnid[i, 0])) | {"maximum_tension": float(max(self._ends(i)))}
+        for i in self.pulling:
+            route = self._route(int(self.model.actuator_trnid[i, 0]))
+            found[self.names.actuators[i]] = route | {"maximum_tension": float(max(self._ends(i)))}
         return found
 
     def _ends(self, i: int) -> Array:
@@ -101,16 +101,38 @@ class ActuatorReader(ElementReader):
         at, gear = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0])
         what = "tendon" if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON else "joint"
         prefix = "tendon_actfrc" if what == "tendon" else "jnt_actfrc"
-        # Older versions have no limits.
-        if getattr(model, f"{prefix}limited", np.zeros(at + 1))[at] and gear:
-            same = [k for k in self.laws if self._drives(k) == (what, at)]
-            if len(same) > 1:
-                name = getattr(model, what)(at).name or f"{what}_{at}"
-                self.rest.add(f"{what} {name}: a limit on what actuators exert on it together")
-            else:
-                ends = sorted(getattr(model, f"{prefix}range")[at] / gear)
-                low, high = max(low, ends[0]), min(high, ends[1])
+        if getattr(model, f"{prefix}limited")[at] and gear and self._drivers(what, at) == [i]:
+            ends = sorted(getattr(model, f"{prefix}range")[at] / gear)
+            low, high = max(low, ends[0]), min(high, ends[1])
         return float(low), float(high)
+
+    def _list_shared_limits(self) -> None:
+        """List the joints and tendons with a limit on what actuators exert, other than that of their only drive."""
+        model = self.model
+        for what, limited in (("joint", model.jnt_actfrclimited), ("tendon", model.tendon_actfrclimited)):
+            for at in (int(each) for each in np.flatnonzero(limited)):
+                drivers, name = self._drivers(what, at), getattr(model, what)(at).name or f"{what}_{at}"
+                if len(drivers) > 1 or any(self._drives(i) != (what, at) for i in drivers):
+                    self.rest.add(f"{what} {name}: a limit on what actuators exert on it together")
+                if what == "joint" and model.jnt_actgravcomp[at] and model.body_gravcomp.any():
+                    self.rest.add(f"joint {name}: its gravity compensation counts as its actuators', which are limited")
+
+    def _drivers(self, what: str, at: int) -> list[int]:
+        """Return the actuators that exert a force on a tendon, or on a joint by itself or by tendons."""
+        found = {(what, at)}
+        if what == "joint":
+            found |= {("tendon", i) for i, moved in enumerate(self._moved) if int(self.model.jnt_dofadr[at]) in moved}
+        return [i for i in self.laws if self._drives(i) in found]
+
+    @cached_property
+    def _moved(self) -> list[set[int]]:
+        """The degrees of freedom that each tendon's force acts on."""
+        data = self.mujoco.MjData(self.model)
+        self.mujoco.mj_fwdPosition(self.model, data)
+        # Older versions have the pattern in the data.
+        where = self.model if hasattr(self.model, "ten_J_rowadr") else data
+        first, count, column = where.ten_J_rowadr, where.ten_J_rownnz, where.ten_J_colind
+        return [set(column.ravel()[a : a + n].tolist()) for a, n in zip(first, count, strict=True)]
 
     def _drives(self, i: int) -> tuple[str, int]:
         """Return the kind and number of what an actuator drives."""
@@ -242,4 +264,5 @@ class ActuatorReader(ElementReader):
             if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or abs(arm) > LARGEST_RADIUS:
                 return False
         ends = self._ends(i)
-        return bool(np.all(ends >= 0.0) and np.any(ends))
+        # One that never lets go has a range of inputs, as other actuators.
+        return bool(np.min(ends) == 0.0 and np.any(ends))

@@ -2,25 +2,40 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from finger_pin.exchange.mujoco_names import Names, Table, distinct
+from finger_pin.exchange.mujoco_compliance import soft_spring
+from finger_pin.exchange.mujoco_names import Table, distinct
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 
-# Time constant with which what is coupled follows, critically damped, s.
-_COUPLED = 0.005
-# The same of points that close a loop, whose springs carry what the loop does, s.
-_CLOSED = 0.0005
 # Of the points that a weld holds, the least distance from their middle, m.
-_WELD = 0.01
+_WELD = 1e-3
+
+
+def linked_bodies(mujoco: Any, model: Any) -> set[int]:
+    """Return the bodies that connections and welds hold together, none that others lead, nor the world."""
+    found: set[int] = set()
+    for i in (int(each) for each in np.flatnonzero(model.eq_active0)):
+        if model.eq_type[i] in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):
+            bodies = _bodies(mujoco, model, i)
+            found |= set(bodies) if all(model.body_mocapid[each] < 0 for each in bodies) else set()
+    return found - {0}
+
+
+def _bodies(mujoco: Any, model: Any, i: int) -> list[int]:
+    """Return the bodies of a connection or weld."""
+    of_sites = model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE
+    both = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+    return [int(model.site_bodyid[each]) if of_sites else each for each in both]
 
 
 def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
     """Return couplings of joints, loops, and the tendons that stand for equalities of tendons, each by name."""
-    mujoco, model, names, rest = read.mujoco, read.model, read.names, read.rest
+    mujoco, model, rest = read.mujoco, read.model, read.rest
     couplings: Table = {}
     loops: Table = {}
     tendons: Table = {}
@@ -28,13 +43,13 @@ def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
         name = model.equality(i).name or f"equality_{i}"
         kind = mujoco.mjtEq(int(model.eq_type[i])).name.removeprefix("mjEQ_").lower()
         if kind in ("connect", "weld"):
-            found = _points(mujoco, model, names, i)
+            found = _points(read, i)
             if isinstance(found, str):
                 rest.add(f"equality {name}: {found}")
             else:
                 loops |= {f"{name}_{k}" if len(found) > 1 else name: each for k, each in enumerate(found)}
         elif kind == "joint":
-            couplings[name] = _coupling(model, names, i)
+            couplings[name] = _coupling(read, i)
         elif kind != "tendon":
             rest.add(f"equality {name}: of kind {kind}")
         elif np.any(model.eq_data[i, 2:5]):
@@ -42,23 +57,23 @@ def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
         elif any(_spatial(mujoco, model, t) for t in _both(model, i)):
             rest.add(f"equality {name}: of tendons through space")
         else:
-            tendons[name] = _difference(model, names, i)
+            tendons[name] = _difference(read, i)
     return _renamed(couplings), _renamed(loops), _renamed(tendons)
 
 
-def _points(mujoco: Any, model: Any, names: Names, i: int) -> list[Table] | str:
+def _points(read: ElementReader, i: int) -> list[Table] | str:
     """Return the points that a connection holds together, three for a weld, or the reason for their lack."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    mujoco, model = read.mujoco, read.model
     first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
-    of_sites = model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE
-    bodies = [int(model.site_bodyid[each]) if of_sites else each for each in (first, second)]
+    of_sites, bodies = model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE, _bodies(mujoco, model, i)
     if any(model.body_mocapid[each] >= 0 for each in bodies):
         return "to a mocap body, which others lead"
-    given, turned = model.eq_data[i], [data.xmat[each].reshape(3, 3) for each in bodies]
+    if not any(model.body_weldid[bodies]):
+        return []  # Both stand still.
+    given = model.eq_data[i]
     if model.eq_type[i] == mujoco.mjtEq.mjEQ_CONNECT:
         places = [model.site_pos[first], model.site_pos[second]] if of_sites else [given[:3], given[3:6]]
-        return [_loop(model, names, bodies, places)]
+        return [_loop(read, i, bodies, places)]
     # A frame of the second body and one of the first stay together: three points of them do.
     frames = [np.eye(3), np.eye(3)]
     if of_sites:
@@ -66,13 +81,14 @@ def _points(mujoco: Any, model: Any, names: Names, i: int) -> list[Table] | str:
         frames = [_matrix(mujoco, model.site_quat[each]) for each in (first, second)]
     else:
         # The anchor in the second body's frame; where it is in the first's, and how the second is turned there.
-        anchor, pose = given[:3], given[3:10]
-        frames[0] = _matrix(mujoco, pose[3:7])
-        places = [pose[:3] + frames[0] @ anchor, anchor]
-    size = max(float(np.linalg.norm(turned[0] @ (model.body_ipos[bodies[0]] - places[0]))), _WELD)
-    corners = size * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
+        frames[0], places = _matrix(mujoco, given[6:10]), [given[3:6], given[:3]]
+    # Three springs of k / 3 at a distance s turn back with k s^2 / 2 about axes in their plane, and k s^2 across it.
+    # MuJoCo has the scaled sine of half the angle, which is 1/4 of a spring of the turns' mobility.
+    along, about = np.sum(model.body_invweight0[bodies], axis=0)
+    size = float(given[10]) * math.sqrt(along / (3.0 * about)) if about > 0.0 else _WELD
+    corners = max(size, _WELD) * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
     return [
-        _loop(model, names, bodies, [place + frame @ corner for place, frame in zip(places, frames, strict=True)], 3.0)
+        _loop(read, i, bodies, [place + frame @ corner for place, frame in zip(places, frames, strict=True)], 3.0)
         for corner in corners
     ]
 
@@ -83,20 +99,22 @@ def _matrix(mujoco: Any, quaternion: Any) -> Any:
     return found.reshape(3, 3)
 
 
-def _loop(model: Any, names: Names, bodies: list[int], places: list[Any], shared: float = 1.0) -> Table:
+def _loop(read: ElementReader, i: int, bodies: list[int], places: list[Any], shared: float = 1.0) -> Table:
     """Return two points that stay together; the body that moves is the first."""
-    pairs = sorted(zip(bodies, places, strict=True), key=lambda each: -each[0])
+    model, names = read.model, read.names
+    pairs = sorted(zip(bodies, places, strict=True), key=lambda each: (model.body_weldid[each[0]] == 0, -each[0]))
     (body, place), (other, there) = pairs
-    lightness = float(np.sum(model.body_invweight0[bodies, 0]))
+    mobility = float(np.sum(model.body_invweight0[bodies, 0]))
     # A body that turns about its mass centre alone has none.
-    mass = (1.0 / lightness if lightness > 0.0 else float(np.sum(model.body_mass[bodies]))) / shared
+    mobility = mobility or 1.0 / float(np.sum(model.body_mass[bodies]))
+    stiffness, damping = soft_spring(read, model.eq_solref[i], model.eq_solimp[i], mobility)
     return {
         "body": names.bodies[body],
         **names.carrier(other, "other"),
         "position": [float(each) for each in place],
         "other_position": [float(each) for each in there],
-        "stiffness": mass / _CLOSED**2,
-        "damping": 2.0 * mass / _CLOSED,
+        "stiffness": stiffness / shared,
+        "damping": damping / shared,
     }
 
 
@@ -113,12 +131,14 @@ def _spatial(mujoco: Any, model: Any, tendon: int) -> bool:
     return bool(model.wrap_type[model.tendon_adr[tendon]] != mujoco.mjtWrap.mjWRAP_JOINT)
 
 
-def _held(inertia: float) -> Table:
-    return {"stiffness": inertia / _COUPLED**2, "damping": 2.0 * inertia / _COUPLED}
+def _held(read: ElementReader, i: int, mobility: float) -> Table:
+    stiffness, damping = soft_spring(read, read.model.eq_solref[i], read.model.eq_solimp[i], mobility)
+    return {"stiffness": stiffness, "damping": damping}
 
 
-def _coupling(model: Any, names: Names, i: int) -> Table:
+def _coupling(read: ElementReader, i: int) -> Table:
     """Return an equality of a joint with another, or with a number."""
+    model, names = read.model, read.names
     first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     q0 = model.qpos0[model.jnt_qposadr]
     # From the references of both.
@@ -132,19 +152,32 @@ def _coupling(model: Any, names: Names, i: int) -> Table:
         offset = float(q0[first]) + coefficients[0]
         if any(coefficients[2:]):
             other["powers"] = coefficients[2 : len(powers.coef)]
-    inertia = float(model.dof_M0[model.jnt_dofadr[first]])
-    return {"joint": names.joints[first], "offset": offset, **_held(inertia), **other}
+            _list_turns(read, i, second)
+    both = model.jnt_dofadr[[each for each in (first, second) if each >= 0]]
+    held = _held(read, i, float(np.sum(model.dof_invweight0[both])))
+    return {"joint": names.joints[first], "offset": offset, **held, **other}
 
 
-def _difference(model: Any, names: Names, i: int) -> Table:
+def _list_turns(read: ElementReader, i: int, joint: int) -> None:
+    """List a polynomial of the angle of a hinge that may turn by more than half a turn from its range's middle."""
+    model = read.model
+    hinge = model.jnt_type[joint] == read.mujoco.mjtJoint.mjJNT_HINGE
+    half = 0.5 * float(np.ptp(model.jnt_range[joint])) if model.jnt_limited[joint] else math.inf
+    if hinge and half > math.pi:
+        name, what = model.equality(i).name or f"equality_{i}", model.joint(joint).name or f"joint_{joint}"
+        read.rest.add(f"equality {name}: powers of the angle of {what} repeat beyond half a turn")
+
+
+def _difference(read: ElementReader, i: int) -> Table:
     """Return an equality of fixed tendons as a spring of a tendon as long as their difference."""
+    model = read.model
     tendons, ratios = _both(model, i), (1.0, -float(model.eq_data[i, 1]))
     found: dict[str, float] = {}
     rest, mobility = float(model.eq_data[i, 0]), 0.0
     for tendon, ratio in zip(tendons, ratios, strict=False):
         rest += ratio * float(model.tendon_length0[tendon])
-        mobility += ratio**2 * float(model.tendon_invweight0[tendon])
+        mobility += float(model.tendon_invweight0[tendon])
         for k in range(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon]):
-            joint = names.joints[model.wrap_objid[k]]
+            joint = read.names.joints[model.wrap_objid[k]]
             found[joint] = found.get(joint, 0.0) + ratio * float(model.wrap_prm[k])
-    return {"joints": found, "rest": [rest, rest], **_held(1.0 / mobility)}
+    return {"joints": found, "rest": [rest, rest], **_held(read, i, mobility)}

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from finger_pin.exchange.mujoco_equalities import linked_bodies
 from finger_pin.exchange.mujoco_names import Table
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
@@ -31,12 +32,7 @@ class FreeBodies:
         model = self.model
         joints = [int(i) for i in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)]
         trees = {i: self._carried(int(model.jnt_bodyid[i])) for i in joints}
-        linked = {
-            int(each)
-            for k in range(model.neq)
-            for each in (model.eq_obj1id[k], model.eq_obj2id[k])
-            if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_BODY and model.eq_active0[k]
-        }
+        linked = linked_bodies(mujoco, model)
         moving = {int(model.jnt_bodyid[i]) for i in range(model.njnt) if i not in joints}
         self.kept = [i for i in joints if trees[i] & (passed | moving | linked)]
         self.loose = [int(model.jnt_bodyid[i]) for i in joints if i not in self.kept]

@@ -21,6 +21,7 @@ class Names:
     sites: list[str]
     geoms: list[str]
     meshes: list[str]
+    actuators: list[str]
     plugins: list[str]
 
     @classmethod
@@ -33,6 +34,9 @@ class Names:
             sites=distinct("site", [model.site(i).name for i in range(model.nsite)]),
             geoms=distinct("geom", [model.geom(i).name for i in range(model.ngeom)]),
             meshes=distinct("mesh", [model.mesh(i).name for i in range(model.nmesh)]),
+            actuators=distinct(
+                "actuator", [model.actuator(i).name for i in range(getattr(model, "nactuator", model.nu))]
+            ),
             plugins=plugins,
         )
 

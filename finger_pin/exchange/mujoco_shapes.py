@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
 
+from finger_pin.description.objects import Object
+from finger_pin.description.surface import Surface
+from finger_pin.exchange.mujoco_compliance import soft_spring
 from finger_pin.exchange.mujoco_names import Table, quaternion
+from finger_pin.exchange.mujoco_pairs import Pairs
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
+from finger_pin.mechanism.tendon_paths import rotation
 
 # How deep bodies may be in each other at the start, as contacts have it, m.
 _DEEPEST = 1e-3
+# Part of the largest moment of inertia by which a free body may differ from an even solid.
+_UNEVEN = 0.02
 
 
 class Shapes:
@@ -39,9 +45,14 @@ class Shapes:
             if not self._solid(i) and not (kind == "plane" and not model.body_weldid[model.geom_bodyid[i]]):
                 moves = bool(model.body_weldid[model.geom_bodyid[i]])
                 self.rest.add(f"geom {self._name(i)}: a {kind} touches nothing here", moves)
-        margins = [self._name(i) for i in self._colliding if model.geom_margin[i] or model.geom_gap[i]]
-        if margins:
-            self.rest.add(f"margins of geoms, where contacts begin: {', '.join(margins)}", moves=False)
+        self._pairs, self._placed_at = Pairs(*vars(read).values()), dict[int, str]()
+        # Ellipsoids, meshes and planes that move were listed.
+        carried = [i for i in self._colliding if self._solid(i) or self._is_plane(i)]
+        self._met = self._pairs.met(carried) if touching else {}
+        self._friction = self._pairs.surfaces(self._met)
+        self._read = read
+        self._list_margins()
+        self._list_stiffness()
         self._overlapping = self._overlaps()
 
     def _name(self, i: int) -> str:
@@ -50,19 +61,41 @@ class Shapes:
     def _solid(self, i: int) -> bool:
         return int(self.model.geom_type[i]) in self._kinds
 
-    def _started(self) -> Any:
-        """Return the model's data where runs start: at its first keyframe, or at its reference."""
-        data = self.mujoco.MjData(self.model)
-        if self.model.nkey:
-            self.mujoco.mj_resetDataKeyframe(self.model, data, 0)
-        self.mujoco.mj_kinematics(self.model, data)
-        self.mujoco.mj_comPos(self.model, data)
-        self.mujoco.mj_collision(self.model, data)
-        return data
+    def _is_plane(self, i: int) -> bool:
+        model = self.model
+        return bool(
+            model.geom_type[i] == self.mujoco.mjtGeom.mjGEOM_PLANE and not model.body_weldid[model.geom_bodyid[i]]
+        )
+
+    def _list_margins(self) -> None:
+        model = self.model
+        margins = [self._name(i) for i in self._colliding if model.geom_margin[i] or model.geom_gap[i]]
+        paired = [self._name(int(model.pair_geom1[k])) for k in range(model.npair) if model.pair_margin[k]]
+        if margins or paired:
+            largest = max(model.geom_margin.max(initial=0.0), model.pair_margin.max(initial=0.0))
+            line = f"margins of geoms, where contacts begin: {', '.join(dict.fromkeys(margins + paired))}"
+            self.rest.add(line, moves=bool(largest > _DEEPEST))
+
+    def _list_stiffness(self) -> None:
+        """List the stiffness of contacts, which `solref` and `solimp` have with the mass that rests on them."""
+        model, asked = self.model, []
+        softness = [(i, model.geom_solref[i], model.geom_solimp[i]) for pair in self._met for i in pair]
+        for geoms in (model.pair_geom1, model.pair_geom2):
+            softness += list(zip(geoms.tolist(), model.pair_solref, model.pair_solimp, strict=True))
+        for i, solref, solimp in softness:
+            mobility = float(model.body_invweight0[model.geom_bodyid[i], 0])
+            if mobility > 0.0:
+                asked.append(soft_spring(self._read, solref, solimp, mobility)[0])
+        if asked:
+            low, high = min(asked), max(asked)
+            ends = f"{low:.2g}" if high < 1.05 * low else f"{low:.2g} to {high:.2g}"
+            here = Surface().stiffness
+            self.rest.add(f"stiffness of contacts by solref, {ends} N/m: it is {here:.2g} N/m here", moves=False)
 
     def _overlaps(self) -> set[frozenset[int]]:
         """Return the pairs of geoms that overlap where runs start, by more than they may."""
-        data = self._started()
+        data = self._read.start_data()
+        self.mujoco.mj_collision(self.model, data)
         deep = [k for k in range(data.ncon) if data.contact.dist[k] < -_DEEPEST]
         return {frozenset(int(each) for each in data.contact.geom[k]) for k in deep}
 
@@ -84,13 +117,8 @@ class Shapes:
             sizes = {"sides": (2.0 * size).tolist()}
         elif shape in ("capsule", "cylinder"):
             sizes["length"] = 2.0 * float(size[1])
-        friction = float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0
-        return {"shape": shape, **sizes, "surface": {"friction": friction}}
-
-    def _meant(self, a: int, b: int) -> bool:
-        """Return whether the bits of two geoms let them collide."""
-        types, affinities = self.model.geom_contype, self.model.geom_conaffinity
-        return bool(types[a] & affinities[b] or types[b] & affinities[a])
+        own = float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0
+        return {"shape": shape, **sizes, "surface": {"friction": self._friction.get(i, own)}}
 
     def still(self) -> set[int]:
         """Return the bodies that stand still, have something to touch, and are not the world."""
@@ -99,13 +127,13 @@ class Shapes:
 
     def objects(self, loose: list[int]) -> Table:
         """Return planes that may be touched, and free bodies at the start of runs, as objects."""
-        model, data, found = self.model, self._started(), {}
+        model, data, found = self.model, self._read.start_data(), {}
         shapes = [i for i in self._colliding if self._solid(i) and int(model.geom_bodyid[i]) not in loose]
         taken = {*self.names.joints, *(self.names.geoms[i] for i in shapes)}
         for i in self._colliding:
-            plane = model.geom_type[i] == self.mujoco.mjtGeom.mjGEOM_PLANE
-            if plane and any(self._meant(i, k) for k in self._colliding if k != i) and not self._dropped(i):
-                found[_free_name(self.names.geoms[i], taken)] = self._shape(i) | self._placed(data, i)
+            if self._is_plane(i) and any(i in pair for pair in self._met) and not self._dropped(i):
+                self._placed_at[i] = _free_name(self.names.geoms[i], taken)
+                found[self._placed_at[i]] = self._shape(i) | self._placed(data, i)
         for body in loose:
             name, own = self.names.bodies[body], [i for i in self._colliding if model.geom_bodyid[i] == body]
             if len(own) != 1 or not self._solid(own[0]) or any(model.body_parentid == body):
@@ -114,10 +142,10 @@ class Shapes:
                 (i,) = own
                 if np.linalg.norm(model.geom_pos[i] - model.body_ipos[body]) > 1e-3 * model.geom_rbound[i]:
                     self.rest.add(f"free body {name}: its mass centre is not its shape's")
-                if model.body_gravcomp[body]:
-                    self.rest.add(f"free body {name}: gravity compensation")
-                mass = {"mass": float(model.body_mass[body])}
-                found[_free_name(name, taken | {*found})] = self._shape(i) | self._placed(data, i) | mass
+                self._placed_at[i] = _free_name(name, taken | {*found})
+                moving = {"mass": float(model.body_mass[body]), **self._velocity(data, i)}
+                found[self._placed_at[i]] = self._shape(i) | self._placed(data, i) | moving
+                self._list_free(body, i, found[self._placed_at[i]])
         return found
 
     def _dropped(self, i: int) -> bool:
@@ -132,38 +160,59 @@ class Shapes:
         self.mujoco.mju_mat2Quat(turned, data.geom_xmat[i])
         return {"position": data.geom_xpos[i].tolist(), "orientation": quaternion(turned)}
 
+    def _velocity(self, data: Any, i: int) -> Table:
+        """Return the speeds of a free geom where runs start: of its middle, and of its turning in its own frame."""
+        found = np.zeros(6)
+        # Turning comes first.
+        self.mujoco.mj_objectVelocity(self.model, data, self.mujoco.mjtObj.mjOBJ_GEOM, i, found, 0)
+        turned = data.geom_xmat[i].reshape(3, 3).T @ found[:3]
+        return {"velocity": found[3:].tolist(), "angular_velocity": turned.tolist()} if found.any() else {}
+
+    def _list_free(self, body: int, i: int, described: Table) -> None:
+        """List what a free body has and an object has not."""
+        model, name, first = self.model, self.names.bodies[body], int(self.model.body_dofadr[body])
+        turned = rotation(quaternion(model.geom_quat[i])).T @ rotation(quaternion(model.body_iquat[body]))
+        moments = turned @ np.diag(model.body_inertia[body]) @ turned.T
+        even = np.diag(Object.model_validate(described).inertia)
+        if np.abs(moments - even).max() > _UNEVEN * even.max():
+            numbers = " for ".join(" ".join(f"{each:.2g}" for each in np.diag(one)) for one in (even, moments))
+            self.rest.add(f"free body {name}: its moments of inertia, {numbers} kg m2")
+        dofs, joint = slice(first, first + 6), int(model.body_jntadr[body])
+        for what, values in (
+            ("gravity compensation", model.body_gravcomp[body]),
+            ("damping", model.dof_damping[dofs]),
+            ("armature", model.dof_armature[dofs]),
+            ("friction loss", model.dof_frictionloss[dofs]),
+            ("a spring", model.jnt_stiffness[joint]),
+        ):
+            if np.any(values):
+                self.rest.add(f"free body {name}: {what}")
+
     def pairs(self, bodies: list[int]) -> list[list[str]]:
-        """Return the pairs that MuJoCo lets collide among some bodies: by its bits, exclusions and explicit pairs."""
-        model, weld = self.model, self.model.body_weldid
-        known = {i for i in self._colliding if self._solid(i) and int(model.geom_bodyid[i]) in (0, *bodies)}
-        excluded = {int(each) for each in model.exclude_signature}
-        filtered = "filterparent" not in self._disabled
-        found = [(int(a), int(b)) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)]
-        for a, b in itertools.combinations(sorted(known), 2):
-            one, other = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
-            # What is welded is one body; a body and its parent do not collide, unless that is the world.
-            first, second = int(weld[one]), int(weld[other])
-            related = (
-                first
-                and second
-                and (weld[model.body_parentid[second]] == first or weld[model.body_parentid[first]] == second)
-            )
-            if (
-                self._meant(a, b)
-                and first != second
-                and not (filtered and related)
-                and (one << 16) + other not in excluded
-            ):
-                found.append((a, b))
-        kept = dict.fromkeys(tuple(sorted(pair)) for pair in found if set(pair) <= known)
-        same = [pair for pair in kept if model.geom_bodyid[pair[0]] == model.geom_bodyid[pair[1]]]
-        apart = []
-        for a, b in kept:
+        """Return the pairs of shapes that MuJoCo lets collide among some bodies, as `Pairs` finds them."""
+        apart, carriers = [], self.model.geom_bodyid
+        for a, b in self._met:
+            if not {int(carriers[a]), int(carriers[b])} <= {0, *bodies} or not (self._solid(a) and self._solid(b)):
+                continue
             if frozenset((a, b)) in self._overlapping:
                 self.rest.add(f"geoms {self._name(a)}, {self._name(b)}: they overlap where runs start, and never touch")
-            elif (a, b) not in same:
+            elif carriers[a] != carriers[b]:
                 apart.append([self.names.geoms[a], self.names.geoms[b]])
         return apart
+
+    def set_apart(self, objects: Table, bodies: list[int]) -> None:
+        """Note with objects the shapes, and the objects before them, that MuJoCo does not let collide with them."""
+        weld, carriers = self.model.body_weldid, self.model.geom_bodyid
+        own = {i: self.names.geoms[i] for i in self._colliding if self._solid(i) and int(carriers[i]) in (0, *bodies)}
+        others = dict(own)
+        for i, name in self._placed_at.items():
+            apart = [
+                other
+                for k, other in others.items()
+                if (weld[carriers[i]] or weld[carriers[k]]) and (min(i, k), max(i, k)) not in self._met
+            ]
+            objects[name] |= {"apart": apart} if apart else {}
+            others[i] = name
 
 
 def _free_name(name: str, taken: set[str]) -> str:

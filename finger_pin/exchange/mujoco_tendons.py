@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.description.waypoints import Waypoint, points_inside_wraps
+from finger_pin.exchange.mujoco_compliance import soft_spring
 from finger_pin.exchange.mujoco_names import Table, distinct, quaternion
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
 
-#: Stiffness with which a range stops a joint, N m/rad, as the stroke limiters do; also the range of a tendon.
-STOP = 50.0
+
+def within_margin(ends: Array, margin: float) -> list[float]:
+    """Return a range less its margin at both ends: no less than its middle, where both ends push."""
+    low, high = (float(each) for each in ends)
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low) - margin, 1e-9 + 1e-6 * (high - low))
+    return [middle - half, middle + half] if margin else [low, high]
 
 
 class TendonReader(ElementReader):
@@ -28,14 +33,13 @@ class TendonReader(ElementReader):
         }
         if model.wrap_type[pieces[0]] == types.mjWRAP_JOINT:
             found["joints"] = {self.names.joints[model.wrap_objid[k]]: float(model.wrap_prm[k]) for k in pieces}
-            share = sum(coefficient**2 for coefficient in found["joints"].values())
-            found["limit_stiffness"] = STOP / share if share else 0.0
         else:
             names = distinct("pulley", [self._piece_name(k) for k in pieces])
             found["path"] = self._without_idle({name: self._piece(k) for name, k in zip(names, pieces, strict=True)})
         if model.tendon_limited[i]:
-            margin = float(model.tendon_margin[i])
-            found["range"] = (model.tendon_range[i] + (margin, -margin)).tolist()
+            found["range"] = within_margin(model.tendon_range[i], float(model.tendon_margin[i]))
+            soft = model.tendon_solref_lim[i], model.tendon_solimp_lim[i], float(model.tendon_invweight0[i])
+            found["limit_stiffness"] = soft_spring(self, *soft)[0]
         return found
 
     def _without_idle(self, path: Table) -> Table:

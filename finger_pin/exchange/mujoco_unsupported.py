@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.exchange.mujoco_names import Names
 
 # What each flag takes out: the arrays that it makes zero; older versions lack some.
 _ZEROED = {
     "spring": ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "tendon_stiffnesspoly"),
-    "damper": ("dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly"),
+    "damper": ("dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly", "actuator_dampingpoly"),
     "gravity": ("body_gravcomp",),
     "frictionloss": ("dof_frictionloss", "tendon_frictionloss"),
     "limit": ("jnt_limited", "tendon_limited"),
@@ -21,6 +22,23 @@ _ZEROED = {
     "contact": ("geom_contype", "geom_conaffinity"),
     "clampctrl": ("actuator_ctrllimited",),
 }
+# What is listed of elements, by array, where it is not zero.
+_LISTED = (
+    ("joint", "jnt_stiffnesspoly", "a stiffness that grows with the deflection"),
+    ("joint", "dof_dampingpoly", "damping that grows with the speed"),
+    ("joint", "jnt_springyield", "a spring that yields"),
+    ("tendon", "tendon_armature", "armature"),
+    ("tendon", "tendon_stiffnesspoly", "a stiffness that grows with the stretch"),
+    ("tendon", "tendon_dampingpoly", "damping that grows with the speed"),
+    ("tendon", "tendon_springyield", "a spring that yields"),
+    ("geom", "geom_adhesion", "adhesion"),
+    ("geom", "geom_surfacevel", "a surface that moves, as a belt does"),
+    ("pair", "pair_adhesion", "adhesion"),
+    ("pair", "pair_solreffriction", "solreffriction, by which what sticks creeps"),
+    ("actuator", "actuator_dampingpoly", "damping that grows with the speed"),
+)
+# MuJoCo's default.
+_SOLREF = 0.02, 1.0
 _CONSTRAINTS = {"frictionloss", "limit", "equality", "contact"}
 # Obeyed elsewhere.
 _ASKED_FOR = {"constraint", "filterparent", "actuation"}
@@ -39,28 +57,30 @@ class Rest:
         self.mujoco, self.model = mujoco, model
         self._listed: list[str] = []
         self._moving: list[str] = []
-        self._every("joint", "jnt_stiffnesspoly", "a stiffness that grows with the deflection")
-        self._every("joint", "dof_dampingpoly", "damping that grows with the speed", by_dof=True)
-        self._every("joint", "jnt_springyield", "a spring that yields")
-        self._every("tendon", "tendon_actfrclimited", "a limit on what actuators exert on it together")
-        self._every("tendon", "tendon_armature", "armature")
-        self._every("tendon", "tendon_stiffnesspoly", "a stiffness that grows with the stretch")
-        self._every("tendon", "tendon_dampingpoly", "damping that grows with the speed")
-        self._every("tendon", "tendon_springyield", "a spring that yields")
+        for what, array, has in _LISTED:
+            self._every(what, array, has)
+        self._default("joint", model.dof_frictionloss > 0.0, model.dof_solref, model.dof_jntid)
+        lossy = model.tendon_frictionloss > 0.0
+        self._default("tendon", lossy, model.tendon_solref_fri, range(model.ntendon))
         if "contact" in disabled(mujoco, model):
             self.add("contacts are disabled in the model: its geoms touch nothing", moves=False)
         flags = without_counterpart(mujoco, model)
         if flags:
             self.add(f"flags about how MuJoCo computes: {', '.join(flags)}", moves=False)
+        if "override" in _set(mujoco.mjtEnableBit, model.opt.enableflags):
+            self.add("override of the margin, solref and solimp of contacts", moves=False)
         if model.opt.density or model.opt.viscosity:
             self.add("the medium: nothing is dragged")
         for count, what in (
             (model.nflex, "flexible bodies"),
             (model.nplugin - len(set(model.actuator_plugin[model.actuator_plugin >= 0])), "plugins"),
-            (model.nmocap, "mocap bodies"),
         ):
             if count:
-                self.add(f"{what}: {count}", moves=what != "mocap bodies")
+                self.add(f"{what}: {count}")
+        for i in np.flatnonzero(model.body_mocapid >= 0):
+            own = model.geom_bodyid == i
+            touches = bool(np.any(own & ((model.geom_contype > 0) | (model.geom_conaffinity > 0))))
+            self.add(f"{self._name('body', i)}: mocap, which others lead, stands still", moves=touches)
 
     def listed(self) -> list[str]:
         """Return the elements left out, a line each."""
@@ -76,15 +96,21 @@ class Rest:
         if moves:
             self._moving.append(line)
 
-    def _every(self, what: str, attribute: str, has: str, by_dof: bool = False) -> None:
+    def _every(self, what: str, attribute: str, has: str) -> None:
         """List every element with a nonzero attribute that older versions lack."""
         values = getattr(self.model, attribute, None)
         if values is None or not len(values):
             return
         for i in np.flatnonzero(np.any(np.reshape(values, (len(values), -1)), axis=1)):
-            index = self.model.dof_jntid[i] if by_dof else i
-            name = getattr(self.model, what)(index).name or f"{what}_{index}"
-            self.add(f"{what} {name}: {has}")
+            self.add(f"{self._name(what, self.model.dof_jntid[i] if attribute.startswith('dof') else i)}: {has}")
+
+    def _default(self, what: str, lossy: NDArray[np.bool_], solref: NDArray[np.float64], owner: Any) -> None:
+        """List dry friction that a time constant of its own lets creep: here it gives by a small length."""
+        for i in np.flatnonzero(lossy & np.any(solref != _SOLREF, axis=1)):
+            self.add(f"{self._name(what, owner[i])}: solreffriction, by which its dry friction creeps", moves=False)
+
+    def _name(self, what: str, i: Any) -> str:
+        return f"{what} {getattr(self.model, what)(i).name or f'{what}_{i}'}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +129,16 @@ class ElementReader:
     names: Names
     rest: Rest
 
+    def start_data(self) -> Any:
+        """Return the model's data where runs start: at its first keyframe, or at its reference."""
+        data = self.mujoco.MjData(self.model)
+        if self.model.nkey:
+            self.mujoco.mj_resetDataKeyframe(self.model, data, 0)
+        self.mujoco.mj_kinematics(self.model, data)
+        self.mujoco.mj_comPos(self.model, data)
+        self.mujoco.mj_comVel(self.model, data)
+        return data
+
 
 def _set(bits: Any, value: int) -> set[str]:
     return {name.split("_")[1].lower() for name, bit in bits.__members__.items() if "_" in name and value & int(bit)}
@@ -118,6 +154,8 @@ def apply_flags(mujoco: Any, model: Any) -> Any:
     """Return a copy of a model without the elements that its flags disable, and with the friction that they set."""
     found = copy.copy(model)
     flags = disabled(mujoco, model)
+    if hasattr(model, "actuator_armature"):
+        _add_drives(mujoco, found)
     for array in (each for flag in flags & set(_ZEROED) for each in _ZEROED[flag]):
         values = getattr(found, array, None)
         if values is not None:
@@ -125,8 +163,22 @@ def apply_flags(mujoco: Any, model: Any) -> Any:
     if "gravity" in flags:
         found.opt.gravity[:] = 0.0
     if "override" in _set(mujoco.mjtEnableBit, model.opt.enableflags):
-        found.geom_friction[:, 0] = model.opt.o_friction[0]
+        found.geom_friction[:, 0] = found.pair_friction[:, 0] = model.opt.o_friction[0]
     return found
+
+
+def _add_drives(mujoco: Any, model: Any) -> None:
+    """Add armature and damping of actuators, which act whatever these do, to those of the joints or tendons driven."""
+    for i in np.flatnonzero(model.actuator_armature + model.actuator_damping):
+        at, ratio = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0]) ** 2
+        if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
+            damping, armature = model.tendon_damping, model.tendon_armature
+        elif model.jnt_type[at] != mujoco.mjtJoint.mjJNT_FREE:
+            damping, armature, at = model.dof_damping, model.dof_armature, int(model.jnt_dofadr[at])
+        else:
+            continue
+        damping[at] += ratio * model.actuator_damping[i]
+        armature[at] += ratio * model.actuator_armature[i]
 
 
 def without_counterpart(mujoco: Any, model: Any) -> list[str]:

@@ -28,13 +28,16 @@ _LOSSES = (
 )
 
 
-def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozenset[str]] = ()) -> Rows:
+def contact_rows(
+    solids: Sequence[Solid], width: int, within: Collection[frozenset[str]] = (), never: Collection[frozenset[str]] = ()
+) -> Rows:
     """Return the contacts of all pairs that can touch: not of one group, not both fixed, and within reach.
 
     Args:
         solids: Links and objects.
         width: Number of coordinates.
         within: Pairs of one group, by their names, that touch all the same.
+        never: Pairs that do not touch, by their names.
 
     Returns:
         A table of contacts named ``link-object``, numbered where a pair has several.
@@ -43,7 +46,8 @@ def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozens
     numbers: list[tuple[float, ...]] = []
     paths: list[tuple[PathTerm, ...]] = []
     for one, other in itertools.combinations(solids, 2):
-        apart = one.group == other.group and frozenset((one.name, other.name)) not in within
+        pair = frozenset((one.name, other.name))
+        apart = pair in never or (one.group == other.group and pair not in within)
         if apart or (one.prescribed and other.prescribed) or one.never_meets(other):
             continue
         found = list(contacts_of(one, other))

@@ -20,7 +20,15 @@ from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.solids import WORLD, add_free_objects, finger_solids, object_solids, pairs_within, tree_solids
+from finger_pin.mechanism.solids import (
+    WORLD,
+    add_free_objects,
+    finger_solids,
+    object_solids,
+    pairs_apart,
+    pairs_within,
+    tree_solids,
+)
 from finger_pin.mechanism.state import State
 from finger_pin.mechanism.tendon_paths import Placed
 from finger_pin.typing import Array, Indices
@@ -49,7 +57,7 @@ def _touching(
 ) -> tuple[object, ...]:
     """Return all that contacts depend on: how heavy objects are, and where they move, is nothing to them."""
     shapes = (
-        (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.surface, *place)
+        (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.surface, each.apart, *place)
         for name, each in objects.items()
         for place in [(each.position, each.orientation)]
     )
@@ -145,7 +153,9 @@ class Scene:
             for what, taken in (("joint", description.joints), ("shape", [each.name for each in own])):
                 if name in taken:
                     raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
-        return contact_rows([*own, *object_solids(objects, extended)], width, pairs_within(description))
+        solids = [*own, *object_solids(objects, extended)]
+        never = pairs_apart(objects, [each.name for each in solids])
+        return contact_rows(solids, width, pairs_within(description), never)
 
     def joined(self, mechanism: Mechanism) -> Mechanism:
         """Return a mechanism with the scene: free objects after the joints, contacts before all other rows.

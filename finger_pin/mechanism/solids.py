@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from finger_pin.description.parameters import Link
 from finger_pin.description.placement import Palm
 from finger_pin.description.surface import Surface
 from finger_pin.description.tree import Tree
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.tendon_paths import Placed, rotation
 from finger_pin.typing import Array
@@ -145,6 +146,20 @@ def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
             pairs |= {frozenset((names[i], names[k])) for k in range(len(names)) for i in range(k - 1)}
             pairs |= {frozenset(pair) for pair in finger.tree.touching}
     return pairs
+
+
+def pairs_apart(objects: Mapping[str, Object], known: Collection[str]) -> set[frozenset[str]]:
+    """Return the names of objects, with those of links, shapes or other objects that they never touch.
+
+    Raises:
+        InputError: If one of these is not known.
+    """
+    for name, each in objects.items():
+        for other in each.apart:
+            if other not in known or other == name:
+                allowed = f"no such link, shape or other object; there are {', '.join(k for k in known if k != name)}"
+                raise InputError(f"environment.objects.{name}.apart", allowed, other)
+    return {frozenset((name, other)) for name, each in objects.items() for other in each.apart}
 
 
 def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:

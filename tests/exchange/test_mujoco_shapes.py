@@ -52,7 +52,8 @@ def test_the_pairs_that_touch_are_those_that_mujoco_lets_collide(flags):
     assert 5 < len(overlapping) < 25
     assert [line for line in tree.left_out if line.startswith("geom floor: it overlaps a1, a2")]
     assert "geom d2: a ellipsoid touches nothing here" in tree.left_out
-    assert shapes["c1"].friction == (0.3 if flags else 0.4)
+    # The greater of 0.4 and MuJoCo's 1 with all that it meets.
+    assert shapes["c1"].friction == (0.3 if flags else 1.0)
     assert not flags or set(data.contact.friction[:, 0]) == {0.3} == {each.friction for each in shapes.values()}
 
 
@@ -73,6 +74,7 @@ def scene(description, gravity, duration, closing):
     return read_scenario(table, {"simulation.rtol": 1e-4})
 
 
+@pytest.mark.filterwarnings("ignore:hand. not carried over")
 def test_the_shadow_hand_closes_on_a_bar_and_holds_it_when_it_is_turned_over():
     description = fp.from_mujoco(MODELS["shadow"]())
     grasp = fp.simulate(scene(description, [0.0, 0.0, -9.81], 0.5, True))
@@ -86,6 +88,7 @@ def test_the_shadow_hand_closes_on_a_bar_and_holds_it_when_it_is_turned_over():
     assert abs(held.object_velocity.values[-1]).max() < 0.05
 
 
+@pytest.mark.filterwarnings("ignore:hand. not carried over")
 def test_the_shapes_of_a_tree_are_where_mujoco_has_them():
     """A small fixed sphere where each axis of a geom leaves it is as deep in that geom's shape as its radius."""
     model = MODELS["shadow"]()

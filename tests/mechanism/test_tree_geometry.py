@@ -57,6 +57,7 @@ def test_cords_that_no_motor_pulls_are_drawn_branch_by_branch_with_ends_at_their
     assert not Scene("ub_stand_in").header("", np.zeros((1, 4)), 1.0)["cords"]
 
 
+@pytest.mark.filterwarnings("ignore:hand. not carried over")
 def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
     """Of the Shadow hand meshes, but of two links that have boxes; its capsules are hidden."""
     model = mujoco.MjModel.from_xml_path(str(asset("hand/reach.xml")))
@@ -89,6 +90,7 @@ def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
     assert len(description.tree.meshes) == 10
 
 
+@pytest.mark.filterwarnings("ignore:hand. not carried over")
 def test_what_falls_out_of_a_hand_leaves_the_view():
     description = fp.from_mujoco(str(asset("adroit_hand/adroit_pen.xml")))
     scene, still = Scene(description), np.zeros((2, len(description.joints)))

@@ -1,0 +1,88 @@
+"""The pairs of geoms that MuJoCo lets collide, and the friction between them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+
+import numpy as np
+
+from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
+from finger_pin.typing import Array
+
+Pair = tuple[int, int]
+# More pairs than these are counted, not named.
+_NAMED = 4
+_SAME = 1e-9
+
+
+class Pairs(ElementReader):
+    """Reads the pairs of geoms that may touch."""
+
+    def met(self, geoms: Iterable[int]) -> dict[Pair, Array]:
+        """Return the coefficients of sliding, turning and rolling, by pair, zero where `condim` has none.
+
+        A pair is meant by the bits of both geoms, and by no exclusion, or listed itself; its bodies are not welded, nor
+        a body and its parent. Of two geoms the greater numbers count, or those of the one with the higher priority.
+        """
+        model, known = self.model, sorted(geoms)
+        found = {pair: self._mixed(*pair) for pair in itertools.combinations(known, 2) if self._meant(*pair)}
+        for k in range(model.npair):
+            pair = sorted((int(model.pair_geom1[k]), int(model.pair_geom2[k])))
+            if set(pair) <= set(known):
+                found[pair[0], pair[1]] = _kept(int(model.pair_dim[k]), model.pair_friction[k][[0, 2, 3]])
+        return found
+
+    def _meant(self, a: int, b: int) -> bool:
+        model, weld = self.model, self.model.body_weldid
+        types, affinities = model.geom_contype, model.geom_conaffinity
+        if not (types[a] & affinities[b] or types[b] & affinities[a]):
+            return False
+        one, other = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
+        first, second = int(weld[one]), int(weld[other])
+        parents = weld[model.body_parentid[second]] == first or weld[model.body_parentid[first]] == second
+        # The world is nobody's parent.
+        related = first and second and parents and "filterparent" not in disabled(self.mujoco, model)
+        return first != second and not related and (one << 16) + other not in model.exclude_signature
+
+    def _mixed(self, a: int, b: int) -> Array:
+        model = self.model
+        dims, priority = model.geom_condim[[a, b]], model.geom_priority[[a, b]]
+        first = int(np.argmax(priority)) if priority[0] != priority[1] else None
+        if first is not None:
+            return _kept(int(dims[first]), model.geom_friction[(a, b)[first]])
+        return _kept(int(np.max(dims)), np.maximum(model.geom_friction[a], model.geom_friction[b]))
+
+    def surfaces(self, met: dict[Pair, Array]) -> dict[int, float]:
+        """Return a coefficient of sliding friction for each geom, of which the smaller of two is that of their pair.
+
+        No other numbers do if these do not; the pairs that rub more than in MuJoCo are listed.
+        """
+        found: dict[int, float] = {}
+        for pair, numbers in met.items():
+            for i in pair:
+                found[i] = max(found.get(i, 0.0), float(numbers[0]))
+        wrong = [
+            f"{self._pair(pair)}: {min(found[i] for i in pair):.3g} for {numbers[0]:.3g}"
+            for pair, numbers in met.items()
+            if min(found[i] for i in pair) > numbers[0] + _SAME
+        ]
+        if wrong:
+            self.rest.add(f"friction of pairs of geoms, which is greater here: {_few(wrong)}")
+        turning = [self._pair(pair) for pair, numbers in met.items() if numbers[1:].any()]
+        if turning:
+            self.rest.add(f"torsional and rolling friction (condim 4 and 6) of geoms: {_few(turning)}")
+        return found
+
+    def _pair(self, pair: Pair) -> str:
+        return " and ".join(self.model.geom(i).name or f"geom_{i}" for i in pair)
+
+
+def _kept(dim: int, friction: Array) -> Array:
+    """Return coefficients of sliding, turning and rolling as a contact of a dimension has them."""
+    return np.asarray(friction) * [dim >= 3, dim >= 4, dim >= 6]
+
+
+def _few(lines: list[str]) -> str:
+    more = f", and {len(lines) - _NAMED} more" if len(lines) > _NAMED else ""
+    return ", ".join(lines[:_NAMED]) + more
