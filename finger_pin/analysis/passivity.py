@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.validation import Numbers, expand
 from finger_pin.laws.bristle import passive_micro_damping
@@ -14,7 +13,6 @@ from finger_pin.typing import Array
 
 
 # Many runs are of one finger.
-@memoised(lambda finger: (finger,))
 def micro_damping_advice(finger: FingerDescription) -> str:
     """Return the warning about micro-damping that can drive motion, in one line; empty if it cannot."""
     tendons, joints = finger.tendon_friction, finger.joint_friction

@@ -18,8 +18,6 @@ from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import ProportionalController, RoutedController
 from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward
 from finger_pin.control.torque import FingertipForce, TorqueLaw
-from finger_pin.description.by_finger import of_finger
-from finger_pin.description.caching import memoised
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
@@ -49,22 +47,6 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     """
     scenario = load_scenario(scenario)
     routing = finger.routing if finger is not None else Routing.from_description(scenario.finger)
-    given, fingers = scenario.controller, () if scenario.hand is None else tuple(scenario.hand.fingers)
-    papers = all((of_finger(given, name) if given.fingers else given).is_paper for name in fingers or ("",))
-    if papers and routing.force_closure().holds:
-        # Of its finger the paper's knows the routing alone.
-        return _paper(scenario, routing, finger)
-    return _built(scenario, routing, finger)
-
-
-@memoised(
-    lambda scenario, routing, finger: (scenario.controller, routing, *(scenario.hand.fingers if scenario.hand else ()))
-)
-def _paper(scenario: Scenario, routing: Routing, finger: Finger | None) -> LoopController:
-    return _built(scenario, routing, finger)
-
-
-def _built(scenario: Scenario, routing: Routing, finger: Finger | None) -> LoopController:
     parts = scenario.parts()
     if len(parts) > 1:
         return joined_controller([build_controller(part) for part in parts.values()], routing)

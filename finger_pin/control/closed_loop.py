@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from finger_pin.control.position_drive import DriveSignals, LoopMemory
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import InputTable, core_signal, held_control
-from finger_pin.description.caching import memoised
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
@@ -31,18 +29,6 @@ _SHORTEST = 1e-4
 
 
 _Acting = tuple[Array, Array, Array | None]
-
-
-# Nothing of a finger changes in a run: those of a scenario that is run again share it.
-@memoised(lambda scenario: (scenario.finger, scenario.environment), most=4)
-def _finger(scenario: Scenario) -> Finger:
-    return Finger(scenario.finger, objects=scenario.environment.objects)
-
-
-# Runs that are prepared share their signals.
-@memoised(lambda signals, tolerance: (*signals, tolerance), most=16)
-def _knots(signals: Sequence[Signal], tolerance: float) -> Array:
-    return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +94,7 @@ class ClosedLoop:
                 or are not finite, or tensions are negative.
         """
         start, acting = scenario.simulation.start_time, scenario.environments()
-        finger = finger or _finger(scenario)
+        finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)
         _refuse_other(finger, scenario)
         alone = len(acting) == 1
         loop = cls(
@@ -180,7 +166,7 @@ class ClosedLoop:
         prescribed = [each and each.signal for each in (self.palm, self.guides)]
         other = [each for each in (self.varying_force, *prescribed) if each]
         signals = (*self.reference.signals(), *self.controller.signals(), *other)
-        return _knots(signals, tolerance).copy()
+        return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
 
     def spool_goals(self, time: Array) -> Array | None:
         """Return theta_m^d of the motors in position drive at times (m,), shape (m, k), rad; None without loops."""

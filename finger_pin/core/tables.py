@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple, NoReturn
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from finger_pin.core.path_tables import Paths, reached, read_paths
 from finger_pin.core.row_tables import row_arrays
 from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.rows import Rows
 from finger_pin.typing import Array
 
@@ -138,47 +136,25 @@ class Tables(NamedTuple):
         refuse_copy(self)
 
 
-_KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
-_BY_TOPOLOGY: WeakKeyDictionary[Topology, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
-_WEIGHED: WeakKeyDictionary[RigidBody, Array] = WeakKeyDictionary()
-
-
 def build_tables(mechanism: Mechanism) -> Tables:
-    """Return the arrays of a mechanism; those that change in place are the caller's own.
+    """Return the arrays of a mechanism: those of its structure, which is read once, and its numbers.
+
+    Pinocchio's model is the source of the rigid body. Arrays that change in place are the caller's own.
 
     Raises:
         InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
     """
-    if mechanism not in _KNOWN:
-        _KNOWN[mechanism] = _read(mechanism)
-    known = _KNOWN[mechanism]
-    return known._replace(bodies=known.bodies.copy(), tip_force=known.tip_force.copy())
-
-
-def _read(mechanism: Mechanism) -> Tables:
-    """Read a mechanism into arrays; Pinocchio's model is the source of the rigid body.
-
-    Raises:
-        InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
-    """
-    body, rows = mechanism.body, mechanism.rows
-    if body.topology not in _BY_TOPOLOGY:
-        chains = read_chains(body.model)
-        _BY_TOPOLOGY[body.topology] = chains, tree_arrays(body, chains)
-    chains, placed = _BY_TOPOLOGY[body.topology]
-    wired = _of_rows(mechanism, chains)
-    if body not in _WEIGHED:
-        _WEIGHED[body] = weighed(chains, body.model)
+    body = mechanism.body
+    chains, structure = _structure(mechanism)
     return Tables(
         prescribed=mechanism.prescribed,
         lumps=mechanism.inertia,
-        bodies=_WEIGHED[body],
+        bodies=weighed(chains, body.model),
         gravity=np.array(body.model.gravity.linear),
         tip_force=np.zeros((len(body.tips), 3)),
         has_tip_force=False,
-        parameters=_parameters(rows),
-        **placed,
-        **wired,
+        parameters=_parameters(mechanism.rows),
+        **structure,
     )
 
 
@@ -191,25 +167,21 @@ def _parameters(rows: Sequence[Rows]) -> Array:
     return found
 
 
-@memoised(lambda legs, topology, chains: (legs, topology))
-def _of_paths(legs: tuple[tuple[Any, ...], ...], topology: Topology, chains: Chains) -> Paths:
-    return read_paths([path for each in legs for path in each], chains)
-
-
-def _wired(mechanism: Mechanism, _: Chains) -> tuple[Any, ...]:
+def _wired(mechanism: Mechanism) -> tuple[Any, ...]:
     states = tuple(each.start for each in mechanism.states)
-    return (mechanism.body.topology, states, *(each.structure.structure_key for each in mechanism.rows))
+    return (mechanism.body.topology, states, *(each.structure_key for each in mechanism.rows))
 
 
-# Inertias and parameters of laws change from run to run; how rows are wired seldom does.
+# Inertias and parameters of laws change from run to run; bodies' places and how rows are wired seldom do.
 @memoised(_wired)
-def _of_rows(mechanism: Mechanism, chains: Chains) -> dict[str, Any]:
-    """Return laws, states, wiring, arms and paths of the rows."""
-    rows, count = mechanism.rows, sum(table.count for table in mechanism.rows)
-    legs = tuple(table.paths for table in rows)
-    paths = _of_paths(legs, mechanism.body.topology, chains)
-    return {
+def _structure(mechanism: Mechanism) -> tuple[Chains, dict[str, Any]]:
+    """Return all but masses, gravity and the parameters of laws: places of bodies, wiring, arms and paths of rows."""
+    rows, chains = mechanism.rows, read_chains(mechanism.body.model)
+    paths = read_paths([path for table in rows for path in table.paths], chains)
+    routed = reached(paths, sum(table.count for table in rows), mechanism.coordinates)
+    return chains, {
         "laws": np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
         "paths": paths,
-        **row_arrays(mechanism, reached(paths, count, mechanism.coordinates)),
+        **tree_arrays(mechanism.body, chains),
+        **row_arrays(mechanism, routed),
     }

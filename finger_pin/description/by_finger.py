@@ -7,7 +7,6 @@ from typing import Any, TypeVar
 
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.validation import Description, problem
 
 _Settings = TypeVar("_Settings", bound=Description)
@@ -44,7 +43,6 @@ def dump_set_fields(table: Mapping[str, Description] | None) -> Any:
     return {name: settings.model_dump(exclude_unset=True, exclude_none=True) for name, settings in table.items()}
 
 
-@memoised(lambda settings, name: (settings, name))
 def of_finger(settings: _Settings, name: str) -> _Settings:
     """Return settings for all fingers with the entries for one, from their table ``fingers``, on top.
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
@@ -30,7 +29,6 @@ class PassiveCoupling:
     followers: tuple[int, ...]
 
     @classmethod
-    @memoised(lambda cls, routing, tension, stiffness: (routing, tension.tobytes(), stiffness.tobytes()))
     def from_routing(cls, routing: Routing, tension: Array, stiffness: Array) -> PassiveCoupling:
         """Solve H_c theta^d = -f^d / K_t for the follower joints.
 

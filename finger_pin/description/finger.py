@@ -261,7 +261,6 @@ class HandSettings(Description):
         """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
         return {name: _placed_finger(name, placed, self.gravity) for name, placed in self.fingers.items()}
 
-    @memoised(lambda self: (self,))
     def joined(self) -> FingerDescription:
         """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
         joined = self._put_together().model_copy()

@@ -12,7 +12,6 @@ from typing import Any, TypeAlias, TypeVar
 
 import tomli_w
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.overriding import normalise_overrides, override
 from finger_pin.description.reading import (
@@ -227,11 +226,6 @@ def to_toml(description: Description) -> str:
         raise InputError("description", allowed, type(description).__name__)
     if isinstance(description, FingerDescription) and description.hand is not None:
         description = description.hand
-    return _text(description)
-
-
-@memoised(lambda description: (description,), most=4)
-def _text(description: Description) -> str:
     long: list[str] = []
     text = tomli_w.dumps(_plain(description.model_dump(mode="python", exclude_none=True), long))
     # In the single quotes of TOML nothing is escaped, so that nobody looks at each letter.

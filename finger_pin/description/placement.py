@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator
-from finger_pin.description.caching import memoised
 from finger_pin.description.parameters import Joint, Link, Tendon
 from finger_pin.description.recordings.series import Series, series
 from finger_pin.description.signals import SignalSettings
@@ -53,12 +52,10 @@ _POWERS = {"length": 1, "offset": 1, "width": 1, "centre_of_mass": 1, "mass": 3}
 _POWERS |= {"transverse_inertia": 5, "axial_inertia": 5}
 
 
-@memoised(lambda link, scale: (link, scale), most=1024)
 def _scaled_link(link: Link, scale: float) -> Link:
     return link.model_copy(update={key: getattr(link, key) * scale**power for key, power in _POWERS.items()})
 
 
-@memoised(lambda tendon, scale: (tendon, scale), most=1024)
 def _scaled_tendon(tendon: Tendon, scale: float) -> Tendon:
     crossings = {
         joint: crossing.updated(radius=crossing.radius * scale) for joint, crossing in tendon.crossings.items()
@@ -66,7 +63,6 @@ def _scaled_tendon(tendon: Tendon, scale: float) -> Tendon:
     return tendon.updated(crossings=crossings)
 
 
-@memoised(lambda joint, scale: (joint, scale), most=1024)
 def _scaled_joint(joint: Joint, scale: float) -> Joint:
     return joint.updated(link=joint.link and _scaled_link(joint.link, scale))
 
@@ -91,13 +87,11 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
     return finger.updated(**update)
 
 
-@memoised(lambda finger, tendon: (finger, tendon), most=1024)
 def tendon_of_hand(finger: str, tendon: Tendon) -> Tendon:
     """Return a tendon whose crossings are of the joints of a hand."""
     return tendon.updated(crossings={f"{finger}.{name}": each for name, each in tendon.crossings.items()})
 
 
-@memoised(lambda finger, actuator: (finger, actuator), most=1024)
 def actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
     """Return an actuator whose tendons are those of a hand."""
     return actuator.updated(tendons=tuple(f"{finger}.{tendon}" for tendon in actuator.tendons))
@@ -110,7 +104,6 @@ def joined_table(parts: Mapping[str, Any], group: str, table: type[_Table]) -> _
     return joined
 
 
-@memoised(lambda table, tables, kinds: (*tables, *kinds), most=1024)
 def _joined(table: Any, tables: Sequence[Any], kinds: list[tuple[str, ...]]) -> Any:
     return table.model_construct(**_lists(tables, kinds))
 

@@ -10,7 +10,6 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 from pydantic_core import PydanticCustomError
 
 from finger_pin.description.by_finger import error_of_finger, of_finger
-from finger_pin.description.caching import memoised
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.effects import CLOSED_LOOP, OF_SCENARIO, idle, shown
@@ -28,14 +27,6 @@ from finger_pin.typing import Array
 
 _Item = TypeVar("_Item")
 _OPEN = 'controller.kind = "tensions"'
-
-
-def _checked(scenario: Scenario) -> tuple[object, ...]:
-    """Return all of a scenario that is checked of its fingers: other friction, for one, is nothing to that."""
-    fingers, finger = () if scenario.hand is None else tuple(scenario.hand.fingers), scenario.finger
-    tables = finger.joints, finger.tendons, finger.actuators
-    named = (part for table in tables for part in (*table, *table.values(), None))
-    return (scenario.controller, scenario.reference, finger.tree, finger.passive_tendon, fingers, *named)
 
 
 class Scenario(Description):
@@ -131,7 +122,6 @@ class Scenario(Description):
                 if all(entry in each for each in found.values()):
                     raise problem(entry, says, shown(value))
 
-    @memoised(_checked)
     def _check_parts(self) -> None:
         """Refuse tables that do not fit each other, finger by finger."""
         for name, part in self.parts().items():
@@ -160,7 +150,11 @@ class Scenario(Description):
 
         Of a finger it is the scenario itself, under no name.
         """
-        return dict(self._parted())
+        if self.hand is None:
+            return {"": self}
+        if len(self.hand.fingers) == 1 and not (self.controller.fingers or self.environment.fingers):
+            return dict.fromkeys(self.hand.fingers, self)
+        return {name: self._part(name, alone) for name, alone in self.hand.parts().items()}
 
     def environments(self) -> dict[str, EnvironmentSettings]:
         """Return the environments of the fingers of a hand, by name; of a finger its own, under no name."""
@@ -168,14 +162,6 @@ class Scenario(Description):
         if self.hand is None:
             return {"": own}
         return {name: of_finger(own, name) if own.fingers else own for name in self.hand.fingers}
-
-    @memoised(lambda self: (self,))
-    def _parted(self) -> dict[str, Scenario]:
-        if self.hand is None:
-            return {"": self}
-        if len(self.hand.fingers) == 1 and not (self.controller.fingers or self.environment.fingers):
-            return dict.fromkeys(self.hand.fingers, self)
-        return {name: self._part(name, alone) for name, alone in self.hand.parts().items()}
 
     def _part(self, name: str, alone: HandSettings) -> Scenario:
         def own(table: Mapping[str, _Item]) -> dict[str, _Item]:

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription, HandSettings
-from finger_pin.description.objects import EnvironmentSettings, Object
+from finger_pin.description.objects import Object
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
@@ -29,11 +28,7 @@ class Embedded(NamedTuple):
 
 def scene_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the attributes of a result of a scenario from which `read_scene` reads."""
-    return _written(scenario.hand or scenario.finger, scenario.environment)
-
-
-@memoised(lambda own, around: (own, around), most=4)
-def _written(own: Description, around: EnvironmentSettings) -> dict[str, str]:
+    own, around = scenario.hand or scenario.finger, scenario.environment
     kind = "hand" if isinstance(own, HandSettings) else "finger"
     objects = {name: _plain(each) for name, each in (around.objects or {}).items()}
     return {kind: json.dumps(_plain(own)), "objects": json.dumps(objects)}

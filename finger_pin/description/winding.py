@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.parameters import Tendon, Winch
 from finger_pin.description.signals import SignalSettings
@@ -15,7 +14,6 @@ WINDINGS = {"spool_angle": "rad", "tendon_winding": "m", "motor_voltage": "V"}
 BY_SOURCE = ("tensions", *WINDINGS)
 
 
-@memoised(lambda finger, tendons: (finger, *tendons))
 def with_winches(finger: FingerDescription, tendons: Sequence[str]) -> FingerDescription:
     """Return a finger with an ideal winch at those of some tendons that have neither a winch nor a motor.
 

@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
@@ -78,7 +77,6 @@ def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> P
 
 
 # Many runs start alike.
-@memoised(lambda contacts, body, q: (contacts, body.topology, q.tobytes()))
 def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     """Refuse a configuration of shape (nq,) in which bodies are deep in each other.
 

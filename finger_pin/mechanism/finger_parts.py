@@ -1,13 +1,12 @@
-"""Parts of a finger and their tables of rows, remembered by what they depend on."""
+"""Parts of a finger and their tables of rows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Routing
@@ -51,11 +50,11 @@ class Parts(NamedTuple):
         routing = Routing.from_description(description)
         return cls(
             routing,
-            _tendons(description, routing),
-            _actuators(description, routing),
-            _joint_friction(description, routing),
-            _stroke_limiter(description),
-            _springs(description),
+            Tendons.from_description(description),
+            Actuators.from_description(description, routing),
+            JointFriction.from_description(description, routing.loads),
+            StrokeLimiter.from_description(description),
+            JointSprings.from_description(description),
         )
 
     @property
@@ -65,13 +64,12 @@ class Parts(NamedTuple):
 
     def hysteresis_rows(self) -> tuple[Rows, ...]:
         """Return the tables of the springs' hysteresis."""
-        return tuple(_made(self.springs.hysteresis_rows, self.routing.joints, self.width))
+        return tuple(self.springs.hysteresis_rows(self.routing.joints, self.width))
 
     def drives(self, description: FingerDescription, rows: Sequence[Rows]) -> tuple[Rows, ...]:
         """Return the tables that pull tendons: elastic ones, sources with an end, and those among further tables."""
-        sources = _sources(self.tendons, description, self.width)
-        elastic = _made(self.actuators.tendon_rows, self.width)
-        return (*elastic, *sources, *(table for table in rows if table.pulls))
+        sources = self.tendons.sources(description, self.width)
+        return (*self.actuators.tendon_rows(self.width), *sources, *(table for table in rows if table.pulls))
 
     def tables(
         self,
@@ -83,66 +81,18 @@ class Parts(NamedTuple):
     ) -> tuple[list[Rows], Canals]:
         """Return the tables of rows in the order of evaluation, and the canals."""
         joints, width = self.routing.joints, self.width
-        tendon_rows = _made(self.tendons.rows, drives, len(self.actuators.inertias))
+        tendon_rows = self.tendons.rows(drives, len(self.actuators.inertias))
         tendon_rows = [along_paths(description, paths, table) for table in tendon_rows]
         canals = Canals(description, paths, self.tendons, [*of_tree, *tendon_rows], drive_matrices, width)
-        pins = _pins(self, drives, drive_matrices, canals.loads)
         return [
             *of_tree,
             *tendon_rows,
             *canals.tables,
-            pins,
-            _made(self.stroke_limiter.rows, joints, width),
-            _made(self.springs.rows, joints, width),
-            *_made(self.actuators.rotor_rows, width),
+            self.joint_friction.rows(joints, drive_matrices, self.routing.actuated, width, canals.loads),
+            self.stroke_limiter.rows(joints, width),
+            self.springs.rows(joints, width),
+            *self.actuators.rotor_rows(width),
         ], canals
-
-
-# Most changes of numbers leave most parts, and most tables, as they were.
-@memoised(lambda make, *given: (make.__self__, make.__name__, *given), most=256)
-def _made(make: Any, *given: Any) -> Any:
-    """Return a method's result, remembered by its part and arguments."""
-    return make(*given)
-
-
-@memoised(lambda finger, routing: (routing, finger.tree, finger.tendon_friction, finger.passive_tendon))
-def _tendons(finger: FingerDescription, routing: Routing) -> Tendons:
-    return Tendons.from_description(finger)
-
-
-@memoised(lambda finger, routing: (routing, *finger.actuators, None, *finger.actuators.values()))
-def _actuators(finger: FingerDescription, routing: Routing) -> Actuators:
-    return Actuators.from_description(finger, routing)
-
-
-@memoised(lambda finger, routing: (routing, finger.tree, finger.joint_friction))
-def _joint_friction(finger: FingerDescription, routing: Routing) -> JointFriction:
-    return JointFriction.from_description(finger, routing.loads)
-
-
-@memoised(lambda finger: (finger.stroke_limiter, *finger.joints.values()))
-def _stroke_limiter(finger: FingerDescription) -> StrokeLimiter:
-    return StrokeLimiter.from_description(finger)
-
-
-@memoised(lambda finger: tuple(finger.joints.values()))
-def _springs(finger: FingerDescription) -> JointSprings:
-    return JointSprings.from_description(finger)
-
-
-@memoised(lambda tendons, finger, width: (tendons, width, *finger.tendons.values()))
-def _sources(tendons: Tendons, finger: FingerDescription, width: int) -> list[Rows]:
-    return tendons.sources(finger, width)
-
-
-def _wired(parts: Parts, drives: tuple[Rows, ...], _: object, loads: Mapping[str, Array]) -> tuple[object, ...]:
-    return (parts.joint_friction, *drives, parts.width, *loads, *(each.tobytes() for each in loads.values()))
-
-
-@memoised(_wired)
-def _pins(parts: Parts, drives: tuple[Rows, ...], drive_matrices: dict[str, Array], loads: Mapping[str, Array]) -> Rows:
-    routing = parts.routing
-    return parts.joint_friction.rows(routing.joints, drive_matrices, routing.actuated, parts.width, loads)
 
 
 def state_layout(
@@ -198,7 +148,7 @@ def state_layout(
         for block, sliding in (("position", "object_pose"), ("velocity", "object_velocity")):
             turning, along = BLOCKS[block].scale[0], BLOCKS[sliding].scale[0]
             scaled[block] = np.where(slides, along, turning).tolist()
-    return _same(Layout.of(labels, scaled))
+    return Layout.of(labels, scaled)
 
 
 def check_layout(layout: Layout, mechanism: Mechanism) -> None:
@@ -214,12 +164,6 @@ def check_layout(layout: Layout, mechanism: Mechanism) -> None:
     for block, end in zip(BLOCKS, np.cumsum(layout.sizes).tolist(), strict=True):
         if end != last.get(block, end) or (block in states and end not in table_ends):
             raise RuntimeError(f"state.{block} ends at {end}, which the {mechanism.size} numbers of the rows do not")
-
-
-# Of the same names and sizes much follows, once for all fingers.
-@memoised(lambda layout: (layout,))
-def _same(layout: Layout) -> Layout:
-    return layout
 
 
 def check_joints(body: RigidBody, description: FingerDescription) -> None:

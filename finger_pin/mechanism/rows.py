@@ -8,7 +8,6 @@ tables read them, whatever the order in which tables are listed.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -126,7 +125,6 @@ class Rows:
     powers: tuple[Energy, ...] = ()
     unit: str = ""
     pulls: tuple[str, ...] = ()
-    _structure = None
 
     def __post_init__(self) -> None:
         """Fill in defaults, and check the sizes."""
@@ -181,11 +179,6 @@ class Rows:
         """Whether paths through space belong to any row."""
         return any(self.paths)
 
-    @property
-    def structure(self) -> Rows:
-        """The table that this one differs from in parameters alone; itself unless made by `with_parameters`."""
-        return self._structure or self
-
     @cached_property
     def structure_key(self) -> tuple[Any, ...]:
         """Everything but the parameters of the law, to be compared by value."""
@@ -194,14 +187,6 @@ class Rows:
         weighted = [(*each, *(matrix.tobytes() for matrix in each.values())) for each in wiring]
         named = (self.group, self.law, self.paths, self.stored, self.powers)
         return (*named, *self.arm.shape, *weighted, *(each.tobytes() for each in arrays))
-
-    def with_parameters(self, parameters: Array) -> Rows:
-        """Return the same rows with other numbers of their law, shape (len(law.parameters), k)."""
-        if parameters.shape != self.parameters.shape:
-            raise InputError(f"rows.{self.group}.parameters", f"must have shape {self.parameters.shape}")
-        twin = copy.copy(self)
-        vars(twin).update(parameters=parameters, _structure=self.structure)
-        return twin
 
     def embed_coordinates(self, places: NDArray[np.int64], width: int) -> Rows:
         """Return the same rows with their coordinates at some places among more."""

@@ -31,7 +31,7 @@ from finger_pin.mechanism.solids import (
 )
 from finger_pin.mechanism.state import State
 from finger_pin.mechanism.tendon_paths import Placed
-from finger_pin.typing import Array, Indices
+from finger_pin.typing import Array
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6
@@ -66,11 +66,6 @@ def _touching(
     hand = description.hand
     pairs = hand and hand.fingers_touch, frozenset(pairs_within(description))
     return (topology, *pairs, width, *links, *shapes)
-
-
-@memoised(lambda structure, places, width: (structure, places.tobytes(), width), most=256)
-def _embedded(structure: Rows, places: Indices, width: int) -> Rows:
-    return structure.embed_coordinates(places, width)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,10 +160,7 @@ class Scene:
         joints, bodies, lumps = int(mechanism.body.model.nv), int(self.body.model.nv), len(mechanism.lumps)
         places = np.append(np.arange(joints), bodies + np.arange(lumps))
         width = bodies + lumps
-        rows = []
-        for table in mechanism.listed:
-            structure = _embedded(table.structure, places, width)
-            rows.append(structure if table.structure is table else structure.with_parameters(table.parameters))
+        rows = [table.embed_coordinates(places, width) for table in mechanism.listed]
         lumps_of = mechanism.lumps, mechanism.inertia
         prescribed = np.full(bodies + lumps, -1)
         prescribed[bodies - len(self.world) : bodies] = np.arange(len(self.world))

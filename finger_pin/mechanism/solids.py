@@ -208,7 +208,6 @@ def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm 
     return _weighing(_extended(body, moved, world), body, [objects[name] for name in moved])
 
 
-@memoised(lambda extended, body, moved: (extended, body, *((each.mass, each.inertia) for each in moved)))
 def _weighing(extended: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
     """Return an extended body with the inertias of the body itself, and those of objects that move."""
     # Any inertia that is too little to count will do for what moves on a path.

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.routing import Routing
@@ -214,35 +213,6 @@ class Tendons:
             drives: Motors that pull tendons in place of ideal sources.
             motors: Number of motors and of spools with play.
         """
-        if self.held:
-            return self._rows(drives, motors)
-        halves, *_, driven, passive = self._wired(drives, motors)
-        friction, taken, actuated = self._friction, driven.parameters[-1:], self.routing.actuated
-        return [
-            halves.with_parameters(np.repeat(self.half_stiffness, 2)[None]),
-            *drives,
-            driven.with_parameters(np.concatenate([friction[:, :actuated], taken])),
-            passive.with_parameters(friction[:, actuated:]),
-        ]
-
-    @memoised(lambda self, drives, motors: (self.routing, self.wraps, *(each.structure for each in drives), motors))
-    def _wired(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
-        return self._rows(drives, motors)
-
-    @property
-    def _friction(self) -> Array:
-        """The numbers of friction by those of its law, at the first place of every tendon, shape (f, t)."""
-        size = len(self.routing.tendons)
-        return self.at(range(size), [places[0] for places in self.wraps[:size]])
-
-    def at(self, tendons: Sequence[int], wraps: Sequence[Wrap]) -> Array:
-        """Return the numbers of friction, as in ``canals``, of some tendons at some of their places, shape (f, k)."""
-        found: Array = self.canals[:, tendons]
-        shared = [PASSIVE_FRICTION.parameters.index(name) for name in ("stiffness", "viscous", "drag")]
-        found[shared] *= [wrap.share for wrap in wraps]
-        return found
-
-    def _rows(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
         routing, joints = self.routing, len(self.routing.joints)
         actuated, passive = routing.actuated, routing.passive
         width = joints + passive + motors
@@ -291,6 +261,19 @@ class Tendons:
                 powers=LOSSES,
             ),
         ]
+
+    @property
+    def _friction(self) -> Array:
+        """The numbers of friction by those of its law, at the first place of every tendon, shape (f, t)."""
+        size = len(self.routing.tendons)
+        return self.at(range(size), [places[0] for places in self.wraps[:size]])
+
+    def at(self, tendons: Sequence[int], wraps: Sequence[Wrap]) -> Array:
+        """Return the numbers of friction, as in ``canals``, of some tendons at some of their places, shape (f, k)."""
+        found: Array = self.canals[:, tendons]
+        shared = [PASSIVE_FRICTION.parameters.index(name) for name in ("stiffness", "viscous", "drag")]
+        found[shared] *= [wrap.share for wrap in wraps]
+        return found
 
 
 def _places(routing: Routing, tendon: int, wraps: Sequence[Wrap]) -> list[tuple[Array, float, NDArray[np.bool_]]]:

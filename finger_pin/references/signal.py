@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.description.caching import cached_property, memoised
+from finger_pin.description.caching import cached_property
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.inputs import harmonic, harmonic_rate, quintic, quintic_curvature, quintic_rate
@@ -48,17 +48,6 @@ class Signal:
             settings: Of each signal.
             tolerance: Of their range, what dense samples may be missed by (`sample_fitting`).
         """
-        # Samples may be many, and would be kept.
-        sampled = any(each.kind == "samples" for each in settings)
-        return (cls._from_settings if sampled else cls._remembered)(settings, tolerance)
-
-    @classmethod
-    @memoised(lambda cls, settings, tolerance: tuple(settings))
-    def _remembered(cls, settings: Sequence[SignalSettings], tolerance: float) -> Signal:
-        return cls._from_settings(settings, tolerance)
-
-    @classmethod
-    def _from_settings(cls, settings: Sequence[SignalSettings], tolerance: float) -> Signal:
         harmonics = np.array([[each.offset, each.amplitude, each.frequency, each.phase] for each in settings])
         return cls(harmonics.reshape(-1, 4), *joined(polynomials(settings, tolerance)))
 

@@ -14,7 +14,6 @@ from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.stepping.trajectory import Trajectory
-from finger_pin.description.caching import memoised
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import (
@@ -24,7 +23,6 @@ from finger_pin.exceptions import (
     MicroDampingWarning,
     SelfLockingWarning,
 )
-from finger_pin.references.reference import LoopReference
 from finger_pin.simulation.accuracy import CHUNK, left_open, open_account, ringing, too_stiff
 from finger_pin.simulation.recording import RunArrays, check_memory, finite_part, only, record, refuse_unknown
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
@@ -133,12 +131,7 @@ def _margin(scenario: Scenario, loop: ClosedLoop, custom: str) -> float | None:
         return None
     if not loop.finger.routing.force_closure().holds:
         return None
-    return _quick_margin(scenario, loop.reference)
-
-
-@memoised(lambda scenario, reference: (scenario,))
-def _quick_margin(scenario: Scenario, reference: LoopReference) -> float:
-    return quick_margin(scenario, reference)
+    return quick_margin(scenario, loop.reference)
 
 
 def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:

@@ -14,7 +14,7 @@ from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import held_control
-from finger_pin.core.stepping.batch import batch_of
+from finger_pin.core.stepping.batch import BatchStepper
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.validation import suggestion
@@ -291,9 +291,7 @@ def step_many(
     acting = [one._checked(inputs, dt, own) for one, inputs, own in zip(simulators, tensions, forces, strict=True)]
     for simulator, (command, force) in zip(simulators, acting, strict=True):
         simulator._hold(command, force)
-    statuses = batch_of(simulators[0], [each._stepper for each in simulators]).advance(
-        [each.time + dt for each in simulators]
-    )
+    statuses = BatchStepper([each._stepper for each in simulators]).advance([each.time + dt for each in simulators])
     for simulator in simulators:
         simulator._log.add(simulator._stepper.time, simulator._tension, simulator._force)
     return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]

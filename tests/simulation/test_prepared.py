@@ -25,7 +25,7 @@ def numbers(table, above=()):
         key = (*above, name)
         if isinstance(value, dict):
             yield from numbers(value, key)
-        elif isinstance(value, float) or (isinstance(value, tuple) and isinstance(value[0], float)):
+        elif isinstance(value, float) or (isinstance(value, tuple) and value and isinstance(value[0], float)):
             yield ".".join(key), value
 
 

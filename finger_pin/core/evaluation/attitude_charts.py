@@ -16,7 +16,6 @@ from finger_pin.core.chains import ROTATION
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables import Tables
-from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 
@@ -130,7 +129,6 @@ class Charts:
     size: int
 
     @classmethod
-    @memoised(lambda cls, mechanism: (mechanism.body.topology, mechanism.coordinates, mechanism.state_count))
     def of(cls, mechanism: Mechanism) -> Charts:
         """Read a mechanism."""
         model, width = mechanism.body.model, mechanism.coordinates

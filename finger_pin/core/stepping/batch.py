@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
-from weakref import WeakKeyDictionary
 
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.threads import in_threads
@@ -28,10 +26,6 @@ class BatchStepper:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the steppers."""
         return BatchStepper, (self._steppers,)
 
-    def is_for(self, steppers: Sequence[Stepper]) -> bool:
-        """Return whether it was made for these steppers with these islands, loops and knots."""
-        return [part.ready() for stepper in steppers for part in stepper.parts] == self._ready
-
     def advance(self, ends: Sequence[float]) -> list[int]:
         """Advance each to a time, s, or not if that is `IDLE`; return the statuses of `advance`."""
         active = [index for index, owner in enumerate(self._owners) if ends[owner] != IDLE]
@@ -52,15 +46,3 @@ class BatchStepper:
                 row[:] = part.x
         else:
             out[:] = [stepper.x for stepper in self._steppers]
-
-
-# By who stepped them together: as a rule the same are stepped again.
-_LAST: WeakKeyDictionary[Any, BatchStepper] = WeakKeyDictionary()
-
-
-def batch_of(owner: Any, steppers: Sequence[Stepper]) -> BatchStepper:
-    """Return the batch of some steppers: that which an owner used last if it is the same, else a new one."""
-    found = _LAST.get(owner)
-    if found is None or not found.is_for(steppers):
-        found = _LAST[owner] = BatchStepper(steppers)
-    return found
