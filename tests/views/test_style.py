@@ -7,12 +7,15 @@ import sys
 import matplotlib
 import numpy as np
 import pytest
+import xarray as xr
 from made_up import synthetic
 from matplotlib.colors import to_rgb
 from matplotlib.figure import SubFigure
 from matplotlib.transforms import Bbox
 from paper.plot_friction_law import plot_friction_law
 
+import finger_pin as fp
+from finger_pin.analysis import self_locking_map
 from finger_pin.exceptions import InputError
 from finger_pin.views import plots
 from finger_pin.views.plots.style import BLUE, COLOURS, GREEN, PURPLE, VERMILLION
@@ -84,6 +87,7 @@ def nothing_overlaps(figure):
     figure.draw_without_rendering()
     boxes = [axes.get_tightbbox() for axes in figure.axes]
     boxes += [legend.get_window_extent() for part in figure.findobj(SubFigure) for legend in part.legends]
+    boxes += [figure._suptitle.get_window_extent()] if figure.get_suptitle() else []
     for box in boxes:
         assert figure.bbox.padded(1.0).count_contains([box.min, box.max]) == 2
     for first, second in itertools.combinations(boxes, 2):
@@ -101,6 +105,64 @@ def test_nothing_overlaps_and_nothing_is_cut_off_at_any_width_and_after_enlargin
     for factor in (1.0, 1.4):
         figure.set_size_inches(factor * figure.get_size_inches())
         nothing_overlaps(figure)
+
+
+def touched(**options):
+    """A figure of contacts and objects with long names."""
+    time, names = np.linspace(0.0, 1.0, 11), [f"middle.abduction-cylinder.{index}" for index in range(4)]
+    force = np.outer(np.sin(np.pi * time), np.arange(1.0, 5.0))
+    signals = {"normal_force": force, "friction": 0.4 * force, "level": 0.8 * force, "slip": 0.0 * force}
+    data = {f"contact_{name}": (("time", "contact"), values) for name, values in signals.items()}
+    data["object_position"] = ("time", "object", "axis"), np.random.default_rng(0).normal(size=(11, 2, 3))
+    coordinates = {"time": time, "contact": names, "object": ["marble", "cylinder"], "axis": list("xyz")}
+    return plots.plot_contact(xr.Dataset(data, coordinates), **options)
+
+
+def swept(**options):
+    """A figure of the metrics whose names are longest."""
+    metrics = sorted(fp.studies.METRICS.values(), key=lambda metric: len(metric.long_name))[-4:]
+    data = {
+        m.name: ("controller.gain", 0.1 * np.arange(3.0), {"units": "N", "long_name": m.long_name}) for m in metrics
+    }
+    data |= {"status": ("controller.gain", ["done"] * 3), "reason": ("controller.gain", [""] * 3)}
+    return plots.plot_sweep(xr.Dataset(data, {"controller.gain": [1.0, 2.0, 3.0]}), **options)
+
+
+def identified(**options):
+    """A figure of two signals, one over time."""
+    time = np.tile(np.arange(5.0), 2)
+    data = {name: ("reading", np.sin(time)) for name in ("measured", "residual")}
+    data |= {"applied": ("reading", np.full(10, np.nan)), "instant": ("reading", time)}
+    data |= {"signal_index": ("reading", np.repeat([0, 1], 5)), "signal_steady": ("signal", [True, False])}
+    data |= {"signal_units": ("signal", ["N", "rad"]), "noise": ("signal", [0.1, 0.2])}
+    names = ["pull.tendon_tension.flexor_profundus", "swing.joint_position.medial"]
+    return plots.plot_identification(xr.Dataset(data, {"signal": names}), **options)
+
+
+def compared(**options):
+    labels = ("as it is, with all frictions", "without the friction of the tendons")
+    return plots.compare(synthetic(), synthetic(seed=1), labels, **options)
+
+
+def mapped(**options):
+    bent = fp.load_finger("ub_stand_in", {"finger.tendons.T5.crossings.distal.bends": True})
+    return plots.plot_self_locking_map(self_locking_map(fp.Finger(bent), samples=3), **options)
+
+
+def sensitivity(**options):
+    finger = fp.Finger(fp.load_finger("ub_stand_in"))
+    return plots.plot_radius_sensitivity(finger, (0.1, 0.5, 0.6, 0.42), (0.3, 0.2, 0.8), **options)
+
+
+def critical(**options):
+    return plots.plot_critical_friction("ub_stand_in", **options)
+
+
+# Two panels of a sweep stand side by side from 5.71 in on, and there as close to each other as ever.
+@pytest.mark.parametrize("width", ["column", 5.75])
+@pytest.mark.parametrize("draw", [touched, swept, identified, compared, mapped, sensitivity, critical])
+def test_long_names_are_broken_before_they_meet_or_leave_the_figure(draw, width):
+    nothing_overlaps(draw(width=width))
 
 
 def test_a_width_that_is_none_is_refused():

@@ -77,13 +77,13 @@ def touching(result: xr.Dataset) -> list[str]:
 
 def _right(part: SubFigure, below: list[str]) -> tuple[Axes, list[Axes]]:
     """Return the panel of the cone, and panels over time below it."""
-    rows = part.add_gridspec(1 + len(below), 1, height_ratios=[1.8, *(1.0 for _ in below)])
-    cone, first = part.add_subplot(rows[0]), part.add_subplot(rows[1])
-    others = [first, *(part.add_subplot(rows[2 + index], sharex=first) for index in range(len(below) - 1))]
+    cone, *others = part.subplots(1 + len(below), 1, height_ratios=[1.8, *(1.0 for _ in below)])
     for axes, label in zip(others, below, strict=True):
         axes.set_ylabel(label)
         axes.margins(x=0.0)
-        axes.tick_params(labelbottom=axes is others[-1])
+        axes.label_outer()
+    for axes in others[:-1]:
+        axes.sharex(others[-1])
     others[-1].set_xlabel("time (s)")
     return cone, others
 

@@ -93,7 +93,7 @@ def plot_radius_sensitivity(
     axes.invert_yaxis()
     axes.axvline(0.0, color=colour(GREY), linewidth=thin(0.6))
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel("change of the largest tension with the signed radius (N/mm)")
+    axes.set_xlabel("change of the largest tension with the signed radius (N/mm)", wrap=True)
     along = ", ".join(f"{each:.3g}" for each in force)
     title(axes, f"largest tension {needed.largest:.3g} N for the force ({along}) N")
     return figure

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import trace
-from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
+from finger_pin.views.plots.panels import grid, title
+from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, Width, styled
 from finger_pin.views.units import shown_unit
 
 #: Rise of minus twice the likelihood at the ends of a 95 % interval.
@@ -19,16 +20,17 @@ _LEVEL = 3.841
 
 
 @styled
-def plot_identification(result: xr.Dataset) -> Figure:
+def plot_identification(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw every signal as measured and computed with its residuals, a row each, over load or over time.
 
     Args:
         result: Dataset of `identify`.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     signals = result["signal"].values
-    figure = new_figure(8.6, 2.6 * len(signals) + 0.3, "constrained")
-    grid = figure.subplots(len(signals), 2, squeeze=False, width_ratios=[3, 2])
-    for k, (met, left) in enumerate(grid):
+    figure, panels = grid(2 * len(signals), 2, (4.3, 2.6), width, titles)
+    for k, (met, left) in enumerate(zip(panels[::2], panels[1::2], strict=True)):
         of_signal = result["signal_index"].values == k
         measured, residual, load, instant = (
             result[name].values[of_signal] for name in ("measured", "residual", "applied", "instant")
@@ -47,22 +49,25 @@ def plot_identification(result: xr.Dataset) -> Figure:
             trace(met, over, measured - residual, color=VERMILLION, label="computed", linewidth=1.0)
             trace(left, over, residual, color=BLUE, linewidth=0.8)
         left.axhline(0.0, color=GREY, linewidth=0.8)
-        met.set(title=str(signals[k]), xlabel=label, ylabel=f"({unit})" if unit else "")
-        left.set(title=f"left over, rms {factor * result['noise'].values[k]:.3g} {unit}", xlabel=label)
-    grid[0, 0].legend(loc="best")
+        met.set(xlabel=label, ylabel=f"({unit})" if unit else "")
+        left.set(xlabel=label)
+        title(met, str(signals[k]))
+        title(left, f"left over, rms {factor * result['noise'].values[k]:.3g} {unit}")
+    panels[0].legend(loc="best")
     return figure
 
 
 @styled
-def plot_predictions(result: xr.Dataset) -> Figure:
+def plot_predictions(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw what was measured over what was predicted of every signal that was held out, with the band of 95 %.
 
     Args:
         result: Dataset of `identify` or `predict`.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     names = result["prediction"].values
-    figure = new_figure(8.6, 2.6 * len(names) + 0.3, "constrained")
-    panels = figure.subplots(len(names), 1, squeeze=False).ravel()
+    figure, panels = grid(len(names), 1, (8.6, 2.6), width, titles)
     for k, axes in enumerate(panels):
         of_signal = result["predicted_index"].values == k
         instant, load, measured, value, band = (
@@ -84,7 +89,8 @@ def plot_predictions(result: xr.Dataset) -> Figure:
             trace(axes, over, value, color=VERMILLION, label="predicted, 95 %", linewidth=1.0)
         rms = f"rms {factor * result['prediction_rms'].values[k]:.3g} {unit}"
         label = "load (N)" if by_load else "reading" if steady else "time (s)"
-        axes.set(title=f"{names[k]}, held out, {rms}", xlabel=label, ylabel=f"({unit})" if unit else "")
+        axes.set(xlabel=label, ylabel=f"({unit})" if unit else "")
+        title(axes, f"{names[k]}, held out, {rms}")
     panels[0].legend(loc="best")
     return figure
 
@@ -101,20 +107,17 @@ def _computed(axes: Axes, over: Array, computed: Array) -> None:
 
 
 @styled
-def plot_profiles(result: xr.Dataset) -> Figure:
+def plot_profiles(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw the profile of every parameter: the misfit of the recordings with it held at other values.
 
     Args:
         result: Dataset of `identify`.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     names = result["parameter"].values
-    columns = 2 if len(names) == 4 else min(len(names), 3)
-    rows = -(-len(names) // columns)
-    figure = new_figure(2.9 * columns + 0.4, 2.5 * rows + 0.2, "constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for spare in panels[len(names) :]:
-        spare.remove()
-    for k, axes in enumerate(panels[: len(names)]):
+    figure, panels = grid(len(names), 2 if len(names) == 4 else 3, (3.0, 2.5), width, titles)
+    for k, axes in enumerate(panels):
         _profile(axes, result.isel(parameter=k))
     return figure
 
@@ -135,7 +138,7 @@ def _profile(axes: Axes, one: xr.Dataset) -> None:
         if math.isfinite(end):
             axes.axvline(end, color=GREY, linewidth=0.8)
     axes.plot([estimate], [0.0], "o", color=VERMILLION, markersize=5.0)
-    axes.set_title(short_name(str(one["parameter"].values)), color=BLACK)
+    title(axes, short_name(str(one["parameter"].values)))
     axes.locator_params(axis="x", nbins=3)
     axes.set(xlabel="" if unit == "1" else f"({unit})", ylim=(-0.3, max(8.0, 1.2 * _LEVEL)))
 

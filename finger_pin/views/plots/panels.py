@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import textwrap
 from collections.abc import Sequence
 
@@ -12,18 +11,15 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.font_manager import FontProperties
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from finger_pin.typing import Array
 from finger_pin.views.plots.style import Width, inches, new_figure, power_of_ten, settings
 
-# Parts are drawn at this share of their own width before they go below each other.
+# Panels are drawn at this share of their width before they go below each other.
 _NARROWEST = 0.62
 # Of the heights of panels, where a figure is for a journal.
 _LOWER = 0.82
-# Mean width of a letter, in parts of the size of the text, and inches of a legend's entry besides its text.
-_LETTER, _HANDLE = 0.5, 0.45
 
 # Most letters in a line of a strip's label.
 _LINE = 13
@@ -48,14 +44,11 @@ def sheet(
         width: Of the figure; default the parts' own.
         titles: Whether panels have titles.
     """
-    found = inches(width)
-    whole = found or sum(each for each, _ in parts)
-    rows: list[list[tuple[float, float]]] = [[]]
-    for part in parts:
-        if rows[-1] and _NARROWEST * (sum(each for each, _ in rows[-1]) + part[0]) > whole:
-            rows.append([])
-        rows[-1].append(part)
-    heights = [(1.0 if found is None else _LOWER) * max(height for _, height in row) for row in rows]
+    chosen = inches(width)
+    whole = chosen or sum(w for w, _ in parts)
+    across = _across(chosen, len(parts), sum(w for w, _ in parts) / len(parts))
+    rows = [parts[k : k + across] for k in range(0, len(parts), across)]
+    heights = [(1.0 if chosen is None else _LOWER) * max(height for _, height in row) for row in rows]
     figure = new_figure(whole, sum(heights), titles=titles)
     bands = figure.subfigures(len(rows), 1, squeeze=False, height_ratios=heights)[:, 0]
     pairs = zip(bands, rows, strict=True)
@@ -76,17 +69,20 @@ def grid(
         titles: Whether panels have titles.
         sharex: Whether the panels share their horizontal axis.
     """
-    found = inches(width)
-    across = min(columns, count)
-    if found is not None:
-        across = max(1, min(across, int(found / (_NARROWEST * cell[0]))))
+    chosen = inches(width)
+    across = _across(chosen, min(columns, count), cell[0])
     down = -(-count // across)
-    height = cell[1] * (1.0 if found is None else min(1.0, max(_NARROWEST, found / across / cell[0])))
-    figure = new_figure(found or cell[0] * across, height * down, titles=titles)
+    height = cell[1] * (1.0 if chosen is None else min(1.0, max(_NARROWEST, chosen / across / cell[0])))
+    figure = new_figure(chosen or cell[0] * across, height * down, titles=titles)
     panels = list(figure.subplots(down, across, squeeze=False, sharex=sharex).ravel())
     for spare in panels[count:]:
         spare.remove()
     return figure, panels[:count]
+
+
+def _across(whole: float | None, count: int, each: float) -> int:
+    """Return how many panels of a width fit side by side into a figure, in; at least one."""
+    return count if whole is None else max(1, min(count, int(whole / (_NARROWEST * each))))
 
 
 def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[float] | None = None) -> list[Axes]:
@@ -97,8 +93,7 @@ def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[flo
         labels: Label of every panel's vertical axis, from the top.
         heights: Relative heights of the panels; equal by default.
     """
-    ratios = {"height_ratios": heights} if heights else {}
-    panels: list[Axes] = list(part.subplots(len(labels), 1, sharex=True, squeeze=False, gridspec_kw=ratios)[:, 0])
+    panels: list[Axes] = list(part.subplots(len(labels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
     for axes, label in zip(panels, labels, strict=True):
         axes.set_ylabel(label)
         axes.yaxis.set_major_locator(MaxNLocator(4, steps=_FEW) if len(labels) > 2 else MaxNLocator(7, steps=_MANY))
@@ -110,33 +105,16 @@ def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[flo
 
 
 def title(axes: Axes, text: str) -> None:
-    """Write a title, unless the figure has none."""
+    """Write a title, broken at the edge of the part of the figure, unless the figure has none."""
     if getattr(axes.get_figure(root=True), "titled", True):
-        spot, part = axes.get_subplotspec(), axes.get_figure()
-        assert part is not None
-        width = part.bbox.width / part.dpi / (1 if spot is None else spot.get_gridspec().ncols)
-        points = _points("axes.titlesize")
-        # Left of the panel are the labels of ticks and of the axis, of two lines at most; letters of titles are wide.
-        written = _wrap(text, min(0.86 * width, width - 8.0 * points / 72.0), points)
         # Panels in three dimensions do not look up the place.
-        axes.set_title(written, loc=settings["axes.titlelocation"])
+        axes.set_title(text, loc=settings["axes.titlelocation"], wrap=True)
 
 
 def heading(figure: Figure, text: str) -> None:
     """Write a title of a whole figure, unless it has none."""
     if getattr(figure, "titled", True):
-        figure.suptitle(_wrap(text, 0.92 * figure.get_figwidth(), _points("figure.titlesize")), x=0.02, ha="left")
-
-
-def _wrap(text: str, width: float, points: float) -> str:
-    """Return a text in lines that fit into a width, in, in letters of a size."""
-    letters = max(12, int(72.0 * width / (_LETTER * points)))
-    return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.splitlines())
-
-
-def _points(setting: str) -> float:
-    """Return a size of text in points."""
-    return float(FontProperties(size=settings[setting]).get_size_in_points())
+        figure.suptitle(text, x=0.02, ha="left", wrap=True)
 
 
 def flatten_rounding(axes: Axes) -> None:
@@ -156,35 +134,30 @@ def cut_spikes(axes: Axes, *signals: Array) -> None:
 def legend(part: Figure | SubFigure, handles: Sequence[Artist]) -> None:
     """Write a legend below a part, in as many columns as its width holds, if there is anything to name."""
     if handles:
-        longest = max(len(str(each.get_label())) for each in handles)
-        entry = _HANDLE + _LETTER * _points("legend.fontsize") * longest / 72.0
-        rows = -(-len(handles) // max(1, int(part.bbox.width / part.dpi / entry)))
+        # With the paddings of the style sheet, n columns are at most n times as wide as one.
+        single = part.legend(handles=handles)
+        rows = -(-len(handles) // max(1, int(part.bbox.width / single.get_window_extent().width)))
+        single.remove()
         # As many columns as the rows need: the last one is no stump.
-        columns = -(-len(handles) // rows)
-        part.legend(handles=handles, ncols=columns, frameon=False, loc="outside lower center", columnspacing=1.2,
-                    handletextpad=0.5, borderaxespad=0.2)  # fmt: skip
+        part.legend(handles=handles, ncols=-(-len(handles) // rows), loc="outside lower center")
 
 
 def logarithmic(axes: Axes) -> None:
     """Give the vertical axis a logarithmic scale with powers of ten in plain text."""
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(round(math.log10(value)))))
+    axes.yaxis.set_major_formatter(lambda value, _: power_of_ten(round(math.log10(value))))
     axes.yaxis.set_minor_locator(NullLocator())
 
 
 def plain(axis: Axis) -> None:
     """Write 1, 2 and 5 times powers of ten as they are along a logarithmic axis."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_major_formatter("{x:g}")
     axis.set_minor_locator(NullLocator())
 
 
 def labelled(name: str, unit: str | None) -> str:
     """Return the label of a strip: its name and unit if any, on several lines if long."""
     whole = name if unit is None else " ".join([name, f"({unit})".replace(" ", "\N{NO-BREAK SPACE}")])
-    lines = [""]
-    for piece in re.split(r"(?<=[-. ])", whole):
-        if lines[-1] and len((lines[-1] + piece).rstrip()) > _LINE:
-            lines.append("")
-        lines[-1] += piece
-    return "\n".join(line.rstrip(" ") for line in lines)
+    lines = textwrap.wrap(whole.replace(".", ". "), _LINE, break_long_words=False)
+    return "\n".join(lines).replace(". ", ".")

@@ -42,7 +42,7 @@ def plot_critical_friction(finger: FingerLike, *, width: Width = None, titles: b
     axes.invert_yaxis()
     axes.margins(x=0.15)
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel("joint friction at which it locks, worst direction (mm)")
+    axes.set_xlabel("joint friction at which it locks, worst direction (mm)", wrap=True)
     axes.legend(loc="lower right")
     return figure
 

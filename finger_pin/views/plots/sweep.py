@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ _MAP = "cividis"
 _WIDE = 50.0
 # Look of a run among many.
 _RUNS: Any = {"markersize": 3.5, "alpha": 0.6, "markeredgewidth": 0.0}
+# Most letters in a line of a panel's title.
+_LETTERS = 36
 # Most ticks along an axis of a map.
 _TICKS = 7
 # Parts of a key that a label does not need.
@@ -168,7 +171,7 @@ def _panels(
     figure, places = grid(len(names), columns, (max(cell[0], 6.5 / columns), cell[1]), width, titles, sharex=True)
     panels = dict(zip(names, places, strict=True))
     for name, axes in panels.items():
-        title(axes, str(result[name].attrs["long_name"]))
+        title(axes, textwrap.fill(str(result[name].attrs["long_name"]), _LETTERS))
     return figure, panels
 
 
