@@ -116,6 +116,7 @@ class _Reader:
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self._bodies()
         actuators, pulled = self.actuators.table(), self.actuators.pulled()
+        taken = {*tendons, *pulled}
         couplings, loops, differences = read_equalities(self._read)
         joints, moving, loss = self._joints()
         stops = [stop_stiffness(self._read, name) for name in joints]
@@ -133,7 +134,7 @@ class _Reader:
             "tree": {
                 "bodies": self._still() | {self.names.bodies[i]: self._body(i) for i in bodies},
                 "joints": moving,
-                "tendons": tendons | {free_name(name, tendons): each for name, each in differences.items()},
+                "tendons": tendons | {free_name(name, taken, "equality"): each for name, each in differences.items()},
                 "couplings": couplings,
                 "loops": loops,
                 "actuators": actuators,

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from finger_pin.description.caching import cached_property
 from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.description.tree_actuators import Muscle
-from finger_pin.exchange.mujoco_names import Table
+from finger_pin.exchange.mujoco_names import Table, free_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
 from finger_pin.typing import Array
 
@@ -75,7 +75,7 @@ class ActuatorReader(ElementReader):
         for i in sorted(self.laws, key=self.pulling.__contains__):
             value = float(controls[self._control(i)])
             pulls = -float(self.model.actuator_gear[i, 0]) * self.laws[i].get("gain", 0.0)
-            found[self.names.actuators[i]] = value * pulls if i in self.pulling else value
+            found[self._name(i)] = value * pulls if i in self.pulling else value
         return found
 
     def _leave_out(self, i: int, why: str) -> None:
@@ -85,9 +85,17 @@ class ActuatorReader(ElementReader):
         """Return the tendons that motors pull, by the names of these."""
         found = {}
         for i in self.pulling:
-            route = self._route(int(self.model.actuator_trnid[i, 0]))
-            found[self.names.actuators[i]] = route | {"maximum_tension": float(max(self._ends(i)))}
+            name, tendon = self._name(i), int(self.model.actuator_trnid[i, 0])
+            same = name == self.names.tendons[tendon]
+            found[name] = self._route(tendon, same) | {"maximum_tension": float(max(self._ends(i)))}
         return found
+
+    def _name(self, i: int) -> str:
+        """Return the name of an actuator; that of a motor which pulls is of no other tendon than its own."""
+        name, tendons = self.names.actuators[i], self.names.tendons
+        if i not in self.pulling or name == tendons[self.model.actuator_trnid[i, 0]]:
+            return name
+        return name if name not in tendons else free_name(name, {*self.names.actuators, *tendons}, "motor")
 
     def _ends(self, i: int) -> Array:
         """Return the tensions of a motor at both ends of its control's range, within its limits, shape (2,), N."""
@@ -139,10 +147,10 @@ class ActuatorReader(ElementReader):
         of_tendon = self.model.actuator_trntype[i] == self.mujoco.mjtTrn.mjTRN_TENDON
         return "tendon" if of_tendon else "joint", int(self.model.actuator_trnid[i, 0])
 
-    def _route(self, tendon: int) -> Table:
-        """Return the path of a tendon, or the joints that it crosses and that bend it."""
+    def _route(self, tendon: int, same: bool) -> Table:
+        """Return the path of a tendon, or of one that has another name the joints that it crosses and that bend it."""
         around = self._around(tendon)
-        if not around:
+        if same or not around:
             return {"along": self.names.tendons[tendon]}
         return {"crossings": {self.names.joints[j]: {"radius": -arm, "bends": True} for j, arm in around.items()}}
 

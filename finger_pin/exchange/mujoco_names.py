@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,6 +69,6 @@ def distinct(what: str, given: list[str]) -> list[str]:
     return found
 
 
-def free_name(name: str, taken: Table) -> str:
-    """Return a name that is not taken."""
-    return free_name(f"{name}_equality", taken) if name in taken else name
+def free_name(name: str, taken: Container[str], what: str) -> str:
+    """Return a name that is not taken, with what has it after its own name if need be."""
+    return free_name(f"{name}_{what}", taken, what) if name in taken else name

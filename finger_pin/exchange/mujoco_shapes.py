@@ -9,7 +9,7 @@ import numpy as np
 from finger_pin.description.objects import Object
 from finger_pin.description.surface import Surface
 from finger_pin.exchange.mujoco_compliance import soft_spring
-from finger_pin.exchange.mujoco_names import Table, quaternion
+from finger_pin.exchange.mujoco_names import Table, free_name, quaternion
 from finger_pin.exchange.mujoco_pairs import Pairs
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.mechanism.tendon_paths import rotation
@@ -132,7 +132,7 @@ class Shapes:
         taken = {*self.names.joints, *(self.names.geoms[i] for i in shapes)}
         for i in self._colliding:
             if self._is_plane(i) and any(i in pair for pair in self._met) and not self._dropped(i):
-                self._placed_at[i] = _free_name(self.names.geoms[i], taken)
+                self._placed_at[i] = free_name(self.names.geoms[i], taken, "object")
                 found[self._placed_at[i]] = self._shape(i) | self._placed(data, i)
         for body in loose:
             name, own = self.names.bodies[body], [i for i in self._colliding if model.geom_bodyid[i] == body]
@@ -142,7 +142,7 @@ class Shapes:
                 (i,) = own
                 if np.linalg.norm(model.geom_pos[i] - model.body_ipos[body]) > 1e-3 * model.geom_rbound[i]:
                     self.rest.add(f"free body {name}: its mass centre is not its shape's")
-                self._placed_at[i] = _free_name(name, taken | {*found})
+                self._placed_at[i] = free_name(name, taken | {*found}, "object")
                 moving = {"mass": float(model.body_mass[body]), **self._velocity(data, i)}
                 found[self._placed_at[i]] = self._shape(i) | self._placed(data, i) | moving
                 self._list_free(body, i, found[self._placed_at[i]])
@@ -213,8 +213,3 @@ class Shapes:
             ]
             objects[name] |= {"apart": apart} if apart else {}
             others[i] = name
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    """Return a name for an object that nothing else has."""
-    return _free_name(f"{name}_object", taken) if name in taken else name

@@ -195,6 +195,22 @@ def test_names_of_actuators_are_their_own_and_controls_find_them():
     assert set(silent.tree.keyframes["reference"].inputs.values()) == {0.0}
 
 
+def test_motors_may_be_called_as_the_tendon_that_they_pull_or_as_another():
+    """Names of tendons and of actuators are apart in MuJoCo; what is pulled has the same arms by any name."""
+    body = '<body><joint name="j" axis="0 1 0"/><geom size=".1" mass="1"/></body>'
+    tendon = '<fixed name="%s"><joint joint="j" coef="%g"/></fixed>'
+    tendons = "".join(tendon % each for each in (("t", -0.01), ("s", 0.02)))
+    motor = '<motor name="%s" tendon="%s" gear="-1" ctrlrange="0 10"/>'
+    crossed = ["s_motor", "t_motor"]
+    for first, second, names in (("t", "s", ["t", "s"]), ("a", "b", ["a", "b"]), ("s", "t", crossed)):
+        motors = motor % (first, "t") + motor % (second, "s")
+        text = f"<mujoco><worldbody>{body}</worldbody><tendon>{tendons}</tendon><actuator>{motors}</actuator>"
+        found = fp.from_mujoco(mujoco.MjModel.from_xml_string(f'{text}<keyframe><key ctrl="4 3"/></keyframe></mujoco>'))
+        assert list(found.tendons) == names
+        assert found.tree.keyframes["keyframe_0"].inputs == dict(zip(names, (4.0, 3.0), strict=True))
+        np.testing.assert_allclose(fp.Finger(found).coupling[:, 0], [0.01, -0.02])
+
+
 CROWD = """<mujoco><worldbody>
 <geom name="floor" type="plane" size="1 1 .1" pos="0 0 -.01" priority="PRIORITY" friction=".3"/>
 <body name="a" pos="0 0 .3"><joint name="j" type="slide"/><geom name="pad" size=".02" mass=".1" friction="1.2"/></body>
