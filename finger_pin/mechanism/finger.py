@@ -11,18 +11,15 @@ import pinocchio as pin
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
+from finger_pin.mechanism.assembly import ConstructorArgs, Parts, assemble, check_joints
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
-from finger_pin.mechanism.finger_parts import ConstructorArgs, Parts, check_joints, check_layout, state_layout
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
-from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
-from finger_pin.mechanism.scene import Scene
 from finger_pin.mechanism.state import Motion, as_floats
 from finger_pin.mechanism.tendon_paths import Excursions
-from finger_pin.mechanism.tree import build_body, tree_rows
-from finger_pin.mechanism.wiring import replaced
+from finger_pin.mechanism.tree import build_body
 from finger_pin.typing import Array
 
 
@@ -81,33 +78,8 @@ class Finger:
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self._excursions = Excursions(self.routing, description, self.paths)
         self.visuals: pin.GeometryModel | None = None
-        of_tree = tree_rows(description, self.paths, parts.width)
-        # What pulls tendons comes before their friction.
-        before = tuple(table for table in of_tree if table.group != "tendon_dry_friction")
-        drives = parts.drives(description, rows)
-        self.drive_matrices = self.tendons.drive_matrices(drives)
-        built, canals = parts.tables(description, self.paths, before, drives, self.drive_matrices)
-        last = (*parts.hysteresis_rows(), *(table for table in of_tree if table not in before), *rows)
-        self.wraps = canals.wraps
-        self.extra_rows = (*before, *canals.tables, *last)
-        mechanism = Mechanism(
-            self.rigid_body,
-            replaced([*built, *(table for table in last if not table.pulls)], self.constructor_args.tables),
-            (
-                *self.routing.passive_names,
-                *(f"{name}.spool" for name in self.actuators.loose_names),
-                *self.actuators.names,
-            ),
-            np.concatenate([self.tendons.mass, self.actuators.inertias]),
-            # Also where a tendon's input goes nowhere: the second one of a spool has none.
-            self.routing.actuated,
-            moved=description.hand is not None and description.hand.palm.path is not None,
-        )
-        self.scene = Scene.around(mechanism, objects, description, self.paths.placed)
-        self.mechanism = mechanism if self.scene is None else self.scene.joined(mechanism)
-        layers = self.tendons, self.joint_friction, self.actuators
-        self.layout = state_layout(*layers, last, self.scene, before, canals.tables, self.rigid_body.slides)
-        check_layout(self.layout, self.mechanism)
+        assembly = assemble(description, self.rigid_body, self.paths, parts, self.constructor_args)
+        self.mechanism, self.scene, self.layout, self.drive_matrices, self.wraps, self.extra_rows = assembly
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.mechanism.finger_parts import check_layout
+from finger_pin.mechanism.assembly import check_layout
 from finger_pin.mechanism.state import BLOCKS, Layout, State
 
 

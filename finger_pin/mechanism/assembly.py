@@ -1,4 +1,4 @@
-"""Parts of a finger and their tables of rows."""
+"""The parts of a finger, assembled: its rows, their order, and the layout of its state."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from finger_pin.mechanism.scene import Scene
 from finger_pin.mechanism.state import BLOCKS, Layout
 from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.tree import along_paths
+from finger_pin.mechanism.tree import along_paths, tree_rows
+from finger_pin.mechanism.wiring import replaced
 from finger_pin.typing import Array
 
 
@@ -62,52 +63,93 @@ class Parts(NamedTuple):
         """Number of coordinates: joints, masses of passive tendons, spools with play, motors."""
         return len(self.routing.joints) + self.routing.passive + len(self.actuators.inertias)
 
-    def hysteresis_rows(self) -> tuple[Rows, ...]:
-        """Return the tables of the springs' hysteresis."""
-        return tuple(self.springs.hysteresis_rows(self.routing.joints, self.width))
 
-    def drives(self, description: FingerDescription, rows: Sequence[Rows]) -> tuple[Rows, ...]:
-        """Return the tables that pull tendons: elastic ones, sources with an end, and those among further tables."""
-        sources = self.tendons.sources(description, self.width)
-        return (*self.actuators.tendon_rows(self.width), *sources, *(table for table in rows if table.pulls))
+class Assembly(NamedTuple):
+    """A description as coordinates and rows.
 
-    def tables(
-        self,
-        description: FingerDescription,
-        paths: TendonPaths,
-        of_tree: tuple[Rows, ...],
-        drives: tuple[Rows, ...],
-        drive_matrices: dict[str, Array],
-    ) -> tuple[list[Rows], Canals]:
-        """Return the tables of rows in the order of evaluation, and the canals."""
-        joints, width = self.routing.joints, self.width
-        tendon_rows = self.tendons.rows(drives, len(self.actuators.inertias))
-        tendon_rows = [along_paths(description, paths, table) for table in tendon_rows]
-        canals = Canals(description, paths, self.tendons, [*of_tree, *tendon_rows], drive_matrices, width)
-        return [
-            *of_tree,
-            *tendon_rows,
-            *canals.tables,
-            self.joint_friction.rows(joints, drive_matrices, self.routing.actuated, width, canals.loads),
-            self.stroke_limiter.rows(joints, width),
-            self.springs.rows(joints, width),
-            *self.actuators.rotor_rows(width),
-        ], canals
+    Attributes:
+        mechanism: All rows, with those of the scene.
+        scene: Objects and contacts; None without any.
+        layout: Order and sizes of the packed state.
+        drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
+        wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
+        extra_rows: Tables beside the paper's: those of a tree, canals, hysteresis, and rows of the user's own.
+    """
+
+    mechanism: Mechanism
+    scene: Scene | None
+    layout: Layout
+    drive_matrices: dict[str, Array]
+    wraps: dict[str, Array]
+    extra_rows: tuple[Rows, ...]
 
 
-def state_layout(
-    tendons: Tendons,
-    friction: JointFriction,
-    motors: Actuators,
-    rows: Sequence[Rows] = (),
-    scene: Scene | None = None,
-    of_tree: Sequence[Rows] = (),
-    canals: Sequence[Rows] = (),
-    slides: Sequence[bool] = (),
+def assemble(
+    description: FingerDescription, body: RigidBody, paths: TendonPaths, parts: Parts, given: ConstructorArgs
+) -> Assembly:
+    """Return the rows of a description, in the order in which their states stand, joined by (18).
+
+    Args:
+        description: Of the finger.
+        body: Its rigid body.
+        paths: Its tendons on that body.
+        parts: Its other parts.
+        given: Rows, objects and replacements of the user's own.
+
+    Raises:
+        InputError: As `Finger`.
+    """
+    routing, tendons, actuators, joint_friction, stroke_limiter, springs = parts
+    joints, width = routing.joints, parts.width
+    # Dry friction of a tree's tendons has states of its own, which stand with those of the user's rows.
+    of_tree = {table.group: table for table in tree_rows(description, paths, width)}
+    dry = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
+    custom_drives = [table for table in given.rows if table.pulls]
+    drives = (*actuators.tendon_rows(width), *tendons.sources(description, width), *custom_drives)
+    matrices = tendons.drive_matrices(drives)
+    tendon_rows = [along_paths(description, paths, table) for table in tendons.rows(drives, len(actuators.inertias))]
+    canals = Canals(description, paths, tendons, [*of_tree.values(), *tendon_rows], matrices, width)
+    further = [*springs.hysteresis_rows(joints, width), *dry, *given.rows]
+    tables = [
+        *of_tree.values(),
+        *tendon_rows,
+        *canals.tables,
+        joint_friction.rows(joints, matrices, routing.actuated, width, canals.loads),
+        stroke_limiter.rows(joints, width),
+        springs.rows(joints, width),
+        *actuators.rotor_rows(width),
+        *(table for table in further if not table.pulls),
+    ]
+    alone = Mechanism(
+        body,
+        replaced(tables, given.tables),
+        (*routing.passive_names, *(f"{name}.spool" for name in actuators.loose_names), *actuators.names),
+        np.concatenate([tendons.mass, actuators.inertias]),
+        # Also where a tendon's input goes nowhere: the second one of a spool has none.
+        routing.actuated,
+        moved=description.hand is not None and description.hand.palm.path is not None,
+    )
+    scene = Scene.around(alone, given.objects, description, paths.placed)
+    mechanism = alone if scene is None else scene.joined(alone)
+    layout = _state_layout(parts, further, scene, [*of_tree.values()], canals.tables, body.slides)
+    check_layout(layout, mechanism)
+    extra_rows = (*of_tree.values(), *canals.tables, *further)
+    return Assembly(mechanism, scene, layout, matrices, canals.wraps, extra_rows)
+
+
+def _state_layout(
+    parts: Parts,
+    further: Sequence[Rows],
+    scene: Scene | None,
+    of_tree: Sequence[Rows],
+    canals: Sequence[Rows],
+    slides: Sequence[bool],
 ) -> Layout:
-    """Return the layout of tendons, joints, motors, extra rows, drives among them, and a scene; which joints slide."""
-    routing = tendons.routing
-    drives, of_others = (state_scales([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
+    """Return the layout of all blocks; ``further`` has drives among them, ``slides`` says which joints slide."""
+    routing, tendons, motors, friction, *_ = parts
+    drives, of_others = (
+        state_scales([table for table in further if bool(table.pulls) == own]) for own in (True, False)
+    )
 
     def each(names: Sequence[str], parts: str) -> list[str]:
         return [f"{name}.{part}" for name in names for part in parts.split()]
