@@ -20,7 +20,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import Motion, State, as_floats
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals
-from finger_pin.references.signal import Signal
+from finger_pin.references.signal import HARMONIC, Signal
 from finger_pin.typing import Array
 
 _NO_FORCE = ForceSignal()
@@ -267,5 +267,5 @@ def with_force(control: InputTable, loop: ClosedLoop) -> InputTable:
     if loop.varying_force is None:
         return control
     force = core_signal(loop.varying_force)
-    force.harmonics[:, 0] += loop.fingertip_force.ravel()
+    force.harmonics[:, HARMONIC.offset] += loop.fingertip_force.ravel()
     return control._replace(force=force)

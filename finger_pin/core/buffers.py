@@ -7,15 +7,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.evaluation.law_code import SLOPES, widest
+from finger_pin.core.evaluation.law_code import SlopeColumns, widest
 from finger_pin.core.jit import Layers, Matrix, Vector
 from finger_pin.core.path_tables import PathWork, build_path_work
 from finger_pin.core.tables import Tables
 from finger_pin.laws.law import ContactLaw, Law
 
-# Layers of work.spatial, one motion or force vector per body, and of work.square.
-AXIS, AXIS_RATE, AXIS_CURVE, MOTION, SPATIAL_ACCELERATION, FORCE, MOMENTUM, SPATIAL_LAYERS = range(8)
-MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
+
+class SpatialVectors(NamedTuple):
+    """Motion and force vectors of the n bodies, base frame about its origin, shape (n, 6) each.
+
+    Attributes:
+        axis: S, of the joint.
+        axis_rate: v x S, with the velocity v of the body that carries it.
+        axis_curve: a x S + v x (v x S), with its acceleration a, less gravity.
+        motion: Velocity.
+        acceleration: Likewise, less gravity.
+        force: What the joint transmits.
+        momentum: Of the body and all that it carries.
+    """
+
+    axis: Matrix
+    axis_rate: Matrix
+    axis_curve: Matrix
+    motion: Matrix
+    acceleration: Matrix
+    force: Matrix
+    momentum: Matrix
 
 
 class Work(NamedTuple):
@@ -25,8 +43,10 @@ class Work(NamedTuple):
         base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
         base_rate: Their rates, shape (2, 6).
         base_power: Power of the base, shape (1,), W.
-        rows: Arguments and results of the rows' laws, shape (columns, K); columns named in `law_code`.
-        slopes: Derivatives of the laws, shape (SLOPES, K).
+        mass_matrix, cholesky: M, and its Cholesky factor with the diagonal inverted, shape (n, n).
+        by_position, by_velocity: Derivatives of inverse dynamics, shape (n, n).
+        rows: Arguments and results of the rows' laws, shape (columns, K); columns `ROW`.
+        slopes: Derivatives of the laws, shape (columns, K); columns `SLOPE`, of contacts `TOUCH_SLOPE`.
         powers: Stored energy and powers of the rows, shape (1 + powers, K).
         arm: As in the tables, shape (arms,), with what paths through space add.
         gradient: dl/dq there, with what they add, shape (arms,).
@@ -47,12 +67,15 @@ class Work(NamedTuple):
     base_acceleration: Vector
     base_rate: Matrix
     base_power: Vector
-    spatial: Layers
+    spatial: SpatialVectors
     inertia: Matrix
     composite: Matrix
     coriolis: Matrix
     vectors: Matrix
-    square: Layers
+    mass_matrix: Matrix
+    cholesky: Matrix
+    by_position: Matrix
+    by_velocity: Matrix
     rows: Matrix
     slopes: Matrix
     powers: Matrix
@@ -85,14 +108,17 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         base_power=np.zeros(1),
         base_acceleration=np.zeros(6),
         base_rate=np.zeros((2, 6)),
-        spatial=np.zeros((SPATIAL_LAYERS, size, 6)),
+        spatial=SpatialVectors(*np.zeros((len(SpatialVectors._fields), size, 6))),
         inertia=np.zeros((size, 10)),
         composite=np.zeros((size, 10)),
         coriolis=np.zeros((size, 12)),
         vectors=np.zeros((2, 6)),
-        square=np.zeros((SQUARE_LAYERS, size, size)),
+        mass_matrix=np.zeros((size, size)),
+        cholesky=np.zeros((size, size)),
+        by_position=np.zeros((size, size)),
+        by_velocity=np.zeros((size, size)),
         rows=np.zeros((columns, count)),
-        slopes=np.zeros((SLOPES, count)),
+        slopes=np.zeros((len(SlopeColumns._fields), count)),
         powers=np.zeros((powers, count)),
         arm=np.zeros(len(tables.arm)),
         gradient=np.zeros(len(tables.arm)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,11 +15,23 @@ from finger_pin.mechanism.rigid_body import FREE_JOINTS, RigidBody
 from finger_pin.mechanism.solids import WORLD
 from finger_pin.typing import Array
 
-# Less of a unit axis is rounding.
-# Columns of the table of bodies.
-ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, ARMATURE, BODY_COLUMNS = 0, 9, 12, 13, 16, 22, 23
+
+class BodyColumns(NamedTuple):
+    """Columns of the table of bodies, the first of several: placement, inertia, and that of the joint's motor."""
+
+    rotation: int
+    translation: int
+    mass: int
+    centre: int
+    inertia: int
+    armature: int
+
+
+_WIDTHS = BodyColumns(rotation=9, translation=3, mass=1, centre=3, inertia=6, armature=1)
+BODY = BodyColumns(*accumulate(_WIDTHS[:-1], initial=0))
 PRISMATIC = 1
 
+# Less of a unit axis is rounding.
 _STILL = 1e-8
 _UPPER = np.triu_indices(3)
 # Farther than anything slides, m, but for what is moved along a path.
@@ -62,7 +75,7 @@ def read_chains(model: pin.Model) -> Chains:
     """
     size = int(model.nv)
     parents, kinds = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
-    bodies, slides, charts, frames = np.zeros((size, BODY_COLUMNS)), np.full(size, _ANYWHERE), [], []
+    bodies, slides, charts, frames = np.zeros((size, sum(_WIDTHS))), np.full(size, _ANYWHERE), [], []
     # Of every joint of the model, the base first: its last body, and how that one's frame is turned.
     last, turns = [-1], [np.eye(3)]
     for joint in range(1, model.njoints):
@@ -79,9 +92,9 @@ def read_chains(model: pin.Model) -> Chains:
         for i, part in enumerate(chain, start=first):
             turned = _frame_along(tuple(part.axis.tolist()))
             parents[i], kinds[i] = above, part.kind
-            bodies[i, ROTATION : ROTATION + 9] = (rotation @ turned).ravel()
-            bodies[i, TRANSLATION : TRANSLATION + 3] = translation
-            bodies[i, ARMATURE] = model.armature[i]
+            bodies[i, BODY.rotation : BODY.rotation + 9] = (rotation @ turned).ravel()
+            bodies[i, BODY.translation : BODY.translation + 3] = translation
+            bodies[i, BODY.armature] = model.armature[i]
             above, rotation, translation, turn = i, turned.T, np.zeros(3), turned
         last.append(above)
         turns.append(turn)
@@ -93,12 +106,12 @@ def read_chains(model: pin.Model) -> Chains:
 
 
 def weighed(chains: Chains, model: pin.Model) -> Array:
-    """Return the placements and inertias of the bodies of a model of this form, columns of `rigid_body`."""
+    """Return the placements and inertias of the bodies of a model of this form, columns `BODY`."""
     bodies = chains.bodies.copy()
     for inertia, last, turn in zip(list(model.inertias)[1:], chains.last[1:], chains.turns[1:], strict=True):
-        bodies[last, MASS] = inertia.mass
-        bodies[last, CENTRE : CENTRE + 3] = turn.T @ inertia.lever
-        bodies[last, INERTIA : INERTIA + 6] = (turn.T @ inertia.inertia @ turn)[_UPPER]
+        bodies[last, BODY.mass] = inertia.mass
+        bodies[last, BODY.centre : BODY.centre + 3] = turn.T @ inertia.lever
+        bodies[last, BODY.inertia : BODY.inertia + 6] = (turn.T @ inertia.inertia @ turn)[_UPPER]
     return bodies
 
 

@@ -8,18 +8,7 @@ import numpy as np
 
 from finger_pin.core.bound_models import FEW, Models, SignalBuffer, fill, path_motions, rows_of
 from finger_pin.core.evaluation.attitude_charts import Charts
-from finger_pin.core.evaluation.law_code import (
-    COMMAND,
-    CURVATURE,
-    FORCE,
-    LENGTH,
-    LOAD,
-    RATE,
-    READING,
-    SIGNALS,
-    SPEED,
-    STATE,
-)
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
@@ -86,7 +75,7 @@ class CompiledMechanism:
             rates=np.empty((count if outputs == "all" else 0, self.charts.size)),
             rows=np.empty((1 if forces_only else columns, kept, rows)),
             first=0,
-            column=FORCE if forces_only else 0,
+            column=ROW.force if forces_only else 0,
             torques=np.empty((summed, width)),
             externals=np.empty((summed, width)),
             energy_terms=np.empty((summed, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
@@ -113,14 +102,14 @@ class CompiledMechanism:
         for table in mechanism.rows:
             end = begin + table.count
             own, arms, begin = rows[:, at, begin:end], table.law.arms, end
-            if buffer.column == FORCE:
+            if buffer.column == ROW.force:
                 found[table.group] = RowSignals(table, None, own[0], own[0, ..., :0], ())
                 continue
             stateful = np.arange(table.count) % arms > 0 if arms > 1 else slice(None)
-            length, speed, load, command, curvature = (own[c] for c in (LENGTH, SPEED, LOAD, COMMAND, CURVATURE))
-            row = Row(length, speed, own[STATE][..., stateful], load, command, curvature, reading=own[READING])
-            shown = tuple(own[SIGNALS + i, ..., ::arms] for i in range(len(table.law.signals)))
-            found[table.group] = RowSignals(table, table.law.sees(row), own[FORCE], own[RATE][..., stateful], shown)
+            row = Row(*own[: len(Row._fields)])._replace(state=own[ROW.state][..., stateful], side=0.0)
+            shown = tuple(own[ROW.signals + i, ..., ::arms] for i in range(len(table.law.signals)))
+            of_states = own[ROW.rate][..., stateful]
+            found[table.group] = RowSignals(table, table.law.sees(row), own[ROW.force], of_states, shown)
         return Evaluation(
             mechanism.energies,
             found,

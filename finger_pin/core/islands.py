@@ -15,6 +15,7 @@ from finger_pin.core.axes import Subset
 from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.inputs import PLANNED, InputTable
 from finger_pin.core.jit import indices
+from finger_pin.core.row_tables import Groups
 from finger_pin.core.tables import Tables
 from finger_pin.description.caching import memoised
 
@@ -114,7 +115,7 @@ class Selection:
 
     island: Island
     subset: Subset | None
-    groups: Indices
+    groups: Groups
     of_groups: Indices
     contact_rows: int
 
@@ -123,7 +124,7 @@ class Selection:
         """Return the part that an island has of tables."""
         rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.prescribed)
         bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
-        counts = np.array([np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups], dtype=np.int64)
+        counts = np.diff(np.searchsorted(rows, np.append(tables.groups.first, len(tables.state))))
         present = np.flatnonzero(counts)
         ends = np.cumsum([0, *counts[present]])
         part = Subset()
@@ -133,7 +134,7 @@ class Selection:
         part.keep("chart", np.flatnonzero(np.isin(tables.charts, bodies)), len(tables.charts))
         part.keep("tip", island.tips, len(tables.tip_body))
         part.keep("row", rows, len(tables.state))
-        part.keep("group", present, len(tables.groups))
+        part.keep("group", present, len(counts))
         part.keep("state", island.states, len(tables.state_row))
         part.keep("input row", np.flatnonzero(np.isin(tables.input_rows, rows)), len(tables.input_rows))
         part.keep("channel", island.channels, 1 + max(tables.channel.max(initial=-1), island.channels.max(initial=-1)))
@@ -145,7 +146,7 @@ class Selection:
         part.keep_entries(paths, "leg")
         part.keep("piece", np.unique(paths.piece[part.kept["leg"]]), len(paths.columns))
         part.keep_entries(paths, "mover")
-        groups = np.column_stack([ends[:-1], ends[1:], tables.groups[present, 2:]])
+        groups = part.of(tables.groups)._replace(first=ends[:-1], end=ends[1:])
         return cls(island, part, groups, present, int(np.count_nonzero(tables.touch[rows])))
 
     def tables(self, tables: Tables) -> Tables:
@@ -179,7 +180,7 @@ def selections(tables: Tables, control: InputTable) -> list[Selection]:
     if not np.array_equal(states, np.arange(len(tables.state_row))):
         raise RuntimeError(f"islands have the states {states.tolist()} of {len(tables.state_row)}")
     if len(islands) == 1:
-        return [Selection(islands[0], None, tables.groups, np.arange(len(tables.groups)), tables.contact_rows)]
+        return [Selection(islands[0], None, tables.groups, np.arange(len(tables.groups.first)), tables.contact_rows)]
     return [Selection.of(tables, island) for island in islands]
 
 

@@ -11,10 +11,33 @@ from numpy.typing import NDArray
 from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains
 from finger_pin.core.collision.motion_bounds import Carrying, motion_bounds
-from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
+from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_address
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 
+
+class PieceBodies(NamedTuple):
+    """Columns of the bodies of a piece: those of its two points, of its frame, and of its side point."""
+
+    first: int
+    second: int
+    frame: int
+    side: int
+
+
+class LookColumns(NamedTuple):
+    """Columns of looks at a gap: the share of the step, the gap, its normal, how far the core of one body is."""
+
+    share: int
+    gap: int
+    normal_x: int
+    normal_y: int
+    normal_z: int
+    far: int
+
+
+LOOK = LookColumns(*range(len(LookColumns._fields)))
+PIECE = PieceBodies(*range(len(PieceBodies._fields)))
 # Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
 COLUMNS, WRENCH = 3, 12
 # A step is halved so often at most, less two, to look for touches.
@@ -25,17 +48,17 @@ class Paths(NamedTuple):
     """E pieces, and the L legs with which R rows use them.
 
     Attributes:
-        bodies: Bodies of both points, of the frame, and of a side point, -1 for the base, shape (E, 4).
+        bodies: Columns `PIECE`, -1 for the base, shape (E, 4).
         points: Both points, and the side point, in the frames of their bodies, shape (E, 9), m.
         rotation: Of the piece's frame in its body's, shape (E, 3, 3).
         origin: Of the piece's frame in its body's, shape (E, 3), m.
-        shapes: Addresses of value and slopes, shape (E, 2).
+        value, slopes: Addresses of the shape of each, shape (E,).
         columns: Number of wrenches of each, shape (E,).
         parameters: Shape (E, most parameters).
         reach: Shape (E,), m.
         start: First index of the coordinates that move a piece, shape (E + 1,).
         at: Coordinates, shape (entries,).
-        moves: One where a coordinate moves the first, the second, and the frame's body, shape (entries, 3).
+        moves: One where a coordinate moves the body, the first columns of `PIECE`, shape (entries, 3).
         motion_bounds: Largest displacement of a point of a gap's bodies against the other body by a unit of each, shape
             (entries,), m; zero where it carries both, or only turns what looks alike.
         opposing_coordinate: Coordinate that moves the other body in the same direction, -1 for none, shape (entries,).
@@ -48,7 +71,7 @@ class Paths(NamedTuple):
         piece: Of each leg, shape (L,).
         column: Of each leg, shape (L,).
         follows: Of each leg, shape (L,).
-        weights: Of each leg in the arm and in the length, shape (L, 2).
+        arm_weight, length_weight: Of each leg, in the arm and in the length, shape (L,).
         bends: Whether each leg's turn counts, shape (L,).
     """
 
@@ -56,7 +79,8 @@ class Paths(NamedTuple):
     points: Annotated[Matrix, along("piece", "x")]
     rotation: Annotated[Layers, along("piece", "x", "y")]
     origin: Annotated[Matrix, along("piece", "x")]
-    shapes: Annotated[IndexTable, along("piece", "x")]
+    value: Annotated[Indices, along("piece")]
+    slopes: Annotated[Indices, along("piece")]
     columns: Annotated[Indices, along("piece")]
     parameters: Annotated[Matrix, along("piece", "c")]
     reach: Annotated[Vector, along("piece")]
@@ -74,7 +98,8 @@ class Paths(NamedTuple):
     piece: Annotated[Indices, along("leg", of="piece")]
     column: Annotated[Indices, along("leg")]
     follows: Annotated[Indices, along("leg")]
-    weights: Annotated[Matrix, along("leg", "x")]
+    arm_weight: Annotated[Vector, along("leg")]
+    length_weight: Annotated[Vector, along("leg")]
     bends: Annotated[Indices, along("leg")]
 
     def __reduce__(self) -> NoReturn:
@@ -101,7 +126,7 @@ class PathWork(NamedTuple):
             shape (E,), m.
         travel: Path of each coordinate, to and fro, in a step, shape (N,).
         control: Bernstein coefficients of its motion, shape (N, 5).
-        looks: Moments of a step, and what was seen there of a gap, shape (LOOKS, 6).
+        looks: Moments of a step, and what was seen there of a gap, columns `LOOK`, shape (LOOKS, columns).
         frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
         origin: Its origin, shape (E, 3), m.
         ends: Both points and the side point, base frame, shape (E, 9), m.
@@ -152,7 +177,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
     legs = [leg for each in paths for leg in each]
     ends = [(*p.ends, Place(0, np.zeros(3)))[:3] for p in pieces]
     carried = [(a.joint, b.joint, p.joint, side.joint) for p, (a, b, side) in zip(pieces, ends, strict=True)]
-    bodies = np.array([[last[joint] for joint in row] for row in carried], dtype=np.int64).reshape(-1, 4)
+    bodies = np.array([[last[joint] for joint in row] for row in carried], dtype=np.int64).reshape(-1, len(PIECE))
     entries = [_movers(row, parents) for row in bodies]
     parameters = np.zeros((len(pieces), max((len(p.shape.parameters) for p in pieces), default=0)))
     for row, piece in zip(parameters, pieces, strict=True):
@@ -172,7 +197,8 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         points=np.array(points).reshape(-1, 9),
         rotation=np.array([turns[p.joint].T @ p.frame.rotation for p in pieces]).reshape(-1, 3, 3),
         origin=np.array([turns[p.joint].T @ p.frame.translation for p in pieces]).reshape(-1, 3),
-        shapes=np.array([shape_addresses(p.shape) for p in pieces], dtype=np.int64).reshape(-1, 2),
+        value=np.array([shape_address(p.shape.value) for p in pieces], dtype=np.int64),
+        slopes=np.array([shape_address(p.shape.slopes) for p in pieces], dtype=np.int64),
         columns=np.array([p.shape.columns for p in pieces], dtype=np.int64),
         parameters=parameters,
         reach=np.array([p.reach for p in pieces], dtype=float),
@@ -190,7 +216,8 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         piece=np.array([number[leg.piece] for leg in legs], dtype=np.int64),
         column=np.array([leg.column for leg in legs], dtype=np.int64),
         follows=np.array([leg.follows for leg in legs], dtype=np.int64),
-        weights=np.array([(leg.arm, leg.length_weight) for leg in legs], dtype=float).reshape(-1, 2),
+        arm_weight=np.array([leg.arm for leg in legs], dtype=float),
+        length_weight=np.array([leg.length_weight for leg in legs], dtype=float),
         bends=np.array([leg.bends for leg in legs], dtype=np.int64),
     )
 
@@ -206,14 +233,14 @@ def reached(paths: Paths, count: int, width: int) -> NDArray[np.bool_]:
 
 def _movers(bodies: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the coordinates that move some bodies, and a mask of the first three for each."""
-    moves = np.zeros((len(parents), 4), dtype=np.int64)
+    moves = np.zeros((len(parents), len(PIECE)), dtype=np.int64)
     for which, body in enumerate(bodies):
         at = int(body)
         while at >= 0:
             moves[at, which] = 1
             at = int(parents[at])
     moved = np.flatnonzero(moves.any(axis=1))
-    return moved, np.ascontiguousarray(moves[moved, :3])
+    return moved, np.ascontiguousarray(moves[moved, : PIECE.side])
 
 
 def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
@@ -233,7 +260,7 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         far=np.zeros(pieces),
         travel=np.zeros(width),
         control=np.zeros((width, 5)),
-        looks=np.zeros((LOOKS, 6)),
+        looks=np.zeros((LOOKS, len(LOOK))),
         frame=np.zeros((pieces, 3, 3)),
         origin=np.zeros((pieces, 3)),
         ends=np.zeros((pieces, 9)),

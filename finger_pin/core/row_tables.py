@@ -2,13 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.evaluation.law_code import kink_column
+from finger_pin.core.axes import along
+from finger_pin.core.evaluation.law_code import addresses, kink_column
+from finger_pin.core.jit import Indices
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.rows import Rows
+
+
+class Groups(NamedTuple):
+    """G groups of rows, one for each table of the mechanism.
+
+    Attributes:
+        first: First row, shape (G,).
+        end: Last row + 1, shape (G,).
+        fed: 1 for rows with inputs from earlier rows, shape (G,).
+        pressed: 1 for rows with loads, shape (G,).
+        kink: Column of `ROW` by whose sign their law bends, -1 for none, shape (G,).
+        value, slopes, account: Addresses of their law, shape (G,).
+    """
+
+    first: Annotated[Indices, along("group")]
+    end: Annotated[Indices, along("group")]
+    fed: Annotated[Indices, along("group")]
+    pressed: Annotated[Indices, along("group")]
+    kink: Annotated[Indices, along("group")]
+    value: Annotated[Indices, along("group")]
+    slopes: Annotated[Indices, along("group")]
+    account: Annotated[Indices, along("group")]
 
 
 def row_arrays(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:
@@ -95,12 +121,8 @@ def _of_wiring(mechanism: Mechanism) -> dict[str, Any]:
                     weights.extend(matrix[k, found])
                 starts[-1].append(len(terms))
     channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
-    groups = [
-        (begin, end, bool(table.inputs), bool(table.loads) or np.any(table.pins >= 0), kink_column(table.law))
-        for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
-    ]
     return {
-        "groups": np.array(groups, dtype=np.int64).reshape(-1, 5),
+        "groups": _groups(rows, ends),
         "channel": channel,
         "input_rows": np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
         "input_start": np.array(starts[0], dtype=np.int64),
@@ -109,6 +131,25 @@ def _of_wiring(mechanism: Mechanism) -> dict[str, Any]:
         "weights": np.array(weights, dtype=float),
         "joint_pin": np.array([first_body[pin] for table in rows for pin in table.pins], dtype=np.int64),
     }
+
+
+def _groups(rows: Sequence[Rows], ends: NDArray[np.int64]) -> Groups:
+    """Return the groups of tables of rows, of which each ends where the next begins."""
+    laws = [addresses(table.law) for table in rows]
+    return Groups(
+        first=ends[:-1],
+        end=ends[1:],
+        fed=_integers(bool(table.inputs) for table in rows),
+        pressed=_integers(bool(table.loads) or np.any(table.pins >= 0) for table in rows),
+        kink=_integers(kink_column(table.law) for table in rows),
+        value=_integers(law.value for law in laws),
+        slopes=_integers(law.slopes for law in laws),
+        account=_integers(law.account for law in laws),
+    )
+
+
+def _integers(values: Iterable[Any]) -> NDArray[np.int64]:
+    return np.fromiter(values, dtype=np.int64)
 
 
 def _of_arms(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:

@@ -9,17 +9,13 @@ import numpy as np
 
 from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains, read_chains, tree_arrays, weighed
-from finger_pin.core.evaluation.law_code import addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.core.path_tables import Paths, reached, read_paths
-from finger_pin.core.row_tables import row_arrays
+from finger_pin.core.row_tables import Groups, row_arrays
 from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
 from finger_pin.typing import Array
-
-# Columns of the table of groups.
-FIRST, END, FED, PRESSED, KINK = range(5)
 
 
 class Tables(NamedTuple):
@@ -32,7 +28,7 @@ class Tables(NamedTuple):
         parents: Of the bodies, -1 for the base, shape (n,).
         roots: First body of the tree that each belongs to, shape (n,): trees do not feel each other's inertia.
         kinds: 1 where a body slides, 0 where it turns, shape (n,).
-        bodies: Placement and inertia, columns of `rigid_body`, shape (n, BODY_COLUMNS).
+        bodies: Placement and inertia, columns `BODY`, shape (n, columns).
         charts: First of the three bodies that turn a free one, shape (f,).
         chart_frames: Rotation of each one's spherical joint in the body before it, shape (f, 3, 3).
         prescribed: For coordinates that are moved along paths, the number of their acceleration; -1 else, shape (N,).
@@ -44,9 +40,7 @@ class Tables(NamedTuple):
         has_tip_force: Whether forces at the tips count.
         parent_links: Body that has the link before each joint, -1 for the base, shape (n,).
         directions: Unit vector of that link in its frame, shape (n, 3).
-        groups: First and last + 1 row of each, whether it has inputs from earlier rows, or loads, and the column of
-            its rows' kink, -1 for none, shape (G, 5).
-        laws: Addresses of value, slopes and account, shape (G, 3).
+        groups: Tables of rows, and the addresses of their laws.
         energies: Of stored energy and powers of each group, places in `Energies` or -1, shape (G, 1 + most powers).
         parameters: Shape (most parameters, K).
         offset: Shape (K,).
@@ -96,8 +90,7 @@ class Tables(NamedTuple):
     has_tip_force: bool
     parent_links: Annotated[Indices, along("body", of="body")]
     directions: Annotated[Matrix, along("body", "x")]
-    groups: IndexTable
-    laws: Annotated[IndexTable, along("group", "c")]
+    groups: Groups
     energies: Annotated[IndexTable, along("group", "c")]
     parameters: Annotated[Matrix, along("c", "row")]
     offset: Annotated[Vector, along("row")]
@@ -179,9 +172,4 @@ def _structure(mechanism: Mechanism) -> tuple[Chains, dict[str, Any]]:
     rows, chains = mechanism.rows, read_chains(mechanism.body.model)
     paths = read_paths([path for table in rows for path in table.paths], chains)
     routed = reached(paths, sum(table.count for table in rows), mechanism.coordinates)
-    return chains, {
-        "laws": np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
-        "paths": paths,
-        **tree_arrays(mechanism.body, chains),
-        **row_arrays(mechanism, routed),
-    }
+    return chains, {"paths": paths, **tree_arrays(mechanism.body, chains), **row_arrays(mechanism, routed)}

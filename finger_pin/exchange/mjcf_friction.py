@@ -15,6 +15,7 @@ from finger_pin.exchange.mujoco_friction import (
     PIN,
     PLUGIN,
     TENDON,
+    Coefficients,
     PluginFriction,
 )
 from finger_pin.mechanism.joints import JointFriction
@@ -63,15 +64,18 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
 def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool) -> list[PluginFriction]:
     found = []
     for index, (name, tendon) in enumerate(description.tendons.items()):
-        numbers = [float(getattr(tendons, each)[index]) for each in _TENDON]
-        numbers += [float(tendons.lag[index] * tendons.stiffness[index]), float(tendons.drag[index])]
-        law = (*numbers, float(tendons.routing.curvature_offset[index]), float(tendons.hardening[index]))
+        law = Coefficients(
+            **{key: float(getattr(tendons, name)[index]) for key, name in _TENDON.items()},
+            **{key: float(getattr(tendons, key)[index]) for key in _ALIKE},
+            micro_damping=float(tendons.lag[index] * tendons.stiffness[index]),
+            curvature_offset=float(tendons.routing.curvature_offset[index]),
+        )
         crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
         if tendon.kind == "actuated":
             found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
         elif massless:
             # Its viscous friction is left out with its mass.
-            law = (*law[:3], 0.0, *law[4:])
+            law = law._replace(viscous=0.0)
             found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
         else:
             split, mass = tendon.proximal_crossings, f"{name}_mass"
@@ -81,16 +85,20 @@ def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool
     return found
 
 
-_TENDON = ("surface", "stiction_ratio", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
-_JOINT = ("kinetic", "static", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
+# Coefficients that have other names in tendons and in joints, and those that have the same.
+_TENDON, _JOINT = {"coulomb": "surface", "stiction": "stiction_ratio"}, {"coulomb": "kinetic", "stiction": "static"}
+_ALIKE = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "drag", "hardening")
 
 
 def _of_joints(description: FingerDescription, tendons: Tendons) -> list[PluginFriction]:
     friction = JointFriction.from_description(description, tendons.routing.loads)
     found = []
     for index, name in enumerate(description.joints):
-        numbers = [float(getattr(friction, each)[index]) for each in _JOINT]
-        micro_damping = float(friction.lag[index] * friction.stiffness[index])
-        law = (*numbers, micro_damping, float(friction.drag[index]), 0.0, float(friction.hardening[index]))
+        law = Coefficients(
+            **{key: float(getattr(friction, name)[index]) for key, name in _JOINT.items()},
+            **{key: float(getattr(friction, key)[index]) for key in _ALIKE},
+            micro_damping=float(friction.lag[index] * friction.stiffness[index]),
+            curvature_offset=0.0,
+        )
         found.append(PluginFriction(PIN, name, name, True, 1.0, law))
     return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 #: The plugin, and the actuator and tuple that `add_friction` makes.
 PLUGIN = "finger_pin.friction"
@@ -23,11 +24,56 @@ LEAST_LOSS = 1e-6
 #: Kinds of friction: of a tendon that is pulled, of a joint's pin (17), of a slide that is a passive tendon's mass
 #: (14c), of a fixed tendon over one joint that is pulled by what drives the joint, and of a branch behind a pulley.
 TENDON, PIN, MASS, LINK, BRANCH = range(5)
-#: What elements of a friction carry, in order.
-LENGTH, RATIO, KIND, COULOMB, STATIC, STIFFNESS, VISCOUS, STRIBECK = range(8)
-FLOOR, EXPONENT, MICRO, DRAG, OFFSET, HARDENING, SHARE, LOADS, HEAD = range(8, 17)
-#: What of each friction stands in `plugin_state`.
-LEVEL, FORCE, LOAD, TURN, SIGNALS = range(5)
+
+
+class Coefficients(NamedTuple):
+    """Coefficients of a friction's law; stiction is a ratio for tendons, and N m for joints."""
+
+    coulomb: float
+    stiction: float
+    stiffness: float
+    viscous: float
+    stribeck_velocity: float
+    floor: float
+    stribeck_exponent: float
+    micro_damping: float
+    drag: float
+    curvature_offset: float
+    hardening: float
+
+
+class ElementPlaces(NamedTuple):
+    """Places of the first elements of a friction, named after what they carry; elements of `more` follow."""
+
+    length: int
+    ratio: int
+    kind: int
+    coulomb: int
+    stiction: int
+    stiffness: int
+    viscous: int
+    stribeck_velocity: int
+    floor: int
+    stribeck_exponent: int
+    micro_damping: int
+    drag: int
+    curvature_offset: int
+    hardening: int
+    share: int
+    loads: int
+
+
+class SignalPlaces(NamedTuple):
+    """Places of a friction's signals in `plugin_state`."""
+
+    level: int
+    force: int
+    load: int
+    turn: int
+
+
+HEAD, SIGNALS = len(ElementPlaces._fields), len(SignalPlaces._fields)
+ELEMENT, SIGNAL = ElementPlaces(*range(HEAD)), SignalPlaces(*range(SIGNALS))
 
 
 @dataclass(frozen=True)
@@ -40,8 +86,7 @@ class PluginFriction:
         row: Name of the tendon or joint in whose row it acts.
         row_of_joint: Whether that is a joint.
         ratio: Its speed over the row's.
-        law: coulomb, static, stiffness, viscous, stribeck_velocity, floor, stribeck_exponent, micro_damping, drag,
-            curvature_offset, hardening.
+        law: Coefficients of its law.
         more: Elements that bend or load it: whether it is a joint, its name, and a number.
         share: Of a `LINK`, tension over the joint's drive: one over the arm and the number of tendons that pull the
             same way; negative where another one pulls the other way, so that it is slack while that is driven. Of a
@@ -55,7 +100,7 @@ class PluginFriction:
     row: str
     row_of_joint: bool
     ratio: float
-    law: tuple[float, ...]
+    law: Coefficients
     more: tuple[tuple[bool, str, float], ...] = ()
     share: float = 0.0
     held: bool = False
@@ -68,15 +113,17 @@ class PluginFriction:
     @property
     def least(self) -> float:
         """The level without load, N or N m."""
-        return max(self.law[5], self.law[8])
+        return max(self.law.floor, self.law.drag)
 
     def elements(self) -> Iterator[tuple[str, str, float]]:
         """Yield the elements of the table: kind and name of an object, and a number."""
         own = "joint" if self.of_joint else "tendon"
-        yield own, self.name, float(HEAD + len(self.more))
-        yield ("joint" if self.row_of_joint else "tendon"), self.row, self.ratio
-        for value in (float(self.kind), *self.law, self.share, float(self.loads)):
-            yield own, self.name, value
+        length, kind, loads = float(HEAD + len(self.more)), float(self.kind), float(self.loads)
+        carried = {"length": length, "ratio": self.ratio, "kind": kind, "share": self.share, "loads": loads}
+        carried |= self.law._asdict()
+        row = ("joint" if self.row_of_joint else "tendon"), self.row
+        for name in ElementPlaces._fields:
+            yield *(row if name == "ratio" else (own, self.name)), carried[name]
         for of_joint, name, value in self.more:
             yield ("joint" if of_joint else "tendon"), name, value
 

@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from finger_pin.core.jit import Pointer, njit_inline
 from finger_pin.mujoco.layout import Data, Kinds, Model
 from finger_pin.mujoco.memory import integer, integer_in, integers, number_in, numbers, size
 
+
+class RowTerms(NamedTuple):
+    """Places of the terms of a row of friction: F - x, c + b, and the most that it exerts."""
+
+    pull: int
+    damp: int
+    limit: int
+
+
+TERMS = len(RowTerms._fields)
+TERM = RowTerms(*range(TERMS))
 # What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
 _NOTHING = 1e-12
 
@@ -22,14 +35,15 @@ def write_rows(m: int, d: int, at: Model, of: Data, kinds: Kinds, rows: Pointer,
     for r in range(ne, ne + integer(d, of.nf)):
         of_dof = kind[r] == kinds.friction_dof
         row = which[r] if of_dof else width + which[r]
-        if rows[3 * row + 1] == 0.0:
+        terms = TERMS * row
+        if rows[terms + TERM.damp] == 0.0:
             continue
         speed = number_in(d, of.qvel, row) if of_dof else number_in(d, of.ten_velocity, which[r])
-        before, stiff = resistance[r], rows[3 * row + 1] * dt
+        before, stiff = resistance[r], rows[terms + TERM.damp] * dt
         held = 1.0 / stiff
-        aref[r] = -speed / dt - held * rows[3 * row]
+        aref[r] = -speed / dt - held * rows[terms + TERM.pull]
         resistance[r], weight[r] = held, stiff
-        most[r] = max(rows[3 * row + 2], _NOTHING)
+        most[r] = max(rows[terms + TERM.limit], _NOTHING)
         if islands:
             s = integer_in(d, of.map_efc2iefc, r)
             numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = held, stiff

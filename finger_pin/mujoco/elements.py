@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import Pointer, njit_inline
-from finger_pin.exchange.mujoco_friction import (
-    BRANCH,
-    DRAG,
-    FLOOR,
-    HEAD,
-    KIND,
-    LENGTH,
-    LINK,
-    OFFSET,
-    RATIO,
-    SHARE,
-    VISCOUS,
-)
+from finger_pin.exchange.mujoco_friction import BRANCH, ELEMENT, HEAD, LINK
 from finger_pin.mujoco.friction_step import delivered
 from finger_pin.mujoco.layout import Data, Kinds, Model
 from finger_pin.mujoco.loads import between, spring, turn_of_path
 from finger_pin.mujoco.memory import integer_in, integers, number_in, numbers
 
 _delivered = inlined(delivered)
-#: Speed, load, normal force, largest friction and turn.
-Seen: TypeAlias = tuple[float, float, float, float, float]
+
+
+class Seen(NamedTuple):
+    """What the law of a friction reads; ``most`` is the largest friction."""
+
+    speed: float
+    load: float
+    pressing: float
+    most: float
+    turn: float
 
 
 @njit_inline
@@ -51,26 +47,28 @@ def tendon(
     tendon, row = objects[0], objects[1]
     first = HEAD
     pull = along[tendon] + spring(m, d, at, of, tendon)
-    if int(p[KIND]) == BRANCH:
+    if int(p[ELEMENT.kind]) == BRANCH:
         # A part of what its tendon's friction has left, which ``held`` is here.
         first, trunk = HEAD + 1, objects[HEAD]
         pull = along[trunk] + spring(m, d, at, of, trunk)
-        left = _delivered(pull, abs(pull), held, p[VISCOUS], number_in(d, of.ten_velocity, trunk))[1]
+        left = _delivered(pull, abs(pull), held, p[ELEMENT.viscous], number_in(d, of.ten_velocity, trunk))[1]
         pull, held = (p[HEAD] if pull > 0.0 else -p[HEAD]) * left, 0.0
-    if int(p[KIND]) == LINK:
-        drive = about[integer_in(m, at.jnt_dofadr, row)] * (abs(p[SHARE]) if p[RATIO] > 0.0 else -abs(p[SHARE]))
-        pull += drive if p[SHARE] > 0.0 else min(drive, 0.0)
+    if int(p[ELEMENT.kind]) == LINK:
+        drive = about[integer_in(m, at.jnt_dofadr, row)] * (
+            abs(p[ELEMENT.share]) if p[ELEMENT.ratio] > 0.0 else -abs(p[ELEMENT.share])
+        )
+        pull += drive if p[ELEMENT.share] > 0.0 else min(drive, 0.0)
     tension = abs(pull) + held
     speed = number_in(d, of.ten_velocity, tendon)
-    loss, left = _delivered(pull, tension, force, p[VISCOUS], speed)
+    loss, left = _delivered(pull, tension, force, p[ELEMENT.viscous], speed)
     bend, pressing = 0.0, tension + left
     if pressing > 0.0:
         bend = _turn(m, d, at, of, kinds, e, tendon)
-    for k in range(first, int(p[LENGTH])):
+    for k in range(first, int(p[ELEMENT.length])):
         reactions[integers(m, at.jnt_dofadr)[objects[k]]] += left
     # What holds the tendon back takes no more than there is.
-    most = tension + p[DRAG] + p[FLOOR] if loss > 0.0 else np.inf
-    return speed, tension, pressing, most, p[OFFSET] + bend
+    most = tension + p[ELEMENT.drag] + p[ELEMENT.floor] if loss > 0.0 else np.inf
+    return Seen(speed, tension, pressing, most, p[ELEMENT.curvature_offset] + bend)
 
 
 @njit_inline
@@ -80,7 +78,7 @@ def _turn(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, tendon: int
         return turn_of_path(d, of, tendon)
     p, objects, found = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e), 0.0
     places, types = integers(m, at.jnt_qposadr), integers(m, at.tuple_objtype, e)
-    for k in range(HEAD, int(p[LENGTH])):
+    for k in range(HEAD, int(p[ELEMENT.length])):
         if types[k] == kinds.of_joint:
             found += p[k] * abs(numbers(d, of.qpos)[places[objects[k]]])
     return found
@@ -96,15 +94,15 @@ def mass(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, reactions: P
     )
     speed, load = number_in(d, of.qvel, integer_in(m, at.jnt_dofadr, objects[0])), 0.0
     dofs, tension = integers(m, at.jnt_dofadr), 0.0
-    for k in range(HEAD, int(p[LENGTH])):
+    for k in range(HEAD, int(p[ELEMENT.length])):
         if types[k] == kinds.of_tendon:
             tension = abs(spring(m, d, at, of, objects[k]))
             load += tension
         else:
             # The joints that the half just named crosses.
             reactions[dofs[objects[k]]] += tension
-    bend = p[OFFSET] + _turn(m, d, at, of, kinds, e, -1)
-    return speed, load, load, np.inf, bend
+    bend = p[ELEMENT.curvature_offset] + _turn(m, d, at, of, kinds, e, -1)
+    return Seen(speed, load, load, np.inf, bend)
 
 
 @njit_inline
@@ -118,7 +116,7 @@ def pin(m: int, d: int, at: Model, of: Data, e: int, held: int, reactions: Point
     if x * x + y * y + z * z > 0.0:
         ex, ey, ez = _proximal(m, d, at, of, joint)
         load = math.sqrt((x - load * ex) ** 2 + (y - load * ey) ** 2 + (z - load * ez) ** 2)
-    return speed, load, load, np.inf, 0.0
+    return Seen(speed, load, load, np.inf, 0.0)
 
 
 @njit_inline

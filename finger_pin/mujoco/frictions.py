@@ -11,7 +11,7 @@ import numpy as np
 
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings, bristles
 from finger_pin.exceptions import InputError
-from finger_pin.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, PluginFriction
+from finger_pin.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, Coefficients, PluginFriction
 from finger_pin.mujoco.name_matching import RoutedFriction
 from finger_pin.typing import Array
 
@@ -19,6 +19,8 @@ from finger_pin.typing import Array
 _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 # Fixed tendons whose coefficients agree to this share are parallel.
 _PARALLEL = 1e-9
+# Coefficients that settings of tendons and of joints both state as they are.
+_ALIKE = ("coulomb", "viscous", "stribeck_velocity", "stribeck_exponent", "micro_damping")
 
 
 def frictions(
@@ -53,7 +55,7 @@ def frictions(
         held = _limited_or_coupled(model, model.tendon(name).id)
         found.append(PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio), held))
         # Drag and what the model does not show count once.
-        behind = (*numbers[:8], 0.0, 0.0, numbers[10])
+        behind = numbers._replace(drag=0.0, curvature_offset=0.0)
         for number, (branch, part) in enumerate(branches.get(name, []), start=1):
             crossed = tuple(each for each in _crossed(model, branch, law) if each[1] in joints)
             more = ((False, name, part), *crossed)
@@ -62,8 +64,15 @@ def frictions(
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
             stiffness, hardening = _bristles(law, loss)
-            numbers = (law.coulomb, law.stiction, stiffness, law.viscous, law.stribeck_velocity)
-            numbers += (max(law.floor, loss), law.stribeck_exponent, law.micro_damping, law.drag, 0.0, hardening)
+            numbers = Coefficients(
+                **{key: getattr(law, key) for key in _ALIKE},
+                stiction=law.stiction,
+                stiffness=stiffness,
+                floor=max(law.floor, loss),
+                drag=law.drag,
+                curvature_offset=0.0,
+                hardening=hardening,
+            )
             found.append(PluginFriction(PIN, name, name, True, 1.0, numbers))
         elif named:
             raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")
@@ -104,7 +113,7 @@ def _with_loss(model: mujoco.MjModel, found: list[PluginFriction]) -> list[Plugi
         if each.row_of_joint and not each.of_joint and each.row not in rows:
             rows.add(each.row)
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(each.row).id]]) / abs(each.ratio)
-            each = replace(each, law=(*each.law[:8], each.law[8] + loss, *each.law[9:]))
+            each = replace(each, law=each.law._replace(drag=each.law.drag + loss))
         kept.append(each)
     return kept
 
@@ -174,11 +183,18 @@ def _row(model: mujoco.MjModel, name: str, first: list[tuple[str, Array]]) -> tu
     return name, False, 1.0
 
 
-def _tendon_law(model: mujoco.MjModel, name: str, law: Any) -> tuple[float, ...]:
+def _tendon_law(model: mujoco.MjModel, name: str, law: Any) -> Coefficients:
     drag = law.drag or float(model.tendon_frictionloss[model.tendon(name).id])
     stiffness, hardening = _bristles(law, drag)
-    ratio = (law.coulomb, law.stiction_ratio, stiffness, law.viscous, law.stribeck_velocity)
-    return (*ratio, law.floor, law.stribeck_exponent, law.micro_damping, drag, law.curvature_offset, hardening)
+    return Coefficients(
+        **{key: getattr(law, key) for key in _ALIKE},
+        stiction=law.stiction_ratio,
+        stiffness=stiffness,
+        floor=law.floor,
+        drag=drag,
+        curvature_offset=law.curvature_offset,
+        hardening=hardening,
+    )
 
 
 def _bristles(law: JointFrictionSettings | TendonFrictionSettings, level: float) -> tuple[float, float]:

@@ -13,32 +13,8 @@ from __future__ import annotations
 
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import Pointer, njit_inline, scratch
-from finger_pin.exchange.mujoco_friction import (
-    BRANCH,
-    COULOMB,
-    DRAG,
-    EXPONENT,
-    FLOOR,
-    FORCE,
-    HARDENING,
-    KIND,
-    LENGTH,
-    LEVEL,
-    LOAD,
-    LOADS,
-    MASS,
-    MICRO,
-    PIN,
-    RATIO,
-    SHARE,
-    SIGNALS,
-    STATIC,
-    STIFFNESS,
-    STRIBECK,
-    TURN,
-    VISCOUS,
-)
-from finger_pin.mujoco.constraint_rows import row_forces, write_rows
+from finger_pin.exchange.mujoco_friction import BRANCH, ELEMENT, MASS, PIN, SIGNAL, SIGNALS
+from finger_pin.mujoco.constraint_rows import TERM, TERMS, row_forces, write_rows
 from finger_pin.mujoco.elements import Seen, mass, pin, tendon
 from finger_pin.mujoco.friction_step import NUMERICAL_FLOOR, exerted, level_of, slide
 from finger_pin.mujoco.layout import Contact, Data, Kinds, Model
@@ -122,14 +98,14 @@ def compute(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) ->
     dofs, states = integers(m, at.jnt_dofadr), numbers(d, of.plugin_state)
     act, rate, dt = numbers(d, of.act), numbers(d, of.act_dot), number(m, at.timestep)
     count = width + size(m, at.ntendon)
-    # Of every degree of freedom, then of every tendon: what drives it, what presses pins, and three of its row.
+    # Of every degree of freedom, then of every tendon: what drives it, what presses pins, and the terms of its row.
     room = zeros(scratch(width + count), width + count)
     about, along, reactions = numbers_at(room), numbers_at(room + 8 * width), numbers_at(room + 8 * count)
-    rows = numbers_at(zeros(scratch(3 * count), 3 * count))
+    rows = numbers_at(zeros(scratch(TERMS * count), TERMS * count))
     driven(m, d, at, of, kinds, along, about)
     # Tendons load pins: the table has pins last.
     while e < end:
-        kind, loads, row = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1]
+        kind, loads, row = int(values[e + ELEMENT.kind]), int(values[e + ELEMENT.loads]), objects[e + 1]
         if kind == PIN:
             seen = pin(m, d, at, of, e, x, reactions)
         elif kind == MASS:
@@ -137,19 +113,23 @@ def compute(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) ->
         else:
             held = act[x] if loads > 0 else 0.0
             if kind == BRANCH:
-                held = act[z - int(values[e + SHARE])]
+                held = act[z - int(values[e + ELEMENT.share])]
             seen = tendon(m, d, at, of, kinds, e, act[z], held, along, about, reactions)
-        row = 3 * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
+        row = TERMS * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
         level, pull, damp, limit = _exerted(numbers(m, at.tuple_objprm, e), kind == PIN, seen, act[z], dt)
-        rows[row] += pull
-        rows[row + 1] += damp
-        rows[row + 2] += limit
-        states[place + LEVEL], states[place + LOAD], states[place + TURN] = level, seen[1], seen[4]
+        rows[row + TERM.pull] += pull
+        rows[row + TERM.damp] += damp
+        rows[row + TERM.limit] += limit
+        states[place + SIGNAL.level], states[place + SIGNAL.load], states[place + SIGNAL.turn] = (
+            level,
+            seen.load,
+            seen.turn,
+        )
         # `advance` moves the bristles, with the speed that the step ends with.
         rate[z] = 0.0
         for k in range(x, x + loads):
             rate[k] = 0.0
-        e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + loads, place + SIGNALS
+        e, z, x, place = e + int(values[e + ELEMENT.length]), z + 1, x + loads, place + SIGNALS
     write_rows(m, d, at, of, kinds, rows, dt)
 
 
@@ -157,10 +137,23 @@ def compute(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) ->
 def _exerted(p: Pointer, of_pin: bool, seen: Seen, force: float, dt: float) -> tuple[float, float, float, float]:
     """Return the level by (9b), (16), and a friction's part of its row: F - x, c + b, and the most that it exerts."""
     speed, tension, pressing, most, turn = seen
-    level = _level(of_pin, p[COULOMB], p[STATIC], p[STRIBECK], p[EXPONENT], p[FLOOR], p[DRAG], speed, pressing, turn)
-    stiffness = p[STIFFNESS] + p[HARDENING] * abs(force)
-    pull, damp, limit = _law(level, stiffness, p[VISCOUS], p[MICRO], speed, tension, most, force, dt)
-    return level, p[RATIO] * pull, p[RATIO] * p[RATIO] * damp, abs(p[RATIO]) * limit
+    level = _level(
+        of_pin,
+        p[ELEMENT.coulomb],
+        p[ELEMENT.stiction],
+        p[ELEMENT.stribeck_velocity],
+        p[ELEMENT.stribeck_exponent],
+        p[ELEMENT.floor],
+        p[ELEMENT.drag],
+        speed,
+        pressing,
+        turn,
+    )
+    stiffness = p[ELEMENT.stiffness] + p[ELEMENT.hardening] * abs(force)
+    pull, damp, limit = _law(
+        level, stiffness, p[ELEMENT.viscous], p[ELEMENT.micro_damping], speed, tension, most, force, dt
+    )
+    return level, p[ELEMENT.ratio] * pull, p[ELEMENT.ratio] * p[ELEMENT.ratio] * damp, abs(p[ELEMENT.ratio]) * limit
 
 
 @njit_inline
@@ -192,22 +185,27 @@ def advance(m: int, d: int, instance: int, at: Model, of: Data, contact: Contact
     held_tensions(m, d, at, of, kinds, held)
     row_forces(m, d, at, of, kinds, width, forces)
     while e < end:
-        kind, loads, row, bristle = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1], act[z]
-        of_joint, level = types[e + 1] == kinds.of_joint, states[place + LEVEL]
-        speed = _speed(m, d, at, of, row, of_joint) * values[e + RATIO]
+        kind, loads, row, bristle = (
+            int(values[e + ELEMENT.kind]),
+            int(values[e + ELEMENT.loads]),
+            objects[e + 1],
+            act[z],
+        )
+        of_joint, level = types[e + 1] == kinds.of_joint, states[place + SIGNAL.level]
+        speed = _speed(m, d, at, of, row, of_joint) * values[e + ELEMENT.ratio]
         row = integer_in(m, at.jnt_dofadr, row) if of_joint else width + row
-        states[place + FORCE] = forces[row] / values[e + RATIO]
-        if kind != PIN and states[place + LOAD] == 0.0 and max(level, abs(bristle)) <= NUMERICAL_FLOOR:
+        states[place + SIGNAL.force] = forces[row] / values[e + ELEMENT.ratio]
+        if kind != PIN and states[place + SIGNAL.load] == 0.0 and max(level, abs(bristle)) <= NUMERICAL_FLOOR:
             # A tendon that is slack: its bristles stand up, so that the next step need not ask for them.
             bristle = speed = 0.0
-        stiffness = values[e + STIFFNESS] + values[e + HARDENING] * abs(bristle)
+        stiffness = values[e + ELEMENT.stiffness] + values[e + ELEMENT.hardening] * abs(bristle)
         act[z] = bristle + _slide(bristle, stiffness * dt * speed, level)[0]
         if kind == PIN:
             places[objects[e]], pins = x, True
             act[x], act[x + 1], act[x + 2] = 0.0, 0.0, 0.0
         elif loads > 0:
             act[x] = held[objects[e]]
-        e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + loads, place + SIGNALS
+        e, z, x, place = e + int(values[e + ELEMENT.length]), z + 1, x + loads, place + SIGNALS
     if pins:
         contact_loads(m, d, at, of, contact, kinds, places, act)
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from finger_pin.exceptions import InputError
-from finger_pin.exchange.mujoco_friction import FORCE, LENGTH, LEVEL, LOAD, NAME, SIGNALS, TURN
+from finger_pin.exchange.mujoco_friction import ELEMENT, NAME, SIGNAL, SIGNALS
 from finger_pin.mujoco.registration import register
 from finger_pin.typing import Array
 
@@ -95,8 +95,8 @@ def _signals(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Signa
     while e < end:
         kind = mujoco.mjtObj(int(model.tuple_objtype[e]))
         names.append(mujoco.mj_id2name(model, kind, int(model.tuple_objid[e])))
-        e += int(model.tuple_objprm[e + LENGTH])
+        e += int(model.tuple_objprm[e + ELEMENT.length])
     first = int(model.plugin_stateadr[model.actuator_plugin[actuator]])
     states = data.plugin_state[first : first + SIGNALS * len(names)].reshape(-1, SIGNALS)
-    level, force, load, turn = (states[:, k] for k in (LEVEL, FORCE, LOAD, TURN))
+    level, force, load, turn = (states[:, k] for k in SIGNAL)
     return Signals(tuple(names), level, force, data.act[z : z + len(names)], load, turn)

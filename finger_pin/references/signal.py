@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,12 +27,24 @@ Flags = NDArray[np.bool_]
 _ROUNDING = 1e-9
 
 
+class Harmonic(NamedTuple):
+    """Columns of sinusoids: offset and amplitude in the unit of the signal, frequency, Hz, and phase, rad."""
+
+    offset: int
+    amplitude: int
+    frequency: int
+    phase: int
+
+
+HARMONIC = Harmonic(*range(len(Harmonic._fields)))
+
+
 @dataclass(frozen=True, eq=False)
 class Signal:
     """k signals over time.
 
     Attributes:
-        harmonics: Shape (k, 4): offset and amplitude in the unit of the signal, frequency, Hz, phase, rad.
+        harmonics: Columns `HARMONIC`, shape (k, 4).
         knots: Shape (m,), s, increasing, at least two; the polynomials are constant outside.
         coefficients: Shape (6, m - 1, k): of the powers 5 to 0 of the time since the knot before, as scipy's `PPoly`.
     """
@@ -207,7 +220,7 @@ class Signal:
         if start == 0.0:
             return self
         harmonics = self.harmonics.copy()
-        harmonics[:, 3] += 2.0 * math.pi * harmonics[:, 2] * start
+        harmonics[:, HARMONIC.phase] += 2.0 * math.pi * harmonics[:, HARMONIC.frequency] * start
         return replace(self, harmonics=harmonics, knots=self.knots - start)
 
 

@@ -5,7 +5,7 @@ import pytest
 from core_cases import condensed
 from test_contact_motion import G, plane, scene
 
-from finger_pin.core.evaluation.law_code import FORCE
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
@@ -41,7 +41,7 @@ def test_contacts_that_sleep_change_not_one_bit_of_a_motion_in_which_they_wake_u
             waker.advance(0.01 * k, room)
         assert np.array_equal(asleep.x, awake.x)
         slept = max(slept, int(sleeper.work.paths.culled.sum()))
-        closed |= waker.work.rows[FORCE] != 0.0
+        closed |= waker.work.rows[ROW.force] != 0.0
     assert slept >= 15
     # The capsule met what it slept beside.
     names = one.rows[0].names

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.buffers import Work
-from finger_pin.core.evaluation.law_code import RATE
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
-from finger_pin.core.path_tables import COLUMNS, Paths, PathWork
+from finger_pin.core.path_tables import COLUMNS, PIECE, Paths, PathWork
 from finger_pin.core.tables import Tables
 
 # Derivations and origins: core/stepping/NOTES.md.
@@ -86,7 +86,7 @@ def path_of(tables: Tables, e: int, own: PathWork) -> float:
                 way += abs(one - two) - abs(one) - abs(two)
             way += own.travel[other]
         total += lever * way
-        if endless and paths.moves[s, 2] > paths.moves[s, 0] and tables.kinds[j] == 0:
+        if endless and paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and tables.kinds[j] == 0:
             turned += way
     return widened(total, turned, own.far[e])
 
@@ -147,7 +147,7 @@ def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
         if not abs(states[tables.state[m]]) < _STRAIGHT_DEFLECTION:
             return False
     for m in range(k + 1, k + COLUMNS):
-        states[tables.state[m]] = rows[RATE, m] = 0.0
+        states[tables.state[m]] = rows[ROW.rate, m] = 0.0
     return True
 
 

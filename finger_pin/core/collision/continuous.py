@@ -22,12 +22,12 @@ from finger_pin.core.collision.broad_phase import (
     set_culled,
     widened,
 )
-from finger_pin.core.evaluation.law_code import SIDE
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
-from finger_pin.core.path_tables import LOOKS, PathWork
+from finger_pin.core.path_tables import LOOK, LOOKS, PIECE, PathWork
 from finger_pin.core.stepping.integration import Integration
-from finger_pin.core.tables import END, FIRST, KINK, Tables
+from finger_pin.core.tables import Tables
 
 # Bernstein coefficients of a coordinate over a step.
 _Coefficients: TypeAlias = tuple[float, float, float, float, float]
@@ -43,8 +43,6 @@ _MIN_NORMAL_COSINE = 0.5
 # Bisections for the moment of a meeting: to 2^-10 of the interval; and its latest share, 1: the end
 # itself would be no other try.
 _MEETING_BISECTIONS, _MAX_MEETING_SHARE = 10, 0.999
-# What is seen at a moment, in this order: the share of the step, the gap, its normal, how far the core of one body is.
-_SHARE, _GAP, _NORMAL, _FAR = 0, 1, 2, 5
 
 
 @njit_inline
@@ -70,12 +68,12 @@ def _between(start: float, end: float, b: _Coefficients) -> _Coefficients:
 @njit_always_inline
 def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> tuple[float, float]:
     """Return bounds of the path between two moments, and of its distance from its chord, m."""
-    paths, far = tables.paths, max(one[_FAR], two[_FAR])
+    paths, far = tables.paths, max(one[LOOK.far], two[LOOK.far])
     endless = np.isinf(paths.extents[e])
     path = turned = moves = bends = turns = swing = curl = 0.0
     for s in range(paths.start[e], paths.start[e + 1]):
         j, other, lever = paths.at[s], paths.opposing_coordinate[s], paths.motion_bounds[s]
-        carries = paths.moves[s, 2] > paths.moves[s, 0] and tables.kinds[j] == 0
+        carries = paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and tables.kinds[j] == 0
         if lever == 0.0 and not carries:
             continue
         whole = (
@@ -85,7 +83,7 @@ def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> 
             _difference(own, j, other, 3),
             _difference(own, j, other, 4),
         )
-        b0, b1, b2, b3, b4 = _between(one[_SHARE], two[_SHARE], whole)
+        b0, b1, b2, b3, b4 = _between(one[LOOK.share], two[LOOK.share], whole)
         d0, d1, d2, d3 = b1 - b0, b2 - b1, b3 - b2, b4 - b3
         way = abs(d0) + abs(d1) + abs(d2) + abs(d3)
         most = max(max(abs(d0), abs(d1)), max(abs(d2), abs(d3)))
@@ -111,19 +109,19 @@ def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> 
 def _clear(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> bool:
     """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
     path, bend = _bounds(tables, own, e, one, two)
-    if one[_GAP] < 0.0 or two[_GAP] < 0.0:
-        return path < PARTING_PATH_PER_DEPTH * (abs(one[_GAP]) + abs(two[_GAP])) + MIN_PARTING_PATH
-    if path < one[_GAP] + two[_GAP] + _GAP_ROUNDING:
+    if one[LOOK.gap] < 0.0 or two[LOOK.gap] < 0.0:
+        return path < PARTING_PATH_PER_DEPTH * (abs(one[LOOK.gap]) + abs(two[LOOK.gap])) + MIN_PARTING_PATH
+    if path < one[LOOK.gap] + two[LOOK.gap] + _GAP_ROUNDING:
         return True
     tilt, size = 0.0, 0.0
-    for i in range(_NORMAL, _NORMAL + 3):
+    for i in range(LOOK.normal_x, LOOK.normal_z + 1):
         tilt += (one[i] - two[i]) * (one[i] - two[i])
         size += one[i] * two[i]
     if not size > _MIN_NORMAL_COSINE:
         return False
     # Of the plane across the first normal the second tells, as far as it is the same.
-    slant = np.sqrt(tilt) * (max(one[_FAR], two[_FAR]) + tables.paths.extents[e]) if tilt > 0.0 else 0.0
-    return bend + slant + GAP_ACCURACY < min(one[_GAP], two[_GAP])
+    slant = np.sqrt(tilt) * (max(one[LOOK.far], two[LOOK.far]) + tables.paths.extents[e]) if tilt > 0.0 else 0.0
+    return bend + slant + GAP_ACCURACY < min(one[LOOK.gap], two[LOOK.gap])
 
 
 @njit_inline
@@ -136,23 +134,23 @@ def _look(integration: Integration, model: Model, e: int, share: float, seen: Ve
         b = own.control[j]
         state[j] = w0 * b[0] + w1 * b[1] + w2 * b[2] + w3 * b[3] + w4 * b[4]
     near = call_at(model.look, integration.model, float(e))
-    seen[_SHARE], seen[_GAP], seen[_FAR] = share, own.out[e, 0], distance(model.tables.paths, e, own)
+    seen[LOOK.share], seen[LOOK.gap], seen[LOOK.far] = share, own.out[e, 0], distance(model.tables.paths, e, own)
     for r in range(3):
         # Of what is far away the normal is not asked for.
-        seen[_NORMAL + r] = own.out[e, 1 + r] if near else 0.0
+        seen[LOOK.normal_x + r] = own.out[e, 1 + r] if near else 0.0
 
 
 @njit_always_inline
 def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: Vector) -> float:
     """Return the time just after bodies have met that are apart at one moment and not at another."""
     looks = model.work.paths.looks
-    early, late, middle = one[_SHARE], two[_SHARE], looks[LOOKS - 1]
+    early, late, middle = one[LOOK.share], two[LOOK.share], looks[LOOKS - 1]
     for _ in range(_MEETING_BISECTIONS):
         _look(integration, model, e, 0.5 * (early + late), middle)
-        if middle[_GAP] < 0.0:
-            late = middle[_SHARE]
+        if middle[LOOK.gap] < 0.0:
+            late = middle[LOOK.share]
         else:
-            early = middle[_SHARE]
+            early = middle[LOOK.share]
     return min(late, _MAX_MEETING_SHARE)
 
 
@@ -166,15 +164,15 @@ def _scan(integration: Integration, model: Model, e: int, seen: bool) -> float:
     looks = own.looks
     _look(integration, model, e, 1.0, looks[1])
     _look(integration, model, e, 0.0, looks[0])
-    own.ahead[e] = looks[1, _GAP] - GAP_ACCURACY
-    parted, met, depth = looks[0, _GAP] >= 0.0, NOTHING, 1
+    own.ahead[e] = looks[1, LOOK.gap] - GAP_ACCURACY
+    parted, met, depth = looks[0, LOOK.gap] >= 0.0, NOTHING, 1
     while depth > 0:
         one, two = looks[0], looks[depth]
         if depth < LOOKS - 2 and not _clear(tables, own, e, one, two):
             depth += 1
-            _look(integration, model, e, 0.5 * (one[_SHARE] + two[_SHARE]), looks[depth])
+            _look(integration, model, e, 0.5 * (one[LOOK.share] + two[LOOK.share]), looks[depth])
             continue
-        if two[_GAP] >= 0.0:
+        if two[LOOK.gap] >= 0.0:
             if met < NOTHING:
                 return met
             parted = True
@@ -190,9 +188,9 @@ def _scan(integration: Integration, model: Model, e: int, seen: bool) -> float:
 def _pressed(tables: Tables, rows: Matrix, k: int) -> bool:
     """Return whether a contact presses, or would if it were not held open."""
     pressed = False
-    for g in range(tables.groups.shape[0]):
-        if tables.groups[g, FIRST] <= k < tables.groups[g, END]:
-            pressed = rows[tables.groups[g, KINK], k] > 0.0
+    for g in range(tables.groups.first.size):
+        if tables.groups.first[g] <= k < tables.groups.end[g]:
+            pressed = rows[tables.groups.kink[g], k] > 0.0
     return pressed
 
 
@@ -224,7 +222,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
             own.ahead[e] = end - GAP_ACCURACY - path
             if min(start, end) >= 0.0 and path < start + end:
                 continue
-            if max(start, end) < 0.0 and rows[SIDE, k] > 0.0:
+            if max(start, end) < 0.0 and rows[ROW.side, k] > 0.0:
                 continue
             ahead = own.ahead[e]
             share = _scan(integration, model, e, _pressed(tables, rows, k))

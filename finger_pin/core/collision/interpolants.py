@@ -14,6 +14,7 @@ from scipy.special import comb
 from finger_pin.core.collision.broad_phase import GAP_ACCURACY
 from finger_pin.core.collision.continuous import MIN_PARTING_PATH, PARTING_PATH_PER_DEPTH
 from finger_pin.core.evaluation.attitude_charts import Charts
+from finger_pin.core.path_tables import PIECE
 from finger_pin.core.stepping.trajectory import Meeting
 from finger_pin.core.tables import build_tables
 from finger_pin.mechanism.mechanism import Mechanism
@@ -93,7 +94,9 @@ class _Meetings:
         for e, _ in self._pieces:
             own = slice(paths.start[e], paths.start[e + 1])
             found[e] = float(levers[own] @ np.where(levers[own] > 0.0, ways[own], 0.0))
-            carries = (paths.moves[own, 2] > paths.moves[own, 0]) & (self._kinds[paths.at[own]] == 0)
+            carries = (paths.moves[own, PIECE.frame] > paths.moves[own, PIECE.first]) & (
+                self._kinds[paths.at[own]] == 0
+            )
             turned = float(ways[own][carries].sum()) if np.isinf(paths.extents[e]) else 0.0
             if turned > 0.0:
                 distance = self._seen(e, interpolate(np.array([start]))[0])[1]

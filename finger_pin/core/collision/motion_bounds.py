@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.chains import PRISMATIC, ROTATION, TRANSLATION, Chains
+from finger_pin.core.chains import BODY, PRISMATIC, Chains
 from finger_pin.mechanism.path_elements import PathElement
 from finger_pin.typing import Array
 
@@ -33,12 +33,12 @@ class Carrying(NamedTuple):
         """Return the motions of chains."""
         parents, sliding = chains.parents.tolist(), (chains.kinds == PRISMATIC).tolist()
         slides = [float(most) if each else None for each, most in zip(sliding, chains.slides, strict=True)]
-        distances = [float(np.linalg.norm(body[TRANSLATION : TRANSLATION + 3])) for body in chains.bodies]
+        distances = [float(np.linalg.norm(body[BODY.translation : BODY.translation + 3])) for body in chains.bodies]
         axes: list[tuple[float, ...] | None] = []
         for at in range(len(parents)):
             rotation, above = np.eye(3), at
             while above >= 0 and sliding[above]:
-                rotation = chains.bodies[above, ROTATION : ROTATION + 9].reshape(3, 3) @ rotation
+                rotation = chains.bodies[above, BODY.rotation : BODY.rotation + 9].reshape(3, 3) @ rotation
                 above = parents[above]
             axes.append(None if above >= 0 else tuple(rotation[:, 2].tolist()))
         return cls(parents, slides, distances, axes)

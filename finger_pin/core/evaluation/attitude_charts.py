@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.chains import ROTATION
+from finger_pin.core.chains import BODY
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables import Tables
@@ -34,9 +34,9 @@ def place(frame: Matrix, q: Vector, body: Vector) -> None:
     along_z = (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y))
     for r in range(3):
         # The frame along x has its axes along -z, y and x.
-        body[ROTATION + 3 * r] = -(frame[r, 0] * along_z[0] + frame[r, 1] * along_z[1] + frame[r, 2] * along_z[2])
-        body[ROTATION + 3 * r + 1] = frame[r, 0] * along_y[0] + frame[r, 1] * along_y[1] + frame[r, 2] * along_y[2]
-        body[ROTATION + 3 * r + 2] = frame[r, 0] * along_x[0] + frame[r, 1] * along_x[1] + frame[r, 2] * along_x[2]
+        body[BODY.rotation + 3 * r] = -(frame[r, 0] * along_z[0] + frame[r, 1] * along_z[1] + frame[r, 2] * along_z[2])
+        body[BODY.rotation + 3 * r + 1] = frame[r, 0] * along_y[0] + frame[r, 1] * along_y[1] + frame[r, 2] * along_y[2]
+        body[BODY.rotation + 3 * r + 2] = frame[r, 0] * along_x[0] + frame[r, 1] * along_x[1] + frame[r, 2] * along_x[2]
 
 
 def place_all(tables: Tables, attitude: Matrix) -> None:

@@ -8,7 +8,7 @@ each of its states decays on its own.
 from __future__ import annotations
 
 from finger_pin.core.buffers import Work
-from finger_pin.core.evaluation import law_code as at
+from finger_pin.core.evaluation.law_code import ROW, TOUCH_SLOPE
 from finger_pin.core.jit import Indices, Matrix, njit_always_inline, njit_inline
 from finger_pin.core.linear_systems import Blocks
 from finger_pin.core.tables import Tables
@@ -29,7 +29,7 @@ def _join(tables: Tables, work: Work, blocks: Blocks) -> None:
         label[a] = a
     for index in range(work.paths.closed_count[0]):
         e = work.paths.closed[index]
-        if work.rows[at.SIDE, paths.row[e]] < 0.0:
+        if work.rows[ROW.side, paths.row[e]] < 0.0:
             continue
         for s in range(paths.start[e], paths.start[e + 1]):
             first, second = label[blocks.atom[paths.at[paths.start[e]]]], label[blocks.atom[paths.at[s]]]
@@ -63,7 +63,7 @@ def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
         k = paths.row[work.paths.active_pairs[index]]
         for m in range(1, 3):
             blocks.active_states[active] = tables.state[k + m]
-            blocks.loose[tables.state[k + m]] = -work.slopes[at.R_LENGTH + 3 + m, k + m]
+            blocks.loose[tables.state[k + m]] = -work.slopes[TOUCH_SLOPE.rate_by_state_1 + m - 1, k + m]
             active += 1
     blocks.active_state_count[0] = active
     for b in range(blocks.number[0]):
@@ -75,7 +75,7 @@ def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
         for index in range(work.paths.closed_count[0]):
             e = work.paths.closed[index]
             k = paths.row[e]
-            if work.rows[at.SIDE, k] < 0.0 or blocks.label[blocks.atom[paths.at[paths.start[e]]]] != b:
+            if work.rows[ROW.side, k] < 0.0 or blocks.label[blocks.atom[paths.at[paths.start[e]]]] != b:
                 continue
             blocks.touches[touches] = k
             touches += 1

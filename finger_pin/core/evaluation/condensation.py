@@ -13,8 +13,8 @@ r, so the solution is kept as one matrix, and a stage costs one product with it.
 
 from __future__ import annotations
 
-from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent, factorise, substitute
+from finger_pin.core.evaluation.law_code import SLOPE
 from finger_pin.core.evaluation.readings import add_readings, resolve_readings
 from finger_pin.core.jit import (
     CompiledFunction,
@@ -123,15 +123,19 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
     for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
         k = blocks.rows[index]
         row, state = linear.gain[k], tables.state[k]
-        of_length, of_speed, of_curvature = slopes[at.F_LENGTH, k], slopes[at.F_SPEED, k], slopes[at.F_CURVATURE, k]
-        of_load, of_command = slopes[at.F_LOAD, k], slopes[at.F_COMMAND, k]
+        of_length, of_speed, of_curvature = (
+            slopes[SLOPE.force_by_length, k],
+            slopes[SLOPE.force_by_speed, k],
+            slopes[SLOPE.force_by_curvature, k],
+        )
+        of_load, of_command = slopes[SLOPE.force_by_load, k], slopes[SLOPE.force_by_command, k]
         by_load = by_command = 0.0
         factor = total = 0.0
         if state >= 0:
-            factor = 1.0 / (g - slopes[at.R_STATE, k])
-            by_load, by_command = factor * slopes[at.R_LOAD, k], factor * slopes[at.R_COMMAND, k]
+            factor = 1.0 / (g - slopes[SLOPE.rate_by_state, k])
+            by_load, by_command = factor * slopes[SLOPE.rate_by_load, k], factor * slopes[SLOPE.rate_by_command, k]
             # d phi by z and by z' = g dz - r_z.
-            total = slopes[at.F_STATE, k] + g * slopes[at.F_RATE, k]
+            total = slopes[SLOPE.force_by_state, k] + g * slopes[SLOPE.force_by_rate, k]
         own = linear.state_gain[max(state, 0)]
         for c in range(full):
             row[c] = 0.0
@@ -156,22 +160,24 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
                     own[c] += by_command * command[c]
         reads = tables.read_start[k + 1] > tables.read_start[k]
         if state >= 0:
-            by_length, by_speed = factor * slopes[at.R_LENGTH, k], factor * slopes[at.R_SPEED, k]
-            _add_motion(model, k, width, by_length, by_speed, factor * slopes[at.R_CURVATURE, k], own)
+            by_length, by_speed = factor * slopes[SLOPE.rate_by_length, k], factor * slopes[SLOPE.rate_by_speed, k]
+            _add_motion(model, k, width, by_length, by_speed, factor * slopes[SLOPE.rate_by_curvature, k], own)
             if reads:
-                add_readings(tables, k, factor * slopes[at.R_READING, k], wide, own)
+                add_readings(tables, k, factor * slopes[SLOPE.rate_by_reading, k], wide, own)
             for c in range(full):
                 row[c] += total * own[c]
             # The column of r_z itself, without the difference g dz - r_z.
             itself = 2 * width + blocks.state_place[state]
             own[itself] += factor
-            row[itself] += factor * (slopes[at.F_STATE, k] + slopes[at.F_RATE, k] * slopes[at.R_STATE, k])
+            row[itself] += factor * (
+                slopes[SLOPE.force_by_state, k] + slopes[SLOPE.force_by_rate, k] * slopes[SLOPE.rate_by_state, k]
+            )
         elif of_length == 0.0 and of_speed == 0.0 and of_curvature == 0.0 and not (pressed or fed or reads):
             # An idle row, such as a limiter inside its range.
             continue
         _add_motion(model, k, width, of_length, of_speed, of_curvature, row)
         if reads:
-            add_readings(tables, k, slopes[at.F_READING, k], wide, row)
+            add_readings(tables, k, slopes[SLOPE.force_by_reading, k], wide, row)
         _push(tables, linear, k, full, row)
     return full == wide or resolve_readings(tables, linear, b, width, wide)
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from finger_pin.core.buffers import Work
-from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
+from finger_pin.core.evaluation.law_code import ROW
+from finger_pin.core.evaluation.law_code import TOUCH_SLOPE as AT
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
 from finger_pin.core.jit import CompiledFunction, Vector, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS
-from finger_pin.core.tables import END, FIRST, Tables
+from finger_pin.core.tables import Tables
 
 
 @CompiledFunction
@@ -28,8 +29,8 @@ def measure(address: int, _time: float) -> int:
 def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
     """Evaluate the contacts, which come before all other rows, but for those culled, and add to A^T phi."""
     rows, paths = work.rows, work.paths
-    for g in range(tables.groups.shape[0]):
-        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+    for g in range(tables.groups.first.size):
+        begin, end = tables.groups.first[g], tables.groups.end[g]
         if begin >= tables.contact_rows:
             continue
         for index in range(paths.active_pair_count[0]):
@@ -42,15 +43,15 @@ def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
                 # One that is open moves nothing, and sees no speed.
                 for a in range(tables.arm_start[m], tables.arm_start[m + 1] if paths.active[e] else 0):
                     speed += work.arm[a] * v[tables.arm_at[a]]
-                rows[at.LENGTH, m], rows[at.SPEED, m] = paths.length[m], speed
+                rows[ROW.length, m], rows[ROW.speed, m] = paths.length[m], speed
                 if m > k:
-                    rows[at.STATE, m] = z[tables.state[m]]
-            call_value(tables.laws[g, 0], rows, tables.parameters, k, k + COLUMNS)
+                    rows[ROW.state, m] = z[tables.state[m]]
+            call_value(tables.groups.value[g], rows, tables.parameters, k, k + COLUMNS)
     push(tables, work)
     for index in range(work.paths.closed_count[0]):
         k = tables.paths.row[work.paths.closed[index]]
         for e in range(tables.arm_start[k], tables.arm_start[k + COLUMNS]):
-            work.torque[tables.arm_at[e]] += work.arm[e] * rows[at.FORCE, tables.arm_row[e]]
+            work.torque[tables.arm_at[e]] += work.arm[e] * rows[ROW.force, tables.arm_row[e]]
 
 
 @njit_inline
@@ -71,8 +72,8 @@ def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear,
     slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
     first, second = tables.state[k + 1], tables.state[k + 2]
     # (g - A) dz = r_z + B (what the contact sees): A is two by two.
-    a, b = g - slopes[at.R_LENGTH + 4, k + 1], -slopes[at.R_LENGTH + 5, k + 1]
-    c, d = -slopes[at.R_LENGTH + 4, k + 2], g - slopes[at.R_LENGTH + 5, k + 2]
+    a, b = g - slopes[AT.rate_by_state_1, k + 1], -slopes[AT.rate_by_state_2, k + 1]
+    c, d = -slopes[AT.rate_by_state_1, k + 2], g - slopes[AT.rate_by_state_2, k + 2]
     inverse = 1.0 / (a * d - b * c)
     for i in range(2):
         by_first, by_second = (inverse * d, -inverse * b) if i == 0 else (-inverse * c, inverse * a)
@@ -81,20 +82,25 @@ def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear,
         for column in range(wide + tables.read_states.size):
             own[column] = 0.0
         weights = (
-            by_first * slopes[at.R_LENGTH, k + 1] + by_second * slopes[at.R_LENGTH, k + 2],
-            by_first * slopes[at.R_LENGTH + 1, k + 1] + by_second * slopes[at.R_LENGTH + 1, k + 2],
-            by_first * slopes[at.R_LENGTH + 2, k + 1] + by_second * slopes[at.R_LENGTH + 2, k + 2],
-            by_first * slopes[at.R_LENGTH + 3, k + 1] + by_second * slopes[at.R_LENGTH + 3, k + 2],
+            by_first * slopes[AT.rate_by_gap, k + 1] + by_second * slopes[AT.rate_by_gap, k + 2],
+            by_first * slopes[AT.rate_by_speed, k + 1] + by_second * slopes[AT.rate_by_speed, k + 2],
+            by_first * slopes[AT.rate_by_slip_1, k + 1] + by_second * slopes[AT.rate_by_slip_1, k + 2],
+            by_first * slopes[AT.rate_by_slip_2, k + 1] + by_second * slopes[AT.rate_by_slip_2, k + 2],
         )
         _add_inputs(tables, k, weights, linear, width, own)
         own[2 * width + state_place[first]] += by_first
         own[2 * width + state_place[second]] += by_second
     for m in range(3):
         row = linear.gain[k + m]
-        of_first, of_second = slopes[4, k + m], slopes[5, k + m]
+        of_first, of_second = slopes[AT.force_by_state_1, k + m], slopes[AT.force_by_state_2, k + m]
         for column in range(wide + tables.read_states.size):
             row[column] = of_first * linear.state_gain[first, column] + of_second * linear.state_gain[second, column]
-        weights = slopes[0, k + m], slopes[1, k + m], slopes[2, k + m], slopes[3, k + m]
+        weights = (
+            slopes[AT.force_by_gap, k + m],
+            slopes[AT.force_by_speed, k + m],
+            slopes[AT.force_by_slip_1, k + m],
+            slopes[AT.force_by_slip_2, k + m],
+        )
         _add_inputs(tables, k, weights, linear, width, row)
         for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
             arm, target = linear.arm[e], linear.force[place[tables.arm_at[e]]]
@@ -125,9 +131,9 @@ def add_pushes(address: int, row: float) -> int:
     for index in range(own.closed_count[0]):
         e = own.closed[index]
         passing = passes(paths, e, tables.joint_pin[k])
-        if passing == 0.0 or work.rows[at.SIDE, paths.row[e]] < 0.0:
+        if passing == 0.0 or work.rows[ROW.side, paths.row[e]] < 0.0:
             continue
-        size = max(work.rows[at.LOAD, k], 1e-100)
+        size = max(work.rows[ROW.load, k], 1e-100)
         for m in range(3):
             share = 0.0
             for r in range(3):

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import AXIS, Work
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.inputs import inputs, tip_forces
-from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, READING, SPEED, STATE
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS
-from finger_pin.core.tables import END, FED, FIRST, PRESSED, Tables
+from finger_pin.core.tables import Tables
 
 
 @njit_always_inline
@@ -32,7 +32,7 @@ def _tips(tables: Tables, work: Work) -> None:
                     tip[r] += work.rotation[body, r, c] * tables.tip_offset[t, c]
         j = body
         while j >= 0:
-            axis = work.spatial[AXIS, j]
+            axis = work.spatial.axis[j]
             jacobian[0, j] = axis[3] + axis[1] * tip[2] - axis[2] * tip[1]
             jacobian[1, j] = axis[4] + axis[2] * tip[0] - axis[0] * tip[2]
             jacobian[2, j] = axis[5] + axis[0] * tip[1] - axis[1] * tip[0]
@@ -69,7 +69,7 @@ def _pin_load(tables: Tables, k: int, load: float, work: Work) -> float:
 def _sum_of_terms(tables: Tables, begin: int, end: int, work: Work) -> float:
     total = 0.0
     for e in range(begin, end):
-        total += tables.weights[e] * work.rows[FORCE, tables.terms[e]]
+        total += tables.weights[e] * work.rows[ROW.force, tables.terms[e]]
     return total
 
 
@@ -81,46 +81,46 @@ def _see(tables: Tables, q: Vector, v: Vector, z: Vector, work: Work) -> None:
     """
     rows, first = work.rows, tables.contact_rows
     for k in range(first, rows.shape[1]):
-        rows[LENGTH, k] = tables.offset[k] + work.paths.length[k]
-        rows[SPEED, k] = 0.0
-        rows[CURVATURE, k] = tables.curvature_offset[k] + work.paths.turn[k]
+        rows[ROW.length, k] = tables.offset[k] + work.paths.length[k]
+        rows[ROW.speed, k] = 0.0
+        rows[ROW.curvature, k] = tables.curvature_offset[k] + work.paths.turn[k]
     for e in range(tables.arm_start[first], tables.arm_at.size):
         k, j = tables.arm_row[e], tables.arm_at[e]
-        rows[LENGTH, k] += tables.measure[e] * q[j]
-        rows[SPEED, k] += work.arm[e] * v[j]
+        rows[ROW.length, k] += tables.measure[e] * q[j]
+        rows[ROW.speed, k] += work.arm[e] * v[j]
     for e in range(tables.bend_start[first], tables.bend_at.size):
-        rows[CURVATURE, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
+        rows[ROW.curvature, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
     for i in range(2 * first // 3, tables.state_row.size):
-        rows[STATE, tables.state_row[i]] = z[i]
+        rows[ROW.state, tables.state_row[i]] = z[i]
     for e in range(tables.read_at.size):
-        rows[READING, tables.read_row[e]] = 0.0
+        rows[ROW.reading, tables.read_row[e]] = 0.0
     for e in range(tables.read_at.size):
-        rows[READING, tables.read_row[e]] += tables.read_weight[e] * z[tables.read_at[e]]
+        rows[ROW.reading, tables.read_row[e]] += tables.read_weight[e] * z[tables.read_at[e]]
     for i in range(tables.input_rows.size):
         k = tables.input_rows[i]
-        rows[COMMAND, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
+        rows[ROW.command, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
 
 
 @njit_always_inline
 def _act(tables: Tables, work: Work) -> None:
     """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
     rows = work.rows
-    for g in range(tables.groups.shape[0]):
-        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+    for g in range(tables.groups.first.size):
+        begin, end = tables.groups.first[g], tables.groups.end[g]
         if begin < tables.contact_rows:
             continue
-        if tables.groups[g, FED]:
+        if tables.groups.fed[g]:
             for k in range(begin, end):
-                rows[COMMAND, k] += _sum_of_terms(tables, tables.input_start[k], tables.input_start[k + 1], work)
-        if tables.groups[g, PRESSED]:
+                rows[ROW.command, k] += _sum_of_terms(tables, tables.input_start[k], tables.input_start[k + 1], work)
+        if tables.groups.pressed[g]:
             for k in range(begin, end):
                 load = _sum_of_terms(tables, tables.load_start[k], tables.load_start[k + 1], work)
                 if (tables.has_tip_force or tables.contact_rows) and tables.joint_pin[k] >= 0:
-                    rows[LOAD, k] = _pin_load(tables, k, load, work)
+                    rows[ROW.load, k] = _pin_load(tables, k, load, work)
                 else:
                     work.pull[k, 0] = load
-                    rows[LOAD, k] = abs(load)
-        call_value(tables.laws[g, 0], rows, tables.parameters, begin, end)
+                    rows[ROW.load, k] = abs(load)
+        call_value(tables.groups.value[g], rows, tables.parameters, begin, end)
 
 
 @njit_always_inline
@@ -128,13 +128,13 @@ def _drive(tables: Tables, work: Work, rate: Vector) -> None:
     """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
     rows, torque = work.rows, work.torque
     for e in range(tables.arm_start[tables.contact_rows], tables.arm_at.size):
-        torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
+        torque[tables.arm_at[e]] += work.arm[e] * rows[ROW.force, tables.arm_row[e]]
     for index in range(work.paths.active_pair_count[0]):
         k = tables.paths.row[work.paths.active_pairs[index]]
         for m in range(k + 1, k + COLUMNS):
-            rate[tables.state[m]] = rows[RATE, m]
+            rate[tables.state[m]] = rows[ROW.rate, m]
     for i in range((COLUMNS - 1) * tables.contact_rows // COLUMNS, tables.state_row.size):
-        rate[i] = rows[RATE, tables.state_row[i]]
+        rate[i] = rows[ROW.rate, tables.state_row[i]]
 
 
 @CompiledFunction

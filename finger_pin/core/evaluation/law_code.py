@@ -21,11 +21,66 @@ from finger_pin.core.jit import put as _put
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law, Row, Touch
 
-# Columns of the table of rows; the signals of the law follow. Numba reads them as constants.
-LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, SIDE, READING, FORCE, RATE, SIGNALS = range(11)
-# Columns of the table of slopes: the force by l, l', z, z', N, u, phi and what is read, then z' by all these but z'.
-F_LENGTH, F_SPEED, F_STATE, F_RATE, F_LOAD, F_COMMAND, F_CURVATURE, F_READING = range(8)
-R_LENGTH, R_SPEED, R_STATE, R_LOAD, R_COMMAND, R_CURVATURE, R_READING, SLOPES = range(8, 16)
+
+class RowColumns(NamedTuple):
+    """Columns of the table of rows: the arguments of a law, as in `Row`, its results, and where its signals begin."""
+
+    length: int
+    speed: int
+    state: int
+    load: int
+    command: int
+    curvature: int
+    side: int
+    reading: int
+    force: int
+    rate: int
+    signals: int
+
+
+class SlopeColumns(NamedTuple):
+    """Columns of the table of slopes, in the order of `Law.slopes`; that by what a row reads is the last of each."""
+
+    force_by_length: int
+    force_by_speed: int
+    force_by_state: int
+    force_by_rate: int
+    force_by_load: int
+    force_by_command: int
+    force_by_curvature: int
+    force_by_reading: int
+    rate_by_length: int
+    rate_by_speed: int
+    rate_by_state: int
+    rate_by_load: int
+    rate_by_command: int
+    rate_by_curvature: int
+    rate_by_reading: int
+
+
+class TouchSlopeColumns(NamedTuple):
+    """Columns of the table of slopes in the three rows of a contact, in the order of `ContactLaw.slopes`."""
+
+    force_by_gap: int
+    force_by_speed: int
+    force_by_slip_1: int
+    force_by_slip_2: int
+    force_by_state_1: int
+    force_by_state_2: int
+    rate_by_gap: int
+    rate_by_speed: int
+    rate_by_slip_1: int
+    rate_by_slip_2: int
+    rate_by_state_1: int
+    rate_by_state_2: int
+
+
+# A law is called with a whole table, so that its columns are positions in one array; the compiler takes them for
+# constants. The table of slopes serves both kinds of laws, whose rates begin in the same column.
+ROW, SLOPE = RowColumns(*range(len(RowColumns._fields))), SlopeColumns(*range(len(SlopeColumns._fields)))
+_STEPS = range(len(TouchSlopeColumns._fields) // 2)
+TOUCH_SLOPE = TouchSlopeColumns(*_STEPS, *(SLOPE.rate_by_length + step for step in _STEPS))
+_ARGUMENTS = len(Row._fields)
 
 # Filled in for every law.
 _law: Any = None
@@ -54,7 +109,7 @@ def addresses(law: Law | ContactLaw) -> Addresses:
 def widest(laws: Sequence[Law | ContactLaw]) -> tuple[int, int]:
     """Return the numbers of columns of the table of rows and of that of energies and powers."""
     powers = max((len(law.supplies) + len(law.losses) for law in laws), default=0)
-    return SIGNALS + max((len(law.signals) for law in laws), default=0), 1 + powers
+    return ROW.signals + max((len(law.signals) for law in laws), default=0), 1 + powers
 
 
 def kink_column(law: Law | ContactLaw) -> int:
@@ -64,10 +119,10 @@ def kink_column(law: Law | ContactLaw) -> int:
         InputError: If it bends with the sign of its speed, but has no state whose rate could.
     """
     if law.kink != "speed":
-        return SIGNALS + law.signals.index(law.kink) if law.kink else -1
+        return ROW.signals + law.signals.index(law.kink) if law.kink else -1
     if law.scale is None or law.arms > 1:
         raise InputError(f"law {law.name}: kink", "is 'speed', which is for laws of one arm with a state")
-    return SPEED
+    return ROW.speed
 
 
 @cache
@@ -121,28 +176,27 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
 
 @njit_inline
 def _seen(table: Pointer, stride: int, k: int) -> Row:
-    length, speed, state, load, command, curvature, side, reading = _numbers(table, k, stride, 8)
-    return Row(length, speed, state, load, command, curvature, side, reading)
+    return Row(*_numbers(table, k, stride, _ARGUMENTS))
 
 
 def _value(table: Pointer, numbers: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end):
         found = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
-        _put(table, FORCE * stride + k, stride, found)
+        _put(table, ROW.force * stride + k, stride, found)
 
 
 def _slopes(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end):
-        signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
+        signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
         of_force, of_rate = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), signals)
         _put(filled, k, stride, of_force)
-        _put(filled, R_LENGTH * stride + k, stride, of_rate)
+        _put(filled, SLOPE.rate_by_length * stride + k, stride, of_rate)
 
 
 def _account(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end):
-        signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
-        force, rate = _numbers(table, FORCE * stride + k, stride, 2)
+        signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
+        force, rate = _numbers(table, ROW.force * stride + k, stride, 2)
         found = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), force, rate, signals)
         _put(filled, k, stride, found)
 
@@ -150,40 +204,42 @@ def _account(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, beg
 @njit_inline
 def _touched(table: Pointer, stride: int, k: int) -> Touch:
     gap, speed, state_1, state_2, side = (
-        table[LENGTH * stride + k],
-        table[SPEED * stride + k],
-        table[STATE * stride + k + 1],
-        table[STATE * stride + k + 2],
-        table[SIDE * stride + k],
+        table[ROW.length * stride + k],
+        table[ROW.speed * stride + k],
+        table[ROW.state * stride + k + 1],
+        table[ROW.state * stride + k + 2],
+        table[ROW.side * stride + k],
     )
-    return Touch(gap, speed, table[SPEED * stride + k + 1], table[SPEED * stride + k + 2], state_1, state_2, side)
+    return Touch(
+        gap, speed, table[ROW.speed * stride + k + 1], table[ROW.speed * stride + k + 2], state_1, state_2, side
+    )
 
 
 def _contact_value(table: Pointer, numbers: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end, 3):
         found = _law(_touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
-        _put(table, FORCE * stride + k, 1, found[:3])
-        _put(table, RATE * stride + k + 1, 1, found[3:5])
-        _put(table, SIGNALS * stride + k, stride, found[5:])
+        _put(table, ROW.force * stride + k, 1, found[:3])
+        _put(table, ROW.rate * stride + k + 1, 1, found[3:5])
+        _put(table, ROW.signals * stride + k, stride, found[5:])
 
 
 def _contact_slopes(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     # The slopes of forces stand in the columns of their rows, those of the states' rates below.
     for k in range(begin, end, 3):
-        signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
+        signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
         normal, first, second, rate_1, rate_2 = _law(
             _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), signals
         )
         _put(filled, k, stride, normal)
         _put(filled, k + 1, stride, first)
         _put(filled, k + 2, stride, second)
-        _put(filled, R_LENGTH * stride + k + 1, stride, rate_1)
-        _put(filled, R_LENGTH * stride + k + 2, stride, rate_2)
+        _put(filled, TOUCH_SLOPE.rate_by_gap * stride + k + 1, stride, rate_1)
+        _put(filled, TOUCH_SLOPE.rate_by_gap * stride + k + 2, stride, rate_2)
 
 
 def _contact_account(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end, 3):
-        signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
-        forces, rates = _numbers(table, FORCE * stride + k, 1, 3), _numbers(table, RATE * stride + k + 1, 1, 2)
+        signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
+        forces, rates = _numbers(table, ROW.force * stride + k, 1, 3), _numbers(table, ROW.rate * stride + k + 1, 1, 2)
         touch, own = _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS)
         _put(filled, k, stride, _law(touch, own, forces, rates, signals))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, Work
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.inputs import input_slopes, tip_forces
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import inverse_dynamics
@@ -14,13 +14,13 @@ from finger_pin.core.jit import CompiledFunction, call_at, call_filling, njit_al
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS
-from finger_pin.core.tables import END, FIRST, Tables
+from finger_pin.core.tables import Tables
 
 
 @njit_always_inline
 def _turning_tips(tables: Tables, work: Work, linear: Linear) -> None:
     """Subtract d(J^T F)/dq from by_position: a column turns with the joints below it and moves with the tip."""
-    axes = work.spatial[AXIS]
+    axes = work.spatial.axis
     for t in range(tables.tip_body.size):
         force, column = tables.tip_force[t], work.jacobian[t]
         i = tables.tip_body[t]
@@ -41,7 +41,7 @@ def _turning_tips(tables: Tables, work: Work, linear: Linear) -> None:
 @njit_always_inline
 def _load_slopes(tables: Tables, work: Work, linear: Linear) -> None:
     """Fill the derivatives of all loads by the sum of earlier forces, and by the posture that turns the pins' links."""
-    axes = work.spatial[AXIS]
+    axes = work.spatial.axis
     for k in range(tables.joint_pin.size):
         body = tables.joint_pin[k]
         if not (tables.has_tip_force or tables.contact_rows) or body < 0:
@@ -92,12 +92,12 @@ def linearise(address: int, time: float) -> int:
     inverse_dynamics_derivatives(tables, velocity, work)
     for i in range(size):
         for j in range(size):
-            linear.by_position[i, j] = work.square[BY_POSITION, i, j]
+            linear.by_position[i, j] = work.by_position[i, j]
         # A body and those that it carries stand between their root and the last of them.
         for j in range(tables.roots[i], i + 1):
-            linear.mass[i, j] = linear.mass[j, i] = work.square[MASS_MATRIX, i, j]
-            linear.by_velocity[i, j] = work.square[BY_VELOCITY, i, j]
-            linear.by_velocity[j, i] = work.square[BY_VELOCITY, j, i]
+            linear.mass[i, j] = linear.mass[j, i] = work.mass_matrix[i, j]
+            linear.by_velocity[i, j] = work.by_velocity[i, j]
+            linear.by_velocity[j, i] = work.by_velocity[j, i]
     if control.palm.harmonics.shape[0] > 0:
         call_at(model.bias_rate, address, time)
     if tables.has_tip_force:
@@ -107,15 +107,15 @@ def linearise(address: int, time: float) -> int:
         signal_derivatives(control.guide, time, 3, work.guide_rate)
     if tables.has_tip_force:
         tip_forces(control, time, 1, work.force_rate)
-    for g in range(tables.groups.shape[0]):
-        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+    for g in range(tables.groups.first.size):
+        begin, end = tables.groups.first[g], tables.groups.end[g]
         if begin >= tables.contact_rows:
-            call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
+            call_filling(tables.groups.slopes[g], work.rows, tables.parameters, work.slopes, begin, end)
             continue
         for index in range(work.paths.active_pair_count[0]):
             k = tables.paths.row[work.paths.active_pairs[index]]
             if begin <= k < end:
-                call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, k, k + COLUMNS)
+                call_filling(tables.groups.slopes[g], work.rows, tables.parameters, work.slopes, k, k + COLUMNS)
     for e in range(tables.bend.size):
         linear.bend[e] = tables.bend[e] * np.sign(x[tables.bend_at[e]])
     _load_slopes(tables, work, linear)

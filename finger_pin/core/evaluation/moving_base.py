@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import AXIS, AXIS_CURVE, FORCE, MOTION
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.rigid_body import inverse_dynamics
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
@@ -64,7 +63,7 @@ def base_power(address: int, _time: float) -> int:
     power = 0.0
     for i in range(tables.parents.size):
         if tables.parents[i] < 0:
-            power += dot(work.base_velocity, work.spatial[FORCE, i])
+            power += dot(work.base_velocity, work.spatial.force[i])
     work.base_power[0] = power
     return 1
 
@@ -81,19 +80,19 @@ def bias_rate(address: int, _time: float) -> int:
     velocity, size, change = model.state[width : 2 * width], tables.parents.size, work.base_rate[0]
     for i in range(size):
         parent = tables.parents[i]
-        own, force = work.spatial[AXIS_CURVE, i], work.spatial[FORCE, i]
-        above = work.base_rate[1] if parent < 0 else work.spatial[AXIS_CURVE, parent]
-        motion_cross(change, work.spatial[AXIS, i], work.vectors[0])
+        own, force = work.spatial.axis_curve[i], work.spatial.force[i]
+        above = work.base_rate[1] if parent < 0 else work.spatial.axis_curve[parent]
+        motion_cross(change, work.spatial.axis[i], work.vectors[0])
         for k in range(6):
             own[k] = above[k] + work.vectors[0][k] * velocity[i]
         apply_inertia(work.inertia[i], own, force)
-        apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
+        apply_inertia(work.inertia[i], work.spatial.motion[i], work.vectors[0])
         add_force_cross(change, work.vectors[0], force)
         apply_inertia(work.inertia[i], change, work.vectors[0])
-        add_force_cross(work.spatial[MOTION, i], work.vectors[0], force)
+        add_force_cross(work.spatial.motion[i], work.vectors[0], force)
     for i in range(size - 1, -1, -1):
-        out[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i])
+        out[i] = dot(work.spatial.axis[i], work.spatial.force[i])
         if tables.parents[i] >= 0:
             for k in range(6):
-                work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
+                work.spatial.force[tables.parents[i], k] += work.spatial.force[i, k]
     return 1

@@ -5,15 +5,15 @@ The wrenches of a piece turn with the body that carries its frame, and change wi
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import AXIS, Work
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.blocks import partition
-from finger_pin.core.evaluation.law_code import FORCE, LOAD
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS, WRENCH, Paths
+from finger_pin.core.path_tables import COLUMNS, PIECE, WRENCH, Paths
 from finger_pin.core.tables import Tables
 
 
@@ -46,14 +46,14 @@ def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
     own = work.paths
     rotation, ends, columns, slopes = own.frame[e], own.ends[e], paths.columns[e], own.slopes
     dy, moved, point = work.vectors[0], work.vectors[1], work.centre
-    call_shape(paths.shapes[e, 1], own.seen[e], paths.parameters[e], slopes)
+    call_shape(paths.slopes[e], own.seen[e], paths.parameters[e], slopes)
     turn_out(rotation, own.out[e], 4, point)
     for r in range(3):
         point[r] += own.origin[e, r]
     for s in range(paths.start[e], paths.start[e + 1]):
-        axis, moves = work.spatial[AXIS, paths.at[s]], paths.moves[s]
+        axis, moves = work.spatial.axis[paths.at[s]], paths.moves[s]
         for p in range(2):
-            weight = 1.0 * (moves[p] - moves[2])
+            weight = 1.0 * (moves[p] - moves[PIECE.frame])
             _seen_from(axis, rotation, ends[3 * p : 3 * p + 3], weight, dy[3 * p : 3 * p + 3])
         for m in range(columns):
             wrench, out = own.wrench[e, m], own.wrench_slope[s, m]
@@ -76,7 +76,7 @@ def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
                 add_moment(point, force, out[:3])
                 _changed(slopes, 18, dy, rotation, moved)
                 add_moment(moved, wrench[3:6], out[:3])
-            if moves[2]:
+            if moves[PIECE.frame]:
                 for p in range(2):
                     add_force_cross(axis, wrench[6 * p : 6 * p + 6], out[6 * p : 6 * p + 6])
 
@@ -117,7 +117,7 @@ def _add_turns(tables: Tables, work: Work, linear: Linear, index: int) -> None:
 def _turn_pushes(tables: Tables, work: Work, k: int, by_position: Vector) -> None:
     """Add to a pin's load the change from contacts that turn with the posture at constant forces."""
     paths, own = tables.paths, work.paths
-    size = max(work.rows[LOAD, k], 1e-100)
+    size = max(work.rows[ROW.load, k], 1e-100)
     for index in range(own.closed_count[0]):
         e = own.closed[index]
         share = passes(paths, e, tables.joint_pin[k]) / size
@@ -125,7 +125,7 @@ def _turn_pushes(tables: Tables, work: Work, k: int, by_position: Vector) -> Non
             continue
         for s in range(paths.start[e], paths.start[e + 1]):
             for m in range(3):
-                force = share * work.rows[FORCE, paths.row[e] + m]
+                force = share * work.rows[ROW.force, paths.row[e] + m]
                 for r in range(3):
                     by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
 
@@ -141,7 +141,7 @@ def linearise_paths(address: int, _time: float) -> int:
         _slopes_of_piece(paths, own.closed[index], work)
     for e in range(touching // COLUMNS, paths.columns.size):
         _slopes_of_piece(paths, e, work)
-    axes, gather, net, crossed = work.spatial[AXIS], own.gather, work.vectors[0], work.vectors[1]
+    axes, gather, net, crossed = work.spatial.axis, own.gather, work.vectors[0], work.vectors[1]
     for at in range(closed + paths.rows.size - touching):
         index = paths.row[own.closed[at // COLUMNS]] + at % COLUMNS if at < closed else at - closed + touching
         k = paths.rows[index]
@@ -149,8 +149,8 @@ def linearise_paths(address: int, _time: float) -> int:
             _add_turns(tables, work, linear, index)
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
-            weight = paths.weights[leg, 0]
-            force = weight * work.rows[FORCE, k]
+            weight = paths.arm_weight[leg]
+            force = weight * work.rows[ROW.force, k]
             begin, end = paths.start[e], paths.start[e + 1]
             for r in range(begin, end):
                 i, turning = paths.at[r], 0.0

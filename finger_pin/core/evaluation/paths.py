@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import AXIS, Work
-from finger_pin.core.evaluation.law_code import FORCE, SIDE
+from finger_pin.core.buffers import Work
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.rigid_body import move
 from finger_pin.core.evaluation.spatial import dot
 from finger_pin.core.jit import (
@@ -19,7 +19,7 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS, WRENCH, Paths
+from finger_pin.core.path_tables import COLUMNS, PIECE, WRENCH, Paths
 from finger_pin.core.tables import Tables
 
 
@@ -36,7 +36,7 @@ def _frame(paths: Paths, e: int, work: Work) -> None:
     """Place a piece's frame and its points, and express its points in the frame."""
     own = work.paths
     rotation, origin, ends = own.frame[e], own.origin[e], own.ends[e]
-    body = paths.bodies[e, 2]
+    body = paths.bodies[e, PIECE.frame]
     if body >= 0:
         above = work.rotation[body]
         for r in range(3):
@@ -49,7 +49,7 @@ def _frame(paths: Paths, e: int, work: Work) -> None:
                     rotation[r, c] += above[r, i] * paths.rotation[e, i, c]
     # Of a gap there is no side point.
     for p in range(3 if paths.columns[e] == 1 else 2):
-        body = paths.bodies[e, p + p // 2]
+        body = paths.bodies[e, PIECE.side if p == 2 else p]
         for r in range(3):
             ends[3 * p + r] = paths.points[e, 3 * p + r]
         if body >= 0:
@@ -84,7 +84,7 @@ def _look(paths: Paths, e: int, work: Work) -> bool:
     if beyond > 0.0:
         out[0] = beyond
     else:
-        call_shape(paths.shapes[e, 0], y, paths.parameters[e], out)
+        call_shape(paths.value[e], y, paths.parameters[e], out)
     return not beyond > 0.0
 
 
@@ -94,7 +94,7 @@ def _measure(paths: Paths, e: int, work: Work) -> None:
     own = work.paths
     _look(paths, e, work)
     out, columns = own.out[e], paths.columns[e]
-    own.active[e] = 1 if columns == 1 or out[0] < 0.0 or work.rows[SIDE, paths.row[e]] > 0.0 else 0
+    own.active[e] = 1 if columns == 1 or out[0] < 0.0 or work.rows[ROW.side, paths.row[e]] > 0.0 else 0
     rotation, ends, point = own.frame[e], own.ends[e], work.centre
     if own.active[e] == 0:
         return
@@ -159,7 +159,7 @@ def measure_paths(tables: Tables, work: Work) -> None:
     own.closed_count[0] = closed
     for e in range(first // COLUMNS, paths.columns.size):
         _measure(paths, e, work)
-    axes, gather, net = work.spatial[AXIS], own.gather, work.vectors[0]
+    axes, gather, net = work.spatial.axis, own.gather, work.vectors[0]
     for at in range(COLUMNS * closed + paths.rows.size - first):
         # The rows of contacts are their places, too.
         index = at - COLUMNS * closed + first
@@ -174,7 +174,7 @@ def measure_paths(tables: Tables, work: Work) -> None:
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
             if m == 0:
-                length += paths.weights[leg, 1] * own.out[e, 0]
+                length += paths.length_weight[leg] * own.out[e, 0]
             if own.active[e] == 0:
                 continue
             if paths.bends[leg] and paths.columns[e] == 1:
@@ -188,8 +188,8 @@ def measure_paths(tables: Tables, work: Work) -> None:
                 gather[paths.at[r]] = dot(axes[paths.at[r]], net)
             for a in range(begin, end):
                 j = tables.arm_at[a]
-                work.arm[a] += paths.weights[leg, 0] * gather[j]
-                work.gradient[a] += paths.weights[leg, 1] * gather[j]
+                work.arm[a] += paths.arm_weight[leg] * gather[j]
+                work.gradient[a] += paths.length_weight[leg] * gather[j]
                 gather[j] = 0.0
         own.length[k], own.turn[k] = length, turn
 
@@ -203,13 +203,13 @@ def push(tables: Tables, work: Work) -> None:
         for r in range(3):
             own.push[e, r] = 0.0
             for m in range(3):
-                own.push[e, r] += work.rows[FORCE, paths.row[e] + m] * own.wrench[e, m, 3 + r]
+                own.push[e, r] += work.rows[ROW.force, paths.row[e] + m] * own.wrench[e, m, 3 + r]
 
 
 @njit_inline
 def passes(paths: Paths, e: int, body: int) -> float:
     """Return the count of passages of a contact's force, less its reaction, through the pin of a body."""
-    first, second = paths.bodies[e, 0], paths.bodies[e, 2]
+    first, second = paths.bodies[e, PIECE.first], paths.bodies[e, PIECE.frame]
     beyond = 0.0
     if first >= 0 and (first == body or paths.carries[body, first]):
         beyond += 1.0

@@ -11,18 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import (
-    AXIS,
-    AXIS_RATE,
-    CHOLESKY,
-    FORCE,
-    MASS_MATRIX,
-    MOMENTUM,
-    MOTION,
-    SPATIAL_ACCELERATION,
-    Work,
-)
-from finger_pin.core.chains import ARMATURE, CENTRE, INERTIA, MASS, PRISMATIC, ROTATION, TRANSLATION
+from finger_pin.core.buffers import Work
+from finger_pin.core.chains import BODY, PRISMATIC
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables import Tables
@@ -32,10 +22,10 @@ from finger_pin.core.tables import Tables
 def _place(tables: Tables, i: int, angle: float, work: Work) -> None:
     """Place body i: rotation, origin and joint axis in the base frame."""
     body, parent, rotation, origin = tables.bodies[i], tables.parents[i], work.rotation[i], work.origin[i]
-    ax, ay, az = body[ROTATION], body[ROTATION + 1], body[ROTATION + 2]
-    bx, by, bz = body[ROTATION + 3], body[ROTATION + 4], body[ROTATION + 5]
-    cx, cy, cz = body[ROTATION + 6], body[ROTATION + 7], body[ROTATION + 8]
-    x, y, z = body[TRANSLATION], body[TRANSLATION + 1], body[TRANSLATION + 2]
+    ax, ay, az = body[BODY.rotation], body[BODY.rotation + 1], body[BODY.rotation + 2]
+    bx, by, bz = body[BODY.rotation + 3], body[BODY.rotation + 4], body[BODY.rotation + 5]
+    cx, cy, cz = body[BODY.rotation + 6], body[BODY.rotation + 7], body[BODY.rotation + 8]
+    x, y, z = body[BODY.translation], body[BODY.translation + 1], body[BODY.translation + 2]
     prismatic = tables.kinds[i] == PRISMATIC
     sine, cosine = (0.0, 1.0) if prismatic else sine_cosine(angle)
     slid = angle if prismatic else 0.0
@@ -54,7 +44,12 @@ def _place(tables: Tables, i: int, angle: float, work: Work) -> None:
 def _massless(tables: Tables, i: int) -> bool:
     """Return whether a body has no inertia."""
     body = tables.bodies[i]
-    return body[MASS] == 0.0 and body[INERTIA] == 0.0 and body[INERTIA + 3] == 0.0 and body[INERTIA + 5] == 0.0
+    return (
+        body[BODY.mass] == 0.0
+        and body[BODY.inertia] == 0.0
+        and body[BODY.inertia + 3] == 0.0
+        and body[BODY.inertia + 5] == 0.0
+    )
 
 
 @njit_always_inline
@@ -64,9 +59,9 @@ def _inertia_about_origin(tables: Tables, i: int, work: Work) -> None:
     if _massless(tables, i):
         out[:] = 0.0
         return
-    mass, x, y, z = body[MASS], body[CENTRE], body[CENTRE + 1], body[CENTRE + 2]
-    ixx, ixy, ixz = body[INERTIA], body[INERTIA + 1], body[INERTIA + 2]
-    iyy, iyz, izz = body[INERTIA + 3], body[INERTIA + 4], body[INERTIA + 5]
+    mass, x, y, z = body[BODY.mass], body[BODY.centre], body[BODY.centre + 1], body[BODY.centre + 2]
+    ixx, ixy, ixz = body[BODY.inertia], body[BODY.inertia + 1], body[BODY.inertia + 2]
+    iyy, iyz, izz = body[BODY.inertia + 3], body[BODY.inertia + 4], body[BODY.inertia + 5]
     ax, ay, az = rotation[0, 0], rotation[0, 1], rotation[0, 2]
     bx, by, bz = rotation[1, 0], rotation[1, 1], rotation[1, 2]
     cx, cy, cz = rotation[2, 0], rotation[2, 1], rotation[2, 2]
@@ -93,7 +88,7 @@ def move(tables: Tables, position: Vector, velocity: Vector, work: Work) -> None
         parent = tables.parents[i]
         _place(tables, i, position[i], work)
         _inertia_about_origin(tables, i, work)
-        axis, rotation, origin = work.spatial[AXIS, i], work.rotation[i], work.origin[i]
+        axis, rotation, origin = work.spatial.axis[i], work.rotation[i], work.origin[i]
         x, y, z = rotation[0, 2], rotation[1, 2], rotation[2, 2]
         if tables.kinds[i] == PRISMATIC:
             axis[0], axis[1], axis[2], axis[3], axis[4], axis[5] = 0.0, 0.0, 0.0, x, y, z
@@ -102,10 +97,10 @@ def move(tables: Tables, position: Vector, velocity: Vector, work: Work) -> None
             axis[3] = origin[1] * z - origin[2] * y
             axis[4] = origin[2] * x - origin[0] * z
             axis[5] = origin[0] * y - origin[1] * x
-        above = work.base_velocity if parent < 0 else work.spatial[MOTION, parent]
-        motion_cross(above, axis, work.spatial[AXIS_RATE, i])
+        above = work.base_velocity if parent < 0 else work.spatial.motion[parent]
+        motion_cross(above, axis, work.spatial.axis_rate[i])
         for k in range(6):
-            work.spatial[MOTION, i, k] = above[k] + axis[k] * velocity[i]
+            work.spatial.motion[i, k] = above[k] + axis[k] * velocity[i]
         for k in range(10):
             work.composite[i, k] = work.inertia[i, k]
     for i in range(tables.parents.size - 1, -1, -1):
@@ -127,47 +122,47 @@ def inverse_dynamics(
         parent = tables.parents[i]
         own = acceleration[i] if moving else 0.0
         for k in range(6):
-            above = work.base_acceleration[k] if parent < 0 else work.spatial[SPATIAL_ACCELERATION, parent, k]
-            work.spatial[SPATIAL_ACCELERATION, i, k] = (
-                above + work.spatial[AXIS, i, k] * own + work.spatial[AXIS_RATE, i, k] * velocity[i]
+            above = work.base_acceleration[k] if parent < 0 else work.spatial.acceleration[parent, k]
+            work.spatial.acceleration[i, k] = (
+                above + work.spatial.axis[i, k] * own + work.spatial.axis_rate[i, k] * velocity[i]
             )
         if _massless(tables, i):
-            work.spatial[FORCE, i] = 0.0
+            work.spatial.force[i] = 0.0
             continue
-        apply_inertia(work.inertia[i], work.spatial[SPATIAL_ACCELERATION, i], work.spatial[FORCE, i])
-        apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
-        add_force_cross(work.spatial[MOTION, i], work.vectors[0], work.spatial[FORCE, i])
+        apply_inertia(work.inertia[i], work.spatial.acceleration[i], work.spatial.force[i])
+        apply_inertia(work.inertia[i], work.spatial.motion[i], work.vectors[0])
+        add_force_cross(work.spatial.motion[i], work.vectors[0], work.spatial.force[i])
     for i in range(size - 1, -1, -1):
         own = acceleration[i] if moving else 0.0
-        torque[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i]) + tables.bodies[i, ARMATURE] * own
+        torque[i] = dot(work.spatial.axis[i], work.spatial.force[i]) + tables.bodies[i, BODY.armature] * own
         if tables.parents[i] >= 0:
             for k in range(6):
-                work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
+                work.spatial.force[tables.parents[i], k] += work.spatial.force[i, k]
 
 
 @njit_always_inline
 def mass_matrix(tables: Tables, work: Work) -> None:
-    """Fill work.square[MASS_MATRIX] = M after `move`; entries between trees are zero from the start."""
+    """Fill work.mass_matrix = M after `move`; entries between trees are zero from the start."""
     size = tables.parents.size
     for i in range(size):
-        momentum = work.spatial[MOMENTUM, i]
-        apply_inertia(work.composite[i], work.spatial[AXIS, i], momentum)
+        momentum = work.spatial.momentum[i]
+        apply_inertia(work.composite[i], work.spatial.axis[i], momentum)
         j = i
         while j >= 0:
-            value = dot(work.spatial[AXIS, j], momentum)
-            work.square[MASS_MATRIX, i, j] = value
-            work.square[MASS_MATRIX, j, i] = value
+            value = dot(work.spatial.axis[j], momentum)
+            work.mass_matrix[i, j] = value
+            work.mass_matrix[j, i] = value
             j = tables.parents[j]
-        work.square[MASS_MATRIX, i, i] += tables.bodies[i, ARMATURE]
+        work.mass_matrix[i, i] += tables.bodies[i, BODY.armature]
 
 
 @njit_always_inline
 def factorise_mass(tables: Tables, size: int, work: Work) -> None:
-    """Fill work.square[CHOLESKY] with the Cholesky factor of M, its diagonal inverted, tree by tree."""
-    factor = work.square[CHOLESKY]
+    """Fill work.cholesky with the Cholesky factor of M, its diagonal inverted, tree by tree."""
+    factor = work.cholesky
     for i in range(size):
         for j in range(tables.roots[i], i + 1):
-            value = work.square[MASS_MATRIX, i, j]
+            value = work.mass_matrix[i, j]
             for k in range(tables.roots[i], j):
                 value -= factor[i, k] * factor[j, k]
             factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
@@ -176,7 +171,7 @@ def factorise_mass(tables: Tables, size: int, work: Work) -> None:
 @njit_always_inline
 def solve_mass(tables: Tables, size: int, work: Work, vector: Vector) -> None:
     """Replace a vector by M^-1 vector after `factorise_mass`."""
-    factor = work.square[CHOLESKY]
+    factor = work.cholesky
     for i in range(size):
         value = vector[i]
         for k in range(tables.roots[i], i):

@@ -6,18 +6,7 @@ Vector Algebra, IEEE RA-L 7 (2022), in the conventions of `rigid_body`.
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import (
-    AXIS,
-    AXIS_CURVE,
-    AXIS_RATE,
-    BY_POSITION,
-    BY_VELOCITY,
-    FORCE,
-    MOMENTUM,
-    MOTION,
-    SPATIAL_ACCELERATION,
-    Work,
-)
+from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables import Tables
@@ -65,25 +54,25 @@ def inverse_dynamics_derivatives(tables: Tables, velocity: Vector, work: Work) -
     Of bodies that neither carries the other they are zero from the start.
     """
     size = tables.parents.size
-    by_position, by_velocity = work.square[BY_POSITION], work.square[BY_VELOCITY]
+    by_position, by_velocity = work.by_position, work.by_velocity
     for i in range(size):
         parent = tables.parents[i]
-        _coriolis_block(work.inertia[i], work.spatial[MOTION, i], work.coriolis[i])
+        _coriolis_block(work.inertia[i], work.spatial.motion[i], work.coriolis[i])
         # axis_curve = a_parent x S + v_parent x (v_parent x S)
-        above = work.base_acceleration if parent < 0 else work.spatial[SPATIAL_ACCELERATION, parent]
-        carried = work.base_velocity if parent < 0 else work.spatial[MOTION, parent]
-        motion_cross(above, work.spatial[AXIS, i], work.spatial[AXIS_CURVE, i])
-        motion_cross(carried, work.spatial[AXIS_RATE, i], work.vectors[0])
+        above = work.base_acceleration if parent < 0 else work.spatial.acceleration[parent]
+        carried = work.base_velocity if parent < 0 else work.spatial.motion[parent]
+        motion_cross(above, work.spatial.axis[i], work.spatial.axis_curve[i])
+        motion_cross(carried, work.spatial.axis_rate[i], work.vectors[0])
         for k in range(6):
-            work.spatial[AXIS_CURVE, i, k] += work.vectors[0][k]
+            work.spatial.axis_curve[i, k] += work.vectors[0][k]
     for i in range(size - 1, -1, -1):
-        block, axis = work.coriolis[i], work.spatial[AXIS, i]
-        rate, curve = work.spatial[AXIS_RATE, i], work.spatial[AXIS_CURVE, i]
+        block, axis = work.coriolis[i], work.spatial.axis[i]
+        rate, curve = work.spatial.axis_rate[i], work.spatial.axis_curve[i]
         # Bt = B^T S, which acts on angular parts only.
         b0 = block[0] * axis[0] + block[3] * axis[1] + block[6] * axis[2] + block[10] * axis[5] - block[11] * axis[4]
         b1 = block[1] * axis[0] + block[4] * axis[1] + block[7] * axis[2] + block[11] * axis[3] - block[9] * axis[5]
         b2 = block[2] * axis[0] + block[5] * axis[1] + block[8] * axis[2] + block[9] * axis[4] - block[10] * axis[3]
-        momentum = work.spatial[MOMENTUM, i]
+        momentum = work.spatial.momentum[i]
         by_q, by_v = work.vectors[0], work.vectors[1]
         apply_inertia(work.composite[i], curve, by_q)
         apply_inertia(work.composite[i], rate, by_v)
@@ -99,11 +88,11 @@ def inverse_dynamics_derivatives(tables: Tables, velocity: Vector, work: Work) -
         by_v[3] -= 2.0 * (py * axis[2] - pz * axis[1])
         by_v[4] -= 2.0 * (pz * axis[0] - px * axis[2])
         by_v[5] -= 2.0 * (px * axis[1] - py * axis[0])
-        add_force_cross(axis, work.spatial[FORCE, i], by_q)
+        add_force_cross(axis, work.spatial.force[i], by_q)
         j = i
         while j >= 0:
-            above, above_rate = work.spatial[AXIS, j], work.spatial[AXIS_RATE, j]
-            above_curve = work.spatial[AXIS_CURVE, j]
+            above, above_rate = work.spatial.axis[j], work.spatial.axis_rate[j]
+            above_curve = work.spatial.axis_curve[j]
             by_position[i, j] = 2.0 * (b0 * above_rate[0] + b1 * above_rate[1] + b2 * above_rate[2]) + dot(
                 momentum, above_curve
             )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.buffers import MOTION, Work
-from finger_pin.core.chains import ARMATURE
+from finger_pin.core.buffers import Work
+from finger_pin.core.chains import BODY
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
-from finger_pin.core.evaluation.law_code import FORCE
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import turn_out
 from finger_pin.core.evaluation.rigid_body import move
 from finger_pin.core.jit import (
@@ -26,7 +26,7 @@ from finger_pin.core.jit import (
 )
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.path_tables import COLUMNS, Paths
-from finger_pin.core.tables import END, FIRST, Tables
+from finger_pin.core.tables import Tables
 
 
 class States(NamedTuple):
@@ -101,18 +101,18 @@ def fill_energy_terms(tables: Tables, work: Work, totals: Vector) -> None:
     """Sum up stored energies and powers of all rows after an evaluation."""
     for c in range(totals.size):
         totals[c] = 0.0
-    for g in range(tables.groups.shape[0]):
-        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+    for g in range(tables.groups.first.size):
+        begin, end = tables.groups.first[g], tables.groups.end[g]
         if begin < tables.contact_rows:
             for index in range(work.paths.active_pair_count[0]):
                 k = tables.paths.row[work.paths.active_pairs[index]]
                 if begin <= k < end:
-                    call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, k, k + COLUMNS)
+                    call_filling(tables.groups.account[g], work.rows, tables.parameters, work.powers, k, k + COLUMNS)
                     for i in range(tables.energies.shape[1]):
                         if tables.energies[g, i] >= 0:
                             totals[tables.energies[g, i]] += work.powers[i, k]
             continue
-        call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
+        call_filling(tables.groups.account[g], work.rows, tables.parameters, work.powers, begin, end)
         for i in range(tables.energies.shape[1]):
             entry = tables.energies[g, i]
             if entry >= 0:
@@ -129,7 +129,7 @@ def _touch(paths: Paths, work: Work, out: Matrix) -> None:
     for index in range(own.closed_count[0]):
         e = own.closed[index]
         k = paths.row[e]
-        if work.rows[FORCE, k] == 0.0:
+        if work.rows[ROW.force, k] == 0.0:
             continue
         # Contacts come before all other rows.
         touch = out[k // COLUMNS]
@@ -138,7 +138,7 @@ def _touch(paths: Paths, work: Work, out: Matrix) -> None:
             touch[3 + r] += own.origin[e, r]
             touch[6 + r] = own.wrench[e, 0, 3 + r]
             for i in range(3):
-                touch[r] -= work.rows[FORCE, k + i] * own.wrench[e, i, 3 + r]
+                touch[r] -= work.rows[ROW.force, k + i] * own.wrench[e, i, 3 + r]
 
 
 @njit_always_inline
@@ -261,7 +261,7 @@ def motion_many(address: int, _time: float) -> int:
                 tips[m, t, r] = value
         moving, lifted = 0.0, 0.0
         for i in range(tables.parents.size):
-            inertia, v = work.inertia[i], work.spatial[MOTION, i]
+            inertia, v = work.inertia[i], work.spatial.motion[i]
             # v . I v, with I = (mass, first moment, second moment about O).
             moving += inertia[0] * (v[3] * v[3] + v[4] * v[4] + v[5] * v[5])
             moving += inertia[4] * v[0] * v[0] + inertia[7] * v[1] * v[1] + inertia[9] * v[2] * v[2]
@@ -269,7 +269,7 @@ def motion_many(address: int, _time: float) -> int:
             moving += 2.0 * v[3] * (v[1] * inertia[3] - v[2] * inertia[2])
             moving += 2.0 * v[4] * (v[2] * inertia[1] - v[0] * inertia[3])
             moving += 2.0 * v[5] * (v[0] * inertia[2] - v[1] * inertia[1])
-            moving += tables.bodies[i, ARMATURE] * velocities[m, i] * velocities[m, i]
+            moving += tables.bodies[i, BODY.armature] * velocities[m, i] * velocities[m, i]
             for r in range(3):
                 weight = bases[m, 12 + r] if bases.shape[0] > 0 else tables.gravity[r]
                 lifted -= weight * inertia[1 + r]

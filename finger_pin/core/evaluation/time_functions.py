@@ -10,6 +10,7 @@ from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.spatial import sine_cosine
 from finger_pin.core.jit import Layers, Matrix, Vector, njit_inline
 from finger_pin.laws.inputs import quintic
+from finger_pin.references.signal import HARMONIC
 
 _quintic = inlined(quintic)
 
@@ -18,7 +19,7 @@ class SignalTable(NamedTuple):
     """k functions of time: a sinusoid about an offset each, plus a piecewise polynomial on shared knots.
 
     Attributes:
-        harmonics: Offset, amplitude, frequency, phase, shape (k, 4).
+        harmonics: Columns `HARMONIC`, shape (k, 4).
         knots: Shape (m,); m = 0 without polynomials. Outside, these keep their value.
         coefficients: Of (t - knot)^(5 - i), shape (6, m - 1, k).
     """
@@ -65,9 +66,12 @@ def signal_values(signal: SignalTable, time: float, out: Vector) -> None:
     """Fill the values of the functions."""
     table = signal.harmonics
     for j in range(table.shape[0]):
-        out[j] = table[j, 0]
-        if table[j, 1] != 0.0:
-            out[j] += table[j, 1] * sine_cosine(2.0 * np.pi * table[j, 2] * time + table[j, 3])[0]
+        out[j] = table[j, HARMONIC.offset]
+        if table[j, HARMONIC.amplitude] != 0.0:
+            out[j] += (
+                table[j, HARMONIC.amplitude]
+                * sine_cosine(2.0 * np.pi * table[j, HARMONIC.frequency] * time + table[j, HARMONIC.phase])[0]
+            )
     if signal.knots.size > 0:
         piece, since = _piece(signal, time)
         for j in range(table.shape[0]):
@@ -79,10 +83,14 @@ def signal_values(signal: SignalTable, time: float, out: Vector) -> None:
 def signal_derivative(signal: SignalTable, j: int, time: float, order: int) -> float:
     """Return a time derivative of function j, of order 0 to 3."""
     table, knots = signal.harmonics, signal.knots
-    circular = 2.0 * np.pi * table[j, 2]
-    value = table[j, 1] * circular**order * np.sin(circular * time + table[j, 3] + 0.5 * np.pi * order)
+    circular = 2.0 * np.pi * table[j, HARMONIC.frequency]
+    value = (
+        table[j, HARMONIC.amplitude]
+        * circular**order
+        * np.sin(circular * time + table[j, HARMONIC.phase] + 0.5 * np.pi * order)
+    )
     if order == 0:
-        value += table[j, 0]
+        value += table[j, HARMONIC.offset]
     if knots.size > 0 and (order == 0 or knots[0] <= time < knots[knots.size - 1]):
         piece, since = _piece(signal, time)
         polynomial = 0.0

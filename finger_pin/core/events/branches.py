@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.collision.broad_phase import record_start_gaps
-from finger_pin.core.evaluation.law_code import SIDE, SPEED
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_at, copy, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping.error_norm import step_error
 from finger_pin.core.stepping.integration import INTEGRATION, Integration
 from finger_pin.core.stepping.interpolation import between, cut
 from finger_pin.core.stepping.tableaus import Tableau
-from finger_pin.core.tables import END, FIRST, KINK, Tables
+from finger_pin.core.tables import Tables
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Safety factor of the maximum step after an event, 1: a rejected step costs as much as the two in which it grows back.
@@ -36,10 +36,10 @@ def release(address: int, _time: float) -> int:
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
     tables, rows, given = model.tables, model.work.rows, integration.memory.frozen[0] > 0.0
-    for g in range(tables.groups.shape[0]):
-        if tables.groups[g, KINK] >= 0:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                rows[SIDE, k] = np.sign(integration.kinks[k]) if given else 0.0
+    for g in range(tables.groups.first.size):
+        if tables.groups.kink[g] >= 0:
+            for k in range(tables.groups.first[g], tables.groups.end[g]):
+                rows[ROW.side, k] = np.sign(integration.kinks[k]) if given else 0.0
     return 1
 
 
@@ -50,12 +50,12 @@ def freeze(address: int, _time: float) -> int:
     model = unpack(integration.model, MODEL)
     tables, rows, kinks = model.tables, model.work.rows, integration.kinks
     if integration.memory.frozen[0] == 0.0:
-        for g in range(tables.groups.shape[0]):
-            column = tables.groups[g, KINK]
+        for g in range(tables.groups.first.size):
+            column = tables.groups.kink[g]
             if column >= 0:
-                for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                for k in range(tables.groups.first[g], tables.groups.end[g]):
                     kinks[k] = rows[column, k]
-                    rows[SIDE, k] = np.sign(kinks[k])
+                    rows[ROW.side, k] = np.sign(kinks[k])
     if tables.contact_rows:
         record_start_gaps(tables, model.work.paths)
     return 1
@@ -68,10 +68,10 @@ def leaving_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
     It is taken to go on at its mean rate.
     """
     share = np.inf
-    for g in range(tables.groups.shape[0]):
-        column = tables.groups[g, KINK]
-        if column > SPEED:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+    for g in range(tables.groups.first.size):
+        column = tables.groups.kink[g]
+        if column > ROW.speed:
+            for k in range(tables.groups.first[g], tables.groups.end[g]):
                 nearer = kinks[k] - rows[column, k]
                 if kinks[k] * nearer > 0.0:
                     share = min(share, kinks[k] / nearer)
@@ -95,12 +95,12 @@ def left_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
 @njit_inline
 def switch_left_branches(tables: Tables, rows: Matrix, kinks: Vector) -> None:
     """Switch the branch of the frozen rows that have left theirs."""
-    for g in range(tables.groups.shape[0]):
-        column = tables.groups[g, KINK]
-        if column > SPEED:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+    for g in range(tables.groups.first.size):
+        column = tables.groups.kink[g]
+        if column > ROW.speed:
+            for k in range(tables.groups.first[g], tables.groups.end[g]):
                 if kinks[k] * rows[column, k] < 0.0:
-                    rows[SIDE, k] = -rows[SIDE, k]
+                    rows[ROW.side, k] = -rows[ROW.side, k]
 
 
 @njit_inline

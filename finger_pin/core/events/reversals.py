@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.evaluation.law_code import RATE, SIDE, SPEED, STATE
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.jit import Matrix, call_value, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
 from finger_pin.core.stepping.integration import Integration
-from finger_pin.core.tables import END, FIRST, KINK, Tables
+from finger_pin.core.tables import Tables
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Greatest reversal error of a step that is taken as a whole, in tolerances: beside an error of 1 it adds 1.6 %.
@@ -70,10 +70,10 @@ def _misled(integration: Integration, model: Model, h: float, share: float) -> t
     size, width = integration.x.size, model.linear.mass.shape[0]
     for c in range(2 * width, size):
         off[c] = 0.0
-    for g in range(tables.groups.shape[0]):
-        if tables.groups[g, KINK] != SPEED:
+    for g in range(tables.groups.first.size):
+        if tables.groups.kink[g] != ROW.speed:
             continue
-        for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+        for k in range(tables.groups.first[g], tables.groups.end[g]):
             way, fastest, turned = _way_back(integration, model, k, share)
             if way > 0.0:
                 c = 2 * width + tables.state[k]
@@ -87,8 +87,8 @@ def _misled(integration: Integration, model: Model, h: float, share: float) -> t
 @njit_always_inline
 def _way_back(integration: Integration, model: Model, k: int, share: float) -> Any:
     """Return the mean speed of a row against its side in a share of a step, the fastest, and the share at its begin."""
-    tables, dense, branch = model.tables, integration.dense, model.work.rows[SIDE, k]
-    start, end = branch * integration.kinks[k], branch * model.work.rows[SPEED, k]
+    tables, dense, branch = model.tables, integration.dense, model.work.rows[ROW.side, k]
+    start, end = branch * integration.kinks[k], branch * model.work.rows[ROW.speed, k]
     width, one, two, three = model.linear.mass.shape[0], 0.0, 0.0, 0.0
     for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
         arm, c = branch * model.work.arm[e], width + tables.arm_at[e]
@@ -116,13 +116,13 @@ def _way_back(integration: Integration, model: Model, k: int, share: float) -> A
 @njit_always_inline
 def _more(tables: Tables, rows: Matrix, g: int, k: int, speed: float) -> float:
     """Return the rate of a row's state at a speed, held on the other side, less that on this side."""
-    branch, own, more = rows[SIDE, k], rows[SPEED, k], 0.0
+    branch, own, more = rows[ROW.side, k], rows[ROW.speed, k], 0.0
     # As it is held, on the other side, and at last as it was.
     for weight in (-1.0, 1.0, 0.0):
-        rows[SIDE, k] = -branch if weight > 0.0 else branch
-        rows[SPEED, k] = speed if weight != 0.0 else own
-        call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 1)
-        more += weight * rows[RATE, k]
+        rows[ROW.side, k] = -branch if weight > 0.0 else branch
+        rows[ROW.speed, k] = speed if weight != 0.0 else own
+        call_value(tables.groups.value[g], rows, tables.parameters, k, k + 1)
+        more += weight * rows[ROW.rate, k]
     return more
 
 
@@ -134,9 +134,9 @@ def bristles_over_limit(integration: Integration, model: Model) -> bool:
     But implicit methods damp what grows, too.
     """
     tables, x, state, width = model.tables, integration.x, model.state, model.linear.mass.shape[0]
-    for g in range(tables.groups.shape[0]):
-        if tables.groups[g, KINK] == SPEED:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+    for g in range(tables.groups.first.size):
+        if tables.groups.kink[g] == ROW.speed:
+            for k in range(tables.groups.first[g], tables.groups.end[g]):
                 c = 2 * width + tables.state[k]
                 more = abs(state[c]) - abs(x[c])
                 if (
@@ -151,15 +151,15 @@ def bristles_over_limit(integration: Integration, model: Model) -> bool:
 @njit_inline
 def bristle_load_ratio(model: Model, g: int, k: int, way: float) -> float:
     """Return the ratio of a row's bristle deflection to its limit at its speed in a direction of sliding."""
-    rows, parameters, law = model.work.rows, model.tables.parameters, model.tables.laws[g, 0]
-    branch, speed, bent = rows[SIDE, k], rows[SPEED, k], rows[STATE, k]
-    rows[SIDE, k], rows[SPEED, k] = way, way * max(abs(speed), _MIN_SLIDING_SPEED)
+    rows, parameters, law = model.work.rows, model.tables.parameters, model.tables.groups.value[g]
+    branch, speed, bent = rows[ROW.side, k], rows[ROW.speed, k], rows[ROW.state, k]
+    rows[ROW.side, k], rows[ROW.speed, k] = way, way * max(abs(speed), _MIN_SLIDING_SPEED)
     call_value(law, rows, parameters, k, k + 1)
-    rate = rows[RATE, k]
-    rows[STATE, k] = 0.0
+    rate = rows[ROW.rate, k]
+    rows[ROW.state, k] = 0.0
     call_value(law, rows, parameters, k, k + 1)
     # sigma_0 v and sigma_0 v (1 - |F^s| / level).
-    burden = 1.0 - rate / rows[RATE, k]
-    rows[SIDE, k], rows[SPEED, k], rows[STATE, k] = branch, speed, bent
+    burden = 1.0 - rate / rows[ROW.rate, k]
+    rows[ROW.side, k], rows[ROW.speed, k], rows[ROW.state, k] = branch, speed, bent
     call_value(law, rows, parameters, k, k + 1)
     return burden

@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.core.bound_models import FEW, BoundModel
 from finger_pin.core.buffers import build_work
-from finger_pin.core.evaluation.law_code import SIDE
+from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.powers import POWERS, Powers, power_many
 from finger_pin.core.jit import call, copied
 from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate_many
@@ -105,5 +105,5 @@ class IslandMotion:
     @cached_property
     def _models(self) -> list[BoundModel]:
         """Models, one for each thread; the first is the island's."""
-        self.part.work.rows[SIDE] = 0.0
+        self.part.work.rows[ROW.side] = 0.0
         return [self.part.model]

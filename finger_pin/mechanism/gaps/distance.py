@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.mechanism.gaps.nearest import ALONG, DISC, EPSILON, INSIDE, RADIUS, SignedDistance, lowered, nearest
-from finger_pin.mechanism.gaps.prism import NUMBERS, RIM, ROUNDING, deepest, offset, surface
+from finger_pin.mechanism.gaps.nearest import EPSILON, INSIDE, SignedDistance, lowered, nearest
+from finger_pin.mechanism.gaps.prism import GAP, GapParameters, deepest, offset, surface
 
 # Tangents are turned from those of one direction, (2, 3, 6) / 7, to those of the normal, the short way. They jump only
 # for its opposite, which is no normal of a face and lies on no plane of symmetry of a shape.
@@ -40,7 +40,7 @@ _CLOSE, _MOST_STEPS = 1e-15, 40
 def _sinking(w: Any, p: Any) -> Any:
     """Return dw/dc, by the shrinking of the core, and its product with w / |w|."""
     a, b, c = np.sign(w[0]), np.sign(w[1]), np.sign(w[2])
-    if p[RIM] > 0.0:
+    if p[GAP.rim] > 0.0:
         across = np.sqrt(w[0] * w[0] + w[1] * w[1])
         a, b = (w[0] / across, w[1] / across) if across > 0.0 else (0.0, 0.0)
     far = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
@@ -51,7 +51,7 @@ def _nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
     """Return the part's distance from the shrunk core, blunted, its slopes by |w| and by c, and s and r."""
     s, x, y_, z = nearest(y, p, sunk, blunt)
     w = offset(y[0] + s * (y[3] - y[0]) + x, y[1] + s * (y[4] - y[1]) + y_, y[2] + s * (y[5] - y[2]) + z, p, sunk)
-    square = (x * x + y_ * y_ + z * z) / (p[DISC] * p[DISC]) if p[DISC] > 0.0 else 1.0
+    square = (x * x + y_ * y_ + z * z) / (p[GAP.disc] * p[GAP.disc]) if p[GAP.disc] > 0.0 else 1.0
     far = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     size, far = (1.0, far) if far >= blunt else (far / blunt, 0.5 * (far * far / blunt + blunt))
     return far + lowered(y, p, s, square), size, _sinking(w, p)[3], s, x, y_, z
@@ -78,7 +78,7 @@ def _shrunk(u: float, start: float, most: float) -> Any:
 
 def _level(y: Any, p: Any) -> Any:
     """Return the level l; its slope by |w|; c; dc/du and d2c/du2; that slope's own where l is flat, else 0; s and r."""
-    start, most = 0.5 * (p[RADIUS] + p[ROUNDING]), deepest(p)
+    start, most = 0.5 * (p[GAP.radius] + p[GAP.rounding]), deepest(p)
     blunt = max((0.5 if most == 0.0 else 0.25) * start, INSIDE)
     far, size, spread, s, x, y_, z = _nearest(y, p, 0.0, blunt)
     if far >= start or most == 0.0 or start == 0.0:
@@ -126,13 +126,13 @@ def _value(y: Any, p: Any, out: Any) -> None:
     level, size, sunk, _, _, _, s, r_x, r_y, r_z = _level(y, p)
     x_, y_, z_ = y[0] + s * (y[3] - y[0]) + r_x, y[1] + s * (y[4] - y[1]) + r_y, y[2] + s * (y[5] - y[2]) + r_z
     _, u, v, w, _, _, _, _, _, _ = surface(x_, y_, z_, p, sunk)
-    out[0] = level - p[ROUNDING] - p[RADIUS]
+    out[0] = level - p[GAP.rounding] - p[GAP.radius]
     _tangent(u, v, w, _FIRST_X, _FIRST_Y, _FIRST_Z, out, 7)
     _tangent(u, v, w, _SECOND_X, _SECOND_Y, _SECOND_Z, out, 10)
     for i in range(7, 13):
         out[i] *= size
     out[1], out[2], out[3] = size * u, size * v, size * w
-    back = p[RADIUS] + 0.5 * out[0]
+    back = p[GAP.radius] + 0.5 * out[0]
     out[4], out[5], out[6] = x_ - back * out[1], y_ - back * out[2], z_ - back * out[3]
 
 
@@ -160,10 +160,10 @@ def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
     e = (y[3] - y[0], y[4] - y[1], y[5] - y[2])
     length, size = np.sqrt(_dot(e, e)), np.sqrt(_dot(r, r))
     zero = (0.0, 0.0, 0.0)
-    pull_s, pull_r = 2.0 * EPSILON * length, EPSILON * p[DISC]
+    pull_s, pull_r = 2.0 * EPSILON * length, EPSILON * p[GAP.disc]
     out, across, on_rim = zero, zero, False
-    if p[DISC] > 0.0:
-        on_rim = size > p[DISC] * (1.0 - 1e-13)
+    if p[GAP.disc] > 0.0:
+        on_rim = size > p[GAP.disc] * (1.0 - 1e-13)
         if size > 0.0:
             out = (r[0] / size, r[1] / size, r[2] / size)
         else:
@@ -176,9 +176,9 @@ def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
             (e[0] * out[1] - e[1] * out[0]) / length,
         )
     # In units of r and s: the disc's pull is kappa_r / R^2 per m; on its rim the circle's curvature stands for that.
-    stiff = pull_r / (p[DISC] * p[DISC]) if p[DISC] > 0.0 else 1.0
-    bent = -_dot(out, n) / p[DISC] if on_rim else stiff
-    free_s = p[ALONG] > 0.0 and 0.0 < s < p[ALONG] and length > 0.0
+    stiff = pull_r / (p[GAP.disc] * p[GAP.disc]) if p[GAP.disc] > 0.0 else 1.0
+    bent = -_dot(out, n) / p[GAP.disc] if on_rim else stiff
+    free_s = p[GAP.along] > 0.0 and 0.0 < s < p[GAP.along] and length > 0.0
     if on_rim:
         out = zero
     along = e if free_s else zero
@@ -208,7 +208,7 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         # What the point minimises goes as |w|^2.
         u_, v_, w_, xx, xy, yy, zz = offset(x_, y_, z_, p, sunk)
         n, h = (flat * u_, flat * v_, flat * w_), (flat * xx, flat * xy, 0.0, flat * yy, 0.0, flat * zz)
-    back = p[RADIUS] + 0.5 * (level - p[ROUNDING] - p[RADIUS])
+    back = p[GAP.radius] + 0.5 * (level - p[GAP.rounding] - p[GAP.radius])
     length = np.sqrt(a * a + b * b + c * c)
     shorter = 1.0 / length if length > 0.0 else 0.0
     axis = (a * shorter, b * shorter, c * shorter)
@@ -260,6 +260,4 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
 
 
 #: The gap between a part of a body and a rounded prism; sizes of the latter from `prism_parameters`.
-PRISM = SignedDistance(
-    name="rounded prism", parameters=("radius", "disc", "along", *NUMBERS), value=_value, slopes=_slopes
-)
+PRISM = SignedDistance(name="rounded prism", parameters=GapParameters._fields, value=_value, slopes=_slopes)

@@ -21,10 +21,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from finger_pin.mechanism.gaps.prism import offset
+from finger_pin.mechanism.gaps.prism import GAP, offset
 
-# Names of the numbers of a part: its own rounding, R, and the largest s, 0 or 1.
-RADIUS, DISC, ALONG = range(3)
 # Radians within which a part lies along a face.
 EPSILON = 1e-5
 #: Nearer to the core than this at least |w| is flattened, m.
@@ -39,14 +37,14 @@ def lowered(y: Any, p: Any, s: float, square: float) -> Any:
     """Return the part of the pull to the middle in |w|, less its most; ``square`` is |r / R|^2."""
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
     along = EPSILON * np.sqrt(a * a + b * b + c * c)
-    return p[ALONG] * along * ((s - 0.5) * (s - 0.5) - 0.25) + 0.5 * EPSILON * p[DISC] * (square - 1.0)
+    return p[GAP.along] * along * ((s - 0.5) * (s - 0.5) - 0.25) + 0.5 * EPSILON * p[GAP.disc] * (square - 1.0)
 
 
 def _on_segment(y: Any, p: Any, sunk: float, blunt: float) -> Any:
     """Return s of the nearest point of a segment: the root of a function that rises with s, or an end."""
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
     pull = 2.0 * EPSILON * np.sqrt(a * a + b * b + c * c)
-    if pull == 0.0 or p[ALONG] == 0.0:
+    if pull == 0.0 or p[GAP.along] == 0.0:
         return 0.0
     s, low, high, first = 0.0, 0.0, 1.0, 0.0
     for k in range(_MOST_STEPS):
@@ -208,7 +206,7 @@ def nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
 
     Up to a distance ``blunt``, m, |w| counts as (|w|^2 / blunt + blunt) / 2, so that the point is unique inside too.
     """
-    if p[DISC] == 0.0:
+    if p[GAP.disc] == 0.0:
         return _on_segment(y, p, sunk, blunt), 0.0, 0.0, 0.0
     e = (y[3] - y[0], y[4] - y[1], y[5] - y[2])
     length = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
@@ -216,10 +214,10 @@ def nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
     # Two unit vectors across the axis (Duff et al., J. Computer Graphics Techniques 6(1), 2017), times R.
     sign = 1.0 if c >= 0.0 else -1.0
     k = -1.0 / (sign + c)
-    big = p[DISC]
+    big = p[GAP.disc]
     f = (big * (1.0 + sign * a * a * k), big * sign * a * b * k, -big * sign * a)
     g = (big * a * b * k, big * (sign + b * b * k), -big * b)
-    along, pulls = p[ALONG], (2.0 * EPSILON * length, EPSILON * big)
+    along, pulls = p[GAP.along], (2.0 * EPSILON * length, EPSILON * big)
     u, v, s, size = 0.0, 0.0, 0.5 * along, 1.0
     for _ in range(_MOST_STEPS):
         d_u, d_v, d_s = _minimum(_expanded(y, p, sunk, blunt, (f, g, e), pulls, u, v, s), along)

@@ -8,16 +8,29 @@ the distance |w|, its gradient n = w / |w|, and, with the slope D = dw/dx (symme
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 #: A half-space is a core so deep below its surface, m, with that rounding: what penetrates it stays outside the core.
 DEEP = 1.0
-#: Names of the numbers of a prism.
-NUMBERS = ("half_x", "half_y", "rim", "low", "high", "rounding")
-#: Where they stand among the numbers of a gap, after those of the other body's part.
-HALF_X, HALF_Y, RIM, LOW, HIGH, ROUNDING = range(3, 9)
+
+
+class GapParameters(NamedTuple):
+    """Places of the parameters of a gap: of a part its rounding, R and the largest s, 0 or 1, then of a prism."""
+
+    radius: int
+    disc: int
+    along: int
+    half_x: int
+    half_y: int
+    rim: int
+    low: int
+    high: int
+    rounding: int
+
+
+GAP = GapParameters(*range(len(GapParameters._fields)))
 
 
 def prism_parameters(shape: str, sizes: Any, fillet: float = 0.0) -> tuple[float, ...]:
@@ -44,14 +57,20 @@ def prism_parameters(shape: str, sizes: Any, fillet: float = 0.0) -> tuple[float
 
 def deepest(p: Any) -> Any:
     """Return the inradius of a core, m; 0 without thickness or end."""
-    side = p[RIM] if p[RIM] > 0.0 else min(p[HALF_X], p[HALF_Y])
-    least = min(side, 0.5 * (p[HIGH] - p[LOW]))
+    side = p[GAP.rim] if p[GAP.rim] > 0.0 else min(p[GAP.half_x], p[GAP.half_y])
+    least = min(side, 0.5 * (p[GAP.high] - p[GAP.low]))
     return least if least < np.inf else 0.0
 
 
 def offset(x: float, y: float, z: float, p: Any, sunk: float) -> Any:
     """Return w of a point from the core, shrunk by ``sunk`` on all sides, and D as xx, xy, yy, zz."""
-    round_, half_x, half_y, low, high = p[RIM] > 0.0, p[HALF_X], p[HALF_Y], p[LOW] + sunk, p[HIGH] - sunk
+    round_, half_x, half_y, low, high = (
+        p[GAP.rim] > 0.0,
+        p[GAP.half_x],
+        p[GAP.half_y],
+        p[GAP.low] + sunk,
+        p[GAP.high] - sunk,
+    )
     if not round_:
         half_x, half_y = half_x - sunk, half_y - sunk
     u, v = x - min(max(x, -half_x), half_x), y - min(max(y, -half_y), half_y)
@@ -61,7 +80,7 @@ def offset(x: float, y: float, z: float, p: Any, sunk: float) -> Any:
     along_z = 1.0 * (w != 0.0 or low == high)
     if not round_:
         return u, v, w, along_x, 0.0, along_y, along_z
-    rim, radius = p[RIM] - sunk, np.sqrt(u * u + v * v)
+    rim, radius = p[GAP.rim] - sunk, np.sqrt(u * u + v * v)
     if radius <= rim:
         return 0.0, 0.0, w, 0.0, 0.0, 0.0, along_z
     if radius == 0.0:
@@ -80,7 +99,7 @@ def surface(x: float, y: float, z: float, p: Any, sunk: float) -> Any:
     u, v, w, xx, xy, yy, zz = offset(x, y, z, p, sunk)
     far = np.sqrt(u * u + v * v + w * w)
     if far == 0.0:
-        flat = p[RIM] > sunk or (p[RIM] == 0.0 and p[HALF_X] > sunk)
+        flat = p[GAP.rim] > sunk or (p[GAP.rim] == 0.0 and p[GAP.half_x] > sunk)
         return (0.0, (0.0 if flat else 1.0), 0.0, (1.0 if flat else 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     u, v, w = u / far, v / far, w / far
     return (

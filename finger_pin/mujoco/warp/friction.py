@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import warp as wp
 
 from finger_pin.exceptions import InputError
-from finger_pin.exchange.mujoco_friction import FORCE, LEVEL, LOAD, TURN, PluginFriction
+from finger_pin.exchange.mujoco_friction import SIGNAL, Coefficients, PluginFriction
 from finger_pin.mujoco.frictions import frictions, pulled
 from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose
 from finger_pin.mujoco.signals import place_of
@@ -18,7 +19,16 @@ from finger_pin.mujoco.specification import Keys, warn_if_noslip, warn_if_stiff
 from finger_pin.mujoco.warp import kernels, row_kernels
 from finger_pin.mujoco.warp.names import NamedModel, branches_of
 from finger_pin.mujoco.warp.self_test import try_self_test
-from finger_pin.mujoco.warp.structures import LAW, MEMORY, NEVER, allocate
+from finger_pin.mujoco.warp.structures import (
+    LAWS,
+    MEMORIES,
+    NEVER,
+    ForceInputs,
+    PinInputs,
+    RowInputs,
+    TendonInputs,
+    allocate,
+)
 from finger_pin.mujoco.warp.tables import build_table, check_rows, losses
 
 _DISCRETE = int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1))
@@ -66,13 +76,14 @@ class Friction:
             rows = self._table.sharing_first.shape[0] - 1
             self._arrays = s = allocate(d.nworld, len(found), rows, d.ten_J.shape[1])
             law = np.array([each.law for each in found], np.float32).T[:, None]
-            s.law.assign(np.broadcast_to(law, (LAW, d.nworld, len(found))).copy())
+            s.law.assign(np.broadcast_to(law, (LAWS, d.nworld, len(found))).copy())
             self._every = wp.full((d.nworld,), True, dtype=bool)
-        self.coulomb, self.stiction, self.stiffness, self.viscous, self.stribeck_velocity = (s.law[k] for k in range(5))
-        self.floor, self.stribeck_exponent, self.micro_damping, self.drag, self.curvature_offset, self.hardening = (
-            s.law[k] for k in range(5, LAW)
-        )
-        self.level, self.friction, self.tension, self.turn = (s.signals[k] for k in (LEVEL, FORCE, LOAD, TURN))
+        views = Coefficients(*(s.law[k] for k in range(LAWS)))
+        self.coulomb, self.stiction, self.stiffness, self.viscous = views[:4]
+        self.stribeck_velocity, self.floor, self.stribeck_exponent = views[4:7]
+        self.micro_damping, self.drag, self.curvature_offset, self.hardening = views[7:]
+        self.level, self.friction, self.tension, self.turn = (s.signals[k] for k in SIGNAL)
+        self._inputs: dict[Any, tuple[list[Any], Any]] = {}
         self._before, self._sensors = m.callback.act_bias, m.callback.sensor
         m.callback.act_bias, m.callback.sensor = self._act_bias, self._sensor
 
@@ -101,7 +112,7 @@ class Friction:
             value if isinstance(value, wp.array) else np.asarray(value, np.float32),
         )
         if tuple(given.shape) != tuple(shape):
-            raise InputError("state", f"must have the shape (worlds, frictions, {MEMORY}), {shape}", given.shape)
+            raise InputError("state", f"must have the shape (worlds, frictions, {MEMORIES}), {shape}", given.shape)
         self._arrays.memory.assign(given)
         self._arrays.clock.fill_(NEVER)
 
@@ -122,8 +133,7 @@ class Friction:
     def _finish(self) -> None:
         """Finish the last step, up to the present time, and start the clock there."""
         m, d = self._model, self._data
-        arguments = [self._table, self._arrays, m.nv, m.opt.timestep, m.ten_J_rowadr, m.ten_J_rownnz, m.ten_J_colind]
-        wp.launch(kernels.finish, self.level.shape, inputs=[*arguments, d.time, d.qvel], device=self._device)
+        self._launch(kernels.finish, self.level.shape[1], TendonInputs, m.opt, m, d)
         wp.copy(self._arrays.clock, d.time)
 
     def _act_bias(self, m: Any, d: Any) -> None:
@@ -132,23 +142,25 @@ class Friction:
             self._before(m, d)
         self._check(m, d)
         self._finish()
-        t, s, worlds = self._table, self._arrays, d.nworld
-        actuators = [m.actuator_gear, m.actuator_forcelimited, m.actuator_forcerange]
-        springs = [m.tendon_actfrclimited, m.tendon_actfrcrange, m.tendon_stiffness, m.tendon_damping]
-        addresses = [m.tendon_lengthspring, m.ten_J_rowadr, m.ten_J_rownnz, m.jnt_qposadr]
-        lengths = [d.actuator_force, d.ten_length, d.ten_velocity, d.qpos, d.ten_J]
-        paths = [d.ten_wrapadr, d.ten_wrapnum, d.wrap_obj, d.wrap_xpos]
-        inputs = [t, s, m.nv, m.opt.timestep, *actuators, *springs, *addresses, *lengths, *paths]
-        self._launch(kernels.tendons, t.tendons, inputs)
-        bodies = [m.body_parentid, m.body_jntadr, m.body_jntnum, m.jnt_bodyid, d.qvel, d.xanchor, d.xmat]
-        self._launch(kernels.pins, t.pins, [t, s, m.opt.timestep, *bodies])
-        rows = [d.efc.type, d.efc.id, d.efc.D, d.efc.aref, d.efc.frictionloss]
-        inputs = [t, s, m.nv, m.opt.timestep, d.qvel, d.ten_velocity, d.ne, d.nf, d.njmax, *rows]
-        wp.launch(row_kernels.write_rows, (worlds, m.nv + m.ntendon), inputs=inputs, device=self._device)
+        t = self._table
+        self._launch(kernels.tendons, t.tendons.shape[0], TendonInputs, m.opt, m, d)
+        self._launch(kernels.pins, t.pins.shape[0], PinInputs, m.opt, m, d)
+        self._launch(row_kernels.write_rows, m.nv + m.ntendon, RowInputs, d.efc, m.opt, m, d)
 
-    def _launch(self, kernel: Any, which: Any, inputs: list[Any]) -> None:
-        if which.shape[0]:
-            wp.launch(kernel, (self._data.nworld, which.shape[0]), inputs=inputs, device=self._device)
+    def _launch(self, kernel: Any, count: int, kind: Any, *owners: Any) -> None:
+        """Launch a kernel for every world and the first of a count, with the fields of a struct from their owners."""
+        if not count:
+            return
+        values = [next(getattr(owner, name) for owner in owners if hasattr(owner, name)) for name in kind.vars]
+        known, inputs = self._inputs.get(kind, ((), None))
+        # Filling a struct takes longer than a launch, and arrays are seldom others.
+        if len(known) != len(values) or not all(map(operator.is_, known, values)):
+            inputs = kind()
+            for name, value in zip(kind.vars, values, strict=True):
+                setattr(inputs, name, value)
+            self._inputs[kind] = values, inputs
+        shape = (self._data.nworld, count)
+        wp.launch(kernel, shape, inputs=[self._table, self._arrays, inputs], device=self._device)
 
     def _sensor(self, m: Any, d: Any, stage: Any) -> None:
         """Record the solver's forces: the callback that MuJoCo Warp calls while its rows are still this step's."""
@@ -158,10 +170,7 @@ class Friction:
             return
         if m.callback.act_bias != self._act_bias:
             raise InputError("m.callback.act_bias", "was set after friction was added, which is in it: set it before")
-        rows = [d.nefc, d.njmax, d.efc.type, d.efc.id, d.efc.force, m.eq_type, m.eq_obj1id, m.eq_obj2id]
-        contacts = [m.geom_bodyid, m.body_isdofancestor, d.contact.dim, d.contact.geom, d.contact.frame]
-        inputs = [self._table, self._arrays, *rows, *contacts, d.contact.friction, d.contact.efc_address]
-        wp.launch(row_kernels.record, self.level.shape, inputs=inputs, device=self._device)
+        self._launch(row_kernels.record, self.level.shape[1], ForceInputs, d.efc, d.contact, m, d)
 
     def _check(self, m: Any, d: Any) -> None:
         """Refuse other data, and options that leave no room for friction."""

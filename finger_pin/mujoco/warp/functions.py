@@ -7,6 +7,7 @@ from typing import Any
 import warp as wp
 
 from finger_pin.mujoco import friction_step
+from finger_pin.mujoco.warp.structures import ForceInputs, PinInputs, TendonInputs
 
 wp.set_module_options({"enable_backward": False})
 
@@ -28,44 +29,35 @@ exerted = _compiled(friction_step.exerted, {"slide": slide})
 
 
 @wp.func
-def spring(
-    w: int,
-    tendon: int,
-    stiffness: wp.array2d[float],
-    damping: wp.array2d[float],
-    rest: wp.array2d[wp.vec2],
-    length: wp.array2d[float],
-    velocity: wp.array2d[float],
-) -> float:
+def spring(w: int, tendon: int, x: TendonInputs) -> float:
     """Return the force of a tendon's own spring and damper along it, N, negative in tension."""
-    reach = rest[w % rest.shape[0], tendon]
-    there = length[w, tendon]
+    reach = x.tendon_lengthspring[w % x.tendon_lengthspring.shape[0], tendon]
+    there = x.ten_length[w, tendon]
     stretch = wp.max(reach[0] - there, 0.0) + wp.min(reach[1] - there, 0.0)
     return (
-        stiffness[w % stiffness.shape[0], tendon] * stretch
-        - damping[w % damping.shape[0], tendon] * velocity[w, tendon]
+        x.tendon_stiffness[w % x.tendon_stiffness.shape[0], tendon] * stretch
+        - x.tendon_damping[w % x.tendon_damping.shape[0], tendon] * x.ten_velocity[w, tendon]
     )
 
 
 @wp.func
-def path_point(w: int, k: int, points: wp.array2d[wp.spatial_vector]) -> wp.vec3:
+def path_point(w: int, k: int, x: TendonInputs) -> wp.vec3:
     """Return a point of the paths of all tendons: two stand in a vector."""
-    pair, first = points[w, k // 2], 3 * (k % 2)
+    pair, first = x.wrap_xpos[w, k // 2], 3 * (k % 2)
     return wp.vec3(pair[first], pair[first + 1], pair[first + 2])
 
 
 @wp.func
-def turn_of_path(
-    w: int, first: int, count: int, points: wp.array2d[wp.spatial_vector], wrapped: wp.array2d[wp.vec2i]
-) -> float:
+def turn_of_path(w: int, tendon: int, x: TendonInputs) -> float:
     """Return the angle by which a path turns up to its first pulley, rad, as `loads.turn_of_path` does."""
+    first = x.ten_wrapadr[w, tendon]
     turn = float(0.0)
     along = wp.vec3(0.0, 0.0, 0.0)
     going = bool(True)
-    for k in range(first + 1, first + count):
-        if wrapped[w, k // 2][k % 2] == -2 or wrapped[w, (k - 1) // 2][(k - 1) % 2] == -2:
+    for k in range(first + 1, first + x.ten_wrapnum[w, tendon]):
+        if x.wrap_obj[w, k // 2][k % 2] == -2 or x.wrap_obj[w, (k - 1) // 2][(k - 1) % 2] == -2:
             going = False
-        way = path_point(w, k, points) - path_point(w, k - 1, points)
+        way = path_point(w, k, x) - path_point(w, k - 1, x)
         # Nearer points are one point, to the digits that positions have.
         if going and wp.length_sq(way) >= 1e-12:
             turn += wp.atan2(wp.length(wp.cross(way, along)), wp.dot(way, along))
@@ -74,35 +66,27 @@ def turn_of_path(
 
 
 @wp.func
-def proximal(
-    w: int,
-    joint: int,
-    parent: wp.array[int],
-    joints: wp.array[int],
-    count: wp.array[int],
-    body_of: wp.array[int],
-    anchor: wp.array2d[wp.vec3],
-    frame: wp.array2d[wp.mat33],
-) -> wp.vec3:
+def proximal(w: int, joint: int, x: PinInputs) -> wp.vec3:
     """Return e_j: from the joint before to this one, or the x axis of its carrier."""
-    carrier = parent[body_of[joint]]
-    found = wp.vec3(frame[w, carrier][0, 0], frame[w, carrier][1, 0], frame[w, carrier][2, 0])
+    carrier = x.body_parentid[x.jnt_bodyid[joint]]
+    found = wp.vec3(x.xmat[w, carrier][0, 0], x.xmat[w, carrier][1, 0], x.xmat[w, carrier][2, 0])
     body = int(carrier)
     while body > 0:
-        if count[body] > 0:
-            way = anchor[w, joint] - anchor[w, joints[body] + count[body] - 1]
+        if x.body_jntnum[body] > 0:
+            way = x.xanchor[w, joint] - x.xanchor[w, x.body_jntadr[body] + x.body_jntnum[body] - 1]
             if wp.length(way) > 1e-6:
                 found = wp.normalize(way)
                 body = 0
-        body = parent[body]
+        body = x.body_parentid[body]
     return found
 
 
 @wp.func
-def contact_force(
-    w: int, r: int, elliptic: bool, dim: int, frame: wp.mat33, first: float, second: float, force: wp.array2d[float]
-) -> wp.vec3:
+def contact_force(w: int, r: int, elliptic: bool, x: ForceInputs) -> wp.vec3:
     """Return the force of a contact on its second geom, world frame, N, from its rows from r on."""
+    c = x.id[w, r]
+    dim, frame, force = x.dim[c], x.frame[c], x.force
+    first, second = x.friction[c][0], x.friction[c][1]
     normal = float(force[w, r])
     across, along = float(0.0), float(0.0)
     if dim > 1 and elliptic:
