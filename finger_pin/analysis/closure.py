@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.analysis.printing import BriefRepr
@@ -43,7 +44,12 @@ class ClosureRange(BriefRepr):
     @property
     def holds(self) -> bool:
         """Whether there is force closure at every posture."""
-        return bool(np.all(self.tension > 0.0))
+        return bool(self.taut.all())
+
+    @property
+    def taut(self) -> NDArray[np.bool_]:
+        """Whether there is force closure at each posture, shape (m,)."""
+        return self.margin > 0.0
 
     @property
     def worst(self) -> Array:
@@ -141,7 +147,7 @@ def locking_over_range(finger: FingerLike, samples: int = 64) -> tuple[CriticalF
     """
     finger = as_finger(finger)
     found = closure_over_range(finger, samples)
-    taut = found.positions[np.all(found.tension > 0.0, axis=1)]
+    taut = found.positions[found.taut]
     if not len(taut):
         raise InputError("finger.tendons", str(found))
     critical = [critical_friction(posed(finger, each), each) for each in taut]

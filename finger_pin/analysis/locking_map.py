@@ -13,7 +13,7 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger, refuse_without_tendons
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
@@ -71,6 +71,7 @@ def self_locking_map(
     """
     finger = as_finger(finger)
     one_finger(finger.description)
+    refuse_without_tendons(finger.description)
     routing, limiter = finger.routing, finger.stroke_limiter
     coupling = PassiveCoupling.inextensible(routing)
     free = [routing.joints[index] for index in coupling.free]

@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.laws.capstan import capstan_coefficient
-from finger_pin.mechanism.coerce import one_finger
+from finger_pin.mechanism.coerce import one_finger, refuse_without_tendons
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
@@ -263,6 +263,7 @@ def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> 
 def posture(finger: Finger, position: Sequence[float] | Array) -> Array:
     """Return theta as an array of the right size, for a finger alone."""
     one_finger(finger.description)
+    refuse_without_tendons(finger.description)
     return finite_vector("position", position, len(finger.routing.joints))
 
 

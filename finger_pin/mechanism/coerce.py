@@ -147,3 +147,14 @@ def one_finger(description: FingerDescription) -> None:
     if hand is not None and len(hand.fingers) > 1:
         allowed = f"is a hand; take one of its fingers: scenario.parts()[NAME] with {', '.join(hand.fingers)}"
         raise InputError("finger", allowed, hand.name)
+
+
+def refuse_without_tendons(description: FingerDescription) -> None:
+    """Refuse a hand whose cords, if any, servos and muscles of its tree pull: their tensions are not chosen.
+
+    Raises:
+        InputError: If it has no actuated tendon.
+    """
+    if not description.actuated_names:
+        allowed = "must have an actuated one for that; servos and muscles of a tree pull its own cords"
+        raise InputError("finger.tendons", allowed)
