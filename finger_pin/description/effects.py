@@ -111,7 +111,10 @@ OF_FINGER = (
         "has no effect without stiffness",
     ),
     Rule(
-        "tree.tendons.*", ("limit_damping",), lambda _, tendon: tendon.range is not None, "has no effect without range"
+        "tree.tendons.*",
+        ("limit_damping", "limit_viscous"),
+        lambda _, tendon: tendon.range is not None,
+        "has no effect without range",
     ),
     Rule(
         "tree.tendons.*",

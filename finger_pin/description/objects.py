@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 PATH = ("x", "y", "z")
 
 
-class Object(Shaped):
-    """A rigid body of the environment: fixed, free if it has a mass, or moved along a path."""
+class ObjectState(Description):
+    """Pose of an object, and of one with a mass its speed, at the start."""
 
     position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its origin, base frame; of a free object at t = 0."
@@ -29,17 +29,35 @@ class Object(Shaped):
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1e3, 1e3)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Quaternion x, y, z, w of any length; likewise."
     )
-    frame: Annotated[Literal["palm", "world"], choice("palm", "world")] = quantity(
-        "palm", unit="1", source="chosen", doc="Where a fixed object stands, also while the palm moves: palm or world."
-    )
-    mass: Annotated[float, real(0.0, 100.0, above=True, hint=" kg (is it in grams?)")] | None = quantity(
-        None, unit="kg", source="design", doc="Of a solid of even density that is free to move; fixed without one."
-    )
     velocity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
         (0.0, 0.0, 0.0), unit="m/s", source="chosen", doc="Of a free object at t = 0, base frame."
     )
     angular_velocity: Annotated[tuple[float, float, float], vector(3, -1e4, 1e4)] = quantity(
         (0.0, 0.0, 0.0), unit="rad/s", source="chosen", doc="Of a free object at t = 0, its own frame."
+    )
+
+    @model_validator(mode="after")
+    def _turned(self) -> Self:
+        if math.hypot(*self.orientation) < 1e-6:
+            raise problem("orientation", "must be a quaternion x, y, z, w that is not zero", self.orientation)
+        return self
+
+    def check_at_rest(self, entry: str = "") -> None:
+        """Refuse speeds, below an entry."""
+        for name in ("velocity", "angular_velocity"):
+            if any(getattr(self, name)):
+                allowed = "is for objects with a mass, which are free to move"
+                raise problem(entry + name, allowed, getattr(self, name))
+
+
+class Object(ObjectState, Shaped):
+    """A rigid body of the environment: fixed, free if it has a mass, or moved along a path."""
+
+    frame: Annotated[Literal["palm", "world"], choice("palm", "world")] = quantity(
+        "palm", unit="1", source="chosen", doc="Where a fixed object stands, also while the palm moves: palm or world."
+    )
+    mass: Annotated[float, real(0.0, 100.0, above=True, hint=" kg (is it in grams?)")] | None = quantity(
+        None, unit="kg", source="design", doc="Of a solid of even density that is free to move; fixed without one."
     )
     path: dict[Name, PathSignal] | None = Field(
         None, description="Path along which it is moved: growth of x, y and z of its position over time, base frame."
@@ -63,17 +81,14 @@ class Object(Shaped):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        if math.hypot(*self.orientation) < 1e-6:
-            raise problem("orientation", "must be a quaternion x, y, z, w that is not zero", self.orientation)
         if self.shape == "half_space" and self.mass is not None:
             raise problem("mass", "a half-space is fixed; leave it out", self.mass)
         if self.frame == "world" and (self.mass is not None or self.path):
             raise problem("frame", "is for fixed objects: leave out mass and path", self.frame)
         if self.path is not None and self.mass is not None:
             raise problem("path", "is for objects without a mass: one with a mass is free, and goes where it is pushed")
-        if self.mass is None and (any(self.velocity) or any(self.angular_velocity)):
-            entry = "velocity" if any(self.velocity) else "angular_velocity"
-            raise problem(entry, "is for objects with a mass, which are free to move", getattr(self, entry))
+        if self.mass is None:
+            self.check_at_rest()
         return self
 
     @property

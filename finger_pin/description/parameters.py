@@ -252,3 +252,6 @@ class StrokeLimiterSettings(Description):
     damping: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
         0.5, unit="s/rad", source="estimate", doc="c of tau^r = k d (1 + c d'), which takes energy from an impact."
     )
+    viscous: Annotated[Numbers, reals(0.0, 1e7)] = quantity(
+        0.0, unit="N m s/rad", source="chosen", doc="b of a damper beside it, k d (1 + c d') + b d', while that pushes."
+    )

@@ -71,11 +71,10 @@ class Scenario(Description):
             raise problem("finger", "is missing: a finger, or a hand")
         if self.hand is None and self.controller.tendon_winding:
             object.__setattr__(self, "finger", with_winches(self.finger, tuple(self.controller.tendon_winding)))
-        tree, objects = self.finger.tree, self.environment.objects
-        if tree.objects:
-            environment = self.environment.updated(objects={**tree.objects, **(objects or {})})
-            object.__setattr__(self, "environment", environment)
         self._check_names()
+        if around := self.finger.tree.objects_at(self.keyframe):
+            environment = self.environment.updated(objects={**around, **(self.environment.objects or {})})
+            object.__setattr__(self, "environment", environment)
         self._choose_kind()
         self._check_effects()
         self._check_parts()
@@ -133,7 +132,7 @@ class Scenario(Description):
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         table: dict[str, Any] = handler(self)
-        of_tree = self.finger.tree.objects
+        of_tree = self.finger.tree.objects_at(self.keyframe)
         around = table.get("environment", {}).get("objects") or {}
         for name in {*of_tree} & {*around}:
             # It stands in the tree, where it can be changed.

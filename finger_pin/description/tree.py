@@ -71,6 +71,10 @@ class Tree(Description):
             for entry in ("position", "velocity"):
                 for joint_name in getattr(keyframe, entry):
                     _check(f"keyframes.{name}.{entry}.{joint_name}", joint_name, self.joints, "joint")
+            for key, state in keyframe.objects.items():
+                _check(f"keyframes.{name}.objects.{key}", key, self.objects, "object")
+                if self.objects[key].mass is None:
+                    state.check_at_rest(f"keyframes.{name}.objects.{key}.")
         for name, actuator in self.actuators.items():
             _check(f"actuators.{name}.joint", actuator.joint, self.joints, "joint")
             _check(f"actuators.{name}.tendon", actuator.tendon, self.tendons, "tendon")
@@ -90,6 +94,12 @@ class Tree(Description):
                 _check("touching", shape, owner, "shape")
             if owner[pair[0]] == owner[pair[1]]:
                 raise problem("touching", "shapes of one body do not touch each other", list(pair))
+
+    def objects_at(self, keyframe: Keyframe | None) -> dict[str, Object]:
+        """Return the objects as they are at a keyframe."""
+        states = keyframe.objects if keyframe else {}
+        moved = {name: self.objects[name].updated(**dict(state)) for name, state in states.items()}
+        return self.objects | moved
 
     def cord(self, tendon: str) -> Cord:
         """Return a tendon as a cord: its arms on joints, where it winds about them, then the legs of its path."""

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from finger_pin.description.objects import ObjectState
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.validation import (
     MOST_ANGLE,
@@ -160,6 +161,9 @@ class TreeTendon(Description):
     limit_damping: Annotated[float, real(0.0, 1e6)] = quantity(
         0.5, unit="s/m", source="estimate", doc="Of the stroke limiter of the range, as c of (2)."
     )
+    limit_viscous: Annotated[float, real(0.0, 1e12)] = quantity(
+        0.0, unit="N s/m", source="chosen", doc="Of a damper beside it, while it pushes."
+    )
     friction: Annotated[float, real(0.0, 1e6)] = quantity(
         0.0, unit="N", source="design", doc="Coulomb friction that does not depend on load."
     )
@@ -181,6 +185,11 @@ class TreeTendon(Description):
             raise problem("slack", "has no effect without stiffness; leave it out", self.slack)
         check_path(self.path or {})
         return self
+
+    @property
+    def limiter(self) -> tuple[float, ...]:
+        """Numbers of the stroke limiter of its range."""
+        return (*(self.range or ()), self.limit_stiffness, self.limit_damping, self.limit_viscous)
 
     @property
     def wound(self) -> dict[str, float]:
@@ -275,3 +284,4 @@ class Keyframe(Description):
     inputs: dict[Name, Annotated[float, real(-_LARGE, _LARGE)]] = quantity(
         {}, unit="1", source="design", doc="Inputs of actuators, by name, that go with it."
     )
+    objects: dict[Name, ObjectState] = Field({}, description="Other states of the tree's objects, whole, by name.")

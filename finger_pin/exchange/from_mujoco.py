@@ -19,7 +19,7 @@ from finger_pin.description.meshes import Mesh
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.exchange.mujoco_actuators import ActuatorReader
-from finger_pin.exchange.mujoco_compliance import stop_stiffness
+from finger_pin.exchange.mujoco_compliance import read_stops
 from finger_pin.exchange.mujoco_equalities import linked_bodies, read_equalities
 from finger_pin.exchange.mujoco_free import FreeBodies
 from finger_pin.exchange.mujoco_keyframes import read_keyframes
@@ -110,8 +110,8 @@ class _Reader:
     def table(self, name: str) -> Table:
         """Return the description as a table."""
         model = self.model
-        if not self.kept_joints:
-            raise InputError("model", "has no joints that turn or slide")
+        if not self.kept_joints and not self.free.kept:
+            raise InputError("model", "has no joint that turns or slides, and no free body that a tendon or loop holds")
         reader = TendonReader(*vars(self._read).values())
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self._bodies()
@@ -119,9 +119,9 @@ class _Reader:
         taken = {*tendons, *pulled}
         couplings, loops, differences = read_equalities(self._read)
         joints, moving, loss = self._joints()
-        stops = [stop_stiffness(self._read, name) for name in joints]
-        keyframes = read_keyframes(self._read, self.actuators, self.free, self.kept_joints)
+        stops = read_stops(self._read, joints)
         objects, pairs = self.shapes.objects(self.free.loose), self.shapes.pairs(bodies)
+        keyframes = read_keyframes(self._read, self.actuators, self.free, self.shapes, self.kept_joints)
         self.shapes.set_apart(objects, bodies)
         return {
             "name": entry_name(name),
@@ -129,7 +129,7 @@ class _Reader:
             "joints": joints,
             "tendons": pulled,
             "joint_friction": {"viscous": 0.0, "floor": np.maximum(loss, _LEAST_FRICTION).tolist()},
-            **({"stroke_limiter": {"stiffness": stops}} if any(each["limited"] for each in joints.values()) else {}),
+            **({"stroke_limiter": stops} if stops else {}),
             "touches_itself": bool(pairs),
             "tree": {
                 "bodies": self._still() | {self.names.bodies[i]: self._body(i) for i in bodies},
@@ -278,7 +278,7 @@ class _Reader:
         for i in range(model.nsite):
             if "tip" in model.site(i).name.lower() and int(model.site_bodyid[i]) in self._moved_by_joints():
                 return int(model.site_bodyid[i]), model.site_pos[i]
-        return int(model.jnt_bodyid[self.kept_joints[-1]]), np.zeros(3)
+        return int(model.jnt_bodyid[(self.free.kept + self.kept_joints)[-1]]), np.zeros(3)
 
     def _moved_by_joints(self) -> set[int]:
         """Return the bodies that joints move which turn or slide."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+from finger_pin.exchange.mujoco_names import Table
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
 
@@ -11,19 +14,41 @@ _IMPEDANCES = 1e-4, 0.9999
 _STIFFEST = 1e7
 
 
-def soft_spring(read: ElementReader, solref: Array, solimp: Array, mobility: float) -> tuple[float, float]:
+def soft_spring(
+    read: ElementReader, what: str, solref: Array, solimp: Array, mobility: float, stop: bool = False
+) -> tuple[float, float]:
     """Return stiffness and damping of a constraint that gives by more than the width in `solimp`, SI.
 
     MuJoCo's force is (a_ref - a) / R with a_ref = -b v - k d r and R = (1 - d) / d times the mobility (manual,
     "Computation: Constraint model"): under a load a spring of k d / R beside a damper of b / R. Within the width the
-    impedance d is smaller, and the constraint gives more. The inertia of 1 / R that MuJoCo adds is left out.
+    impedance d is smaller, and the constraint gives more. The inertia of 1 / R that MuJoCo adds is left out:
+    beside the same spring, a stop throws back as much of an impact's speed with the same damping ratio, b / (2 sqrt k),
+    of the inertia that meets it. What is stiffer than descriptions have is listed, by the name of its element.
 
     Args:
         read: The model.
+        what: Name of the element, for the list.
         solref: Time constant and damping ratio, or stiffness and damping per mass, both negative.
         solimp: Impedance; the second number is that of large deflections.
         mobility: Acceleration per force along the constraint, as MuJoCo approximates it, 1/kg or 1/(kg m2).
+        stop: Whether it bounces.
     """
+    spring, damper, stiffness, damping = _unbounded(read, solref, solimp, mobility)
+    if spring > _STIFFEST:
+        read.rest.add(f"{what}: stiffness {spring:.2g} by its solref and solimp, {_STIFFEST:.2g} here", moves=False)
+        spring = _STIFFEST
+    if stop and mobility > 0.0:
+        damper = damping * math.sqrt(spring / (stiffness * mobility))
+    return spring, min(damper, _STIFFEST)
+
+
+def contact_stiffness(read: ElementReader, solref: Array, solimp: Array, mobility: float) -> float:
+    """Return the stiffness of a contact without friction, N/m, as that of `soft_spring`."""
+    return min(_unbounded(read, solref, solimp, mobility)[0], _STIFFEST)
+
+
+def _unbounded(read: ElementReader, solref: Array, solimp: Array, mobility: float) -> tuple[float, float, float, float]:
+    """Return stiffness and damping at any mobility, and MuJoCo's k and b."""
     impedance = min(max(float(solimp[1]), _IMPEDANCES[0]), _IMPEDANCES[1])
     first, second = float(solref[0]), float(solref[1])
     if first > 0.0:
@@ -32,15 +57,18 @@ def soft_spring(read: ElementReader, solref: Array, solimp: Array, mobility: flo
             first = max(first, 2.0 * float(read.model.opt.timestep))
         stiffness, damping = 1.0 / (impedance * first * second) ** 2, 2.0 / (impedance * first)
     else:
-        stiffness, damping = -first / impedance**2, -second / impedance
-    inertia = impedance / ((1.0 - impedance) * mobility) if mobility > 0.0 else _STIFFEST
-    return min(stiffness * impedance * inertia, _STIFFEST), min(damping * inertia, _STIFFEST)
+        stiffness, damping = -first / impedance**2, abs(second) / impedance
+    inertia = impedance / ((1.0 - impedance) * mobility) if mobility > 0.0 else math.inf
+    return stiffness * impedance * inertia, damping * inertia, stiffness, damping
 
 
-def stop_stiffness(read: ElementReader, joint: str) -> float:
-    """Return the stiffness of the stops of a joint by its name, N m/rad or N/m; zero for those of free bodies."""
-    if joint not in read.names.joints:
-        return 0.0
-    model, i = read.model, read.names.joints.index(joint)
-    mobility = float(model.dof_invweight0[model.jnt_dofadr[i]])
-    return soft_spring(read, model.jnt_solref[i], model.jnt_solimp[i], mobility)[0]
+def read_stops(read: ElementReader, joints: Table) -> Table:
+    """Return the stroke limiters of joints by their names; free bodies have none."""
+    model, numbers = read.model, []
+    for name in joints:
+        i = read.names.joints.index(name) if joints[name]["limited"] else None
+        soft = None if i is None else (model.jnt_solref[i], model.jnt_solimp[i])
+        mobility = 0.0 if i is None else float(model.dof_invweight0[model.jnt_dofadr[i]])
+        numbers.append(soft_spring(read, f"stops of joint {name}", *soft, mobility, stop=True) if soft else (0.0, 0.0))
+    stiffness, viscous = zip(*numbers, strict=True)
+    return {"stiffness": [*stiffness], "damping": 0.0, "viscous": [*viscous]} if any(stiffness) else {}

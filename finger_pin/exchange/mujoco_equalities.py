@@ -107,14 +107,13 @@ def _loop(read: ElementReader, i: int, bodies: list[int], places: list[Any], sha
     mobility = float(np.sum(model.body_invweight0[bodies, 0]))
     # A body that turns about its mass centre alone has none.
     mobility = mobility or 1.0 / float(np.sum(model.body_mass[bodies]))
-    stiffness, damping = soft_spring(read, model.eq_solref[i], model.eq_solimp[i], mobility)
+    held = _held(read, i, mobility)
     return {
         "body": names.bodies[body],
         **names.carrier(other, "other"),
         "position": [float(each) for each in place],
         "other_position": [float(each) for each in there],
-        "stiffness": stiffness / shared,
-        "damping": damping / shared,
+        **{key: each / shared for key, each in held.items()},
     }
 
 
@@ -132,7 +131,9 @@ def _spatial(mujoco: Any, model: Any, tendon: int) -> bool:
 
 
 def _held(read: ElementReader, i: int, mobility: float) -> Table:
-    stiffness, damping = soft_spring(read, read.model.eq_solref[i], read.model.eq_solimp[i], mobility)
+    model = read.model
+    what = f"equality {model.equality(i).name or f'equality_{i}'}"
+    stiffness, damping = soft_spring(read, what, model.eq_solref[i], model.eq_solimp[i], mobility)
     return {"stiffness": stiffness, "damping": damping}
 
 

@@ -7,6 +7,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from finger_pin.description.surface import Surface
+from finger_pin.exchange.mujoco_compliance import contact_stiffness
+from finger_pin.exchange.mujoco_names import Table
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.typing import Array
 
@@ -14,6 +17,8 @@ Pair = tuple[int, int]
 # More pairs than these are counted, not named.
 _NAMED = 4
 _SAME = 1e-9
+# MuJoCo's least number.
+_LEAST_MIX = 1e-15
 
 
 class Pairs(ElementReader):
@@ -53,26 +58,61 @@ class Pairs(ElementReader):
             return _kept(int(dims[first]), model.geom_friction[(a, b)[first]])
         return _kept(int(np.max(dims)), np.maximum(model.geom_friction[a], model.geom_friction[b]))
 
-    def surfaces(self, met: dict[Pair, Array]) -> dict[int, float]:
-        """Return a coefficient of sliding friction for each geom, of which the smaller of two is that of their pair.
+    def surfaces(self, met: dict[Pair, Array]) -> dict[int, Table]:
+        """Return the sliding friction and the stiffness of each geom, of which the smaller of two is their pair's.
 
-        No other numbers do if these do not; the pairs that rub more than in MuJoCo are listed.
+        No other numbers do if these do not; the pairs of which a number is greater than in MuJoCo are listed.
         """
-        found: dict[int, float] = {}
-        for pair, numbers in met.items():
-            for i in pair:
-                found[i] = max(found.get(i, 0.0), float(numbers[0]))
-        wrong = [
-            f"{self._pair(pair)}: {min(found[i] for i in pair):.3g} for {numbers[0]:.3g}"
-            for pair, numbers in met.items()
-            if min(found[i] for i in pair) > numbers[0] + _SAME
-        ]
-        if wrong:
-            self.rest.add(f"friction of pairs of geoms, which is greater here: {_few(wrong)}")
+        friction = self._shared("friction", {pair: float(numbers[0]) for pair, numbers in met.items()})
+        pressing = {pair: self._stiffness(pair, numbers) for pair, numbers in met.items()}
+        stiffness = self._shared("stiffness, N/m,", pressing, moves=False)
         turning = [self._pair(pair) for pair, numbers in met.items() if numbers[1:].any()]
         if turning:
             self.rest.add(f"torsional and rolling friction (condim 4 and 6) of geoms: {_few(turning)}")
+        return {i: {"friction": friction[i], "stiffness": stiffness[i]} for i in friction}
+
+    def _shared(self, what: str, wanted: dict[Pair, float], moves: bool = True) -> dict[int, float]:
+        """Return the least number of each geom with which no pair has less than it is to have; list those with more."""
+        found: dict[int, float] = {}
+        for pair, number in wanted.items():
+            for i in pair:
+                found[i] = max(found.get(i, 0.0), number)
+        least = {pair: min(found[i] for i in pair) for pair in wanted}
+        wrong = [
+            f"{self._pair(pair)}: {least[pair]:.3g} for {number:.3g}"
+            for pair, number in wanted.items()
+            if least[pair] > (1.0 + _SAME) * number + _SAME
+        ]
+        if wrong:
+            self.rest.add(f"{what} of pairs of geoms, which is greater here: {_few(wrong)}", moves)
         return found
+
+    def _stiffness(self, pair: Pair, friction: Array) -> float:
+        """Return the stiffness of a contact of two geoms at one point, N/m.
+
+        In a pyramid of friction, edges of slope mu share the load: of n directions 2 n, of 2 mu^2 (1 + mu^2) R each.
+        """
+        model, bodies = self.model, self.model.geom_bodyid[[*pair]]
+        mobility = float(np.sum(model.body_invweight0[bodies, 0]))
+        if not mobility:
+            return Surface().stiffness
+        stiffness = contact_stiffness(self, *self._softness(pair), mobility)
+        if model.opt.cone == self.mujoco.mjtCone.mjCONE_PYRAMIDAL and friction[0]:
+            directions = 2 + np.count_nonzero(friction[[1, 2, 2]])
+            stiffness *= float(model.opt.impratio) * directions / (friction[0] ** 2 * (1.0 + friction[0] ** 2))
+        return float(stiffness)
+
+    def _softness(self, pair: Pair) -> tuple[Array, Array]:
+        """Return solref and solimp of a pair, mixed as `mj_contactParam` does."""
+        model, geoms = self.model, [*pair]
+        for k in range(model.npair):
+            if {int(model.pair_geom1[k]), int(model.pair_geom2[k])} == {*pair}:
+                return model.pair_solref[k], model.pair_solimp[k]
+        priority, mix = model.geom_priority[geoms], np.maximum(model.geom_solmix[geoms], _LEAST_MIX)
+        shares = mix / mix.sum() if priority[0] == priority[1] else 1.0 * (priority == priority.max())
+        solref, solimp = model.geom_solref[geoms], model.geom_solimp[geoms]
+        both_timed = bool(np.all(solref[:, 0] > 0.0)) or priority[0] != priority[1]
+        return shares @ solref if both_timed else solref.min(axis=0), shares @ solimp
 
     def _pair(self, pair: Pair) -> str:
         return " and ".join(self.model.geom(i).name or f"geom_{i}" for i in pair)

@@ -48,9 +48,9 @@ SCHEMA: dict[str, dict[Kind, str]] = {
     "compiler": {"carried": ALL},
     "extension": {"listed": ALL},
     "option": {
-        "carried": "gravity o_friction actuatorgroupdisable timestep",
+        "carried": "cone gravity impratio o_friction actuatorgroupdisable timestep",
         "listed": "density viscosity wind o_margin o_solref o_solimp",
-        "idle": "ccd_iterations ccd_tolerance cone impratio integrator iterations jacobian ls_iterations ls_tolerance "
+        "idle": "ccd_iterations ccd_tolerance integrator iterations jacobian ls_iterations ls_tolerance "
         "magnetic noslip_iterations noslip_tolerance sdf_initpoints sdf_iterations sleep_tolerance solver tolerance",
     },
     "flag": {
@@ -79,8 +79,8 @@ SCHEMA: dict[str, dict[Kind, str]] = {
     "freejoint": {"carried": "align"},
     "body/geom": {
         "carried": f"{_POSE} conaffinity contype condim density fitscale friction fromto mass mesh priority "
-        "shellinertia size type",
-        "listed": "adhesion fluidcoef fluidshape gap hfield margin solimp solmix solref surfacevel",
+        "shellinertia size solimp solmix solref type",
+        "listed": "adhesion fluidcoef fluidshape gap hfield margin surfacevel",
         "idle": "castshadow",
     },
     "body/site": {"carried": f"{_POSE} fromto", "idle": "mesh size type"},
@@ -90,7 +90,7 @@ SCHEMA: dict[str, dict[Kind, str]] = {
     "body/plugin": {"listed": ALL},
     "geom/plugin": {"listed": ALL},
     "flexcomp": {"listed": ALL},
-    "pair": {"carried": "condim friction geom1 geom2", "listed": "adhesion gap margin solimp solref solreffriction"},
+    "pair": {"carried": "condim friction geom1 geom2 solimp solref", "listed": "adhesion gap margin solreffriction"},
     "exclude": {"carried": "body1 body2"},
     "spatial": _TENDON,
     "fixed": _TENDON,

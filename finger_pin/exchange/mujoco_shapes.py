@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.objects import Object
-from finger_pin.description.surface import Surface
-from finger_pin.exchange.mujoco_compliance import soft_spring
 from finger_pin.exchange.mujoco_names import Table, free_name, quaternion
 from finger_pin.exchange.mujoco_pairs import Pairs
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
@@ -49,10 +47,9 @@ class Shapes:
         # Ellipsoids, meshes and planes that move were listed.
         carried = [i for i in self._colliding if self._solid(i) or self._is_plane(i)]
         self._met = self._pairs.met(carried) if touching else {}
-        self._friction = self._pairs.surfaces(self._met)
+        self._surfaces = self._pairs.surfaces(self._met)
         self._read = read
         self._list_margins()
-        self._list_stiffness()
         self._overlapping = self._overlaps()
 
     def _name(self, i: int) -> str:
@@ -75,22 +72,6 @@ class Shapes:
             largest = max(model.geom_margin.max(initial=0.0), model.pair_margin.max(initial=0.0))
             line = f"margins of geoms, where contacts begin: {', '.join(dict.fromkeys(margins + paired))}"
             self.rest.add(line, moves=bool(largest > _DEEPEST))
-
-    def _list_stiffness(self) -> None:
-        """List the stiffness of contacts, which `solref` and `solimp` have with the mass that rests on them."""
-        model, asked = self.model, []
-        softness = [(i, model.geom_solref[i], model.geom_solimp[i]) for pair in self._met for i in pair]
-        for geoms in (model.pair_geom1, model.pair_geom2):
-            softness += list(zip(geoms.tolist(), model.pair_solref, model.pair_solimp, strict=True))
-        for i, solref, solimp in softness:
-            mobility = float(model.body_invweight0[model.geom_bodyid[i], 0])
-            if mobility > 0.0:
-                asked.append(soft_spring(self._read, solref, solimp, mobility)[0])
-        if asked:
-            low, high = min(asked), max(asked)
-            ends = f"{low:.2g}" if high < 1.05 * low else f"{low:.2g} to {high:.2g}"
-            here = Surface().stiffness
-            self.rest.add(f"stiffness of contacts by solref, {ends} N/m: it is {here:.2g} N/m here", moves=False)
 
     def _overlaps(self) -> set[frozenset[int]]:
         """Return the pairs of geoms that overlap where runs start, by more than they may."""
@@ -117,8 +98,8 @@ class Shapes:
             sizes = {"sides": (2.0 * size).tolist()}
         elif shape in ("capsule", "cylinder"):
             sizes["length"] = 2.0 * float(size[1])
-        own = float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0
-        return {"shape": shape, **sizes, "surface": {"friction": self._friction.get(i, own)}}
+        alone = {"friction": float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0}
+        return {"shape": shape, **sizes, "surface": self._surfaces.get(i, alone)}
 
     def still(self) -> set[int]:
         """Return the bodies that stand still, have something to touch, and are not the world."""
@@ -147,6 +128,17 @@ class Shapes:
                 found[self._placed_at[i]] = self._shape(i) | self._placed(data, i) | moving
                 self._list_free(body, i, found[self._placed_at[i]])
         return found
+
+    def object_states(self, keyframe: int) -> Table:
+        """Return the free bodies that are elsewhere at a keyframe, or move otherwise, than where runs start."""
+        start, data = (self._free_states(k) for k in (0, keyframe))
+        return {name: state for name, state in data.items() if state != start[name]}
+
+    def _free_states(self, keyframe: int) -> Table:
+        data = self._read.start_data(keyframe)
+        weld, carriers = self.model.body_weldid, self.model.geom_bodyid
+        free = {name: i for i, name in self._placed_at.items() if weld[carriers[i]]}
+        return {name: self._placed(data, i) | self._velocity(data, i) for name, i in free.items()}
 
     def _dropped(self, i: int) -> bool:
         """Return whether an object overlaps a body at the start of runs, and list it if so."""

@@ -39,7 +39,9 @@ class TendonReader(ElementReader):
         if model.tendon_limited[i]:
             found["range"] = within_margin(model.tendon_range[i], float(model.tendon_margin[i]))
             soft = model.tendon_solref_lim[i], model.tendon_solimp_lim[i], float(model.tendon_invweight0[i])
-            found["limit_stiffness"] = soft_spring(self, *soft)[0]
+            what = f"range of tendon {self.names.tendons[i]}"
+            found["limit_stiffness"], found["limit_viscous"] = soft_spring(self, what, *soft, stop=True)
+            found["limit_damping"] = 0.0
         return found
 
     def _without_idle(self, path: Table) -> Table:

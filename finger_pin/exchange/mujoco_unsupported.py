@@ -129,11 +129,11 @@ class ElementReader:
     names: Names
     rest: Rest
 
-    def start_data(self) -> Any:
-        """Return the model's data where runs start: at its first keyframe, or at its reference."""
+    def start_data(self, keyframe: int = 0) -> Any:
+        """Return the model's data where runs start: at a keyframe, or at its reference without any."""
         data = self.mujoco.MjData(self.model)
         if self.model.nkey:
-            self.mujoco.mj_resetDataKeyframe(self.model, data, 0)
+            self.mujoco.mj_resetDataKeyframe(self.model, data, keyframe)
         self.mujoco.mj_kinematics(self.model, data)
         self.mujoco.mj_comPos(self.model, data)
         self.mujoco.mj_comVel(self.model, data)

@@ -1,4 +1,4 @@
-"""Stroke limiters (2): Hunt-Crossley contacts at both ends of a joint's range."""
+"""Stroke limiters (2): Hunt-Crossley contacts at both ends of a joint's range, and dampers beside them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ def penetration(position: Number, lower: Number, upper: Number) -> Number:
     return np.maximum(position - upper, 0.0) - np.maximum(lower - position, 0.0)
 
 
-def limiter_torque(depth: Number, velocity: Number, stiffness: Number, damping: Number) -> Number:
-    """Return tau^r = max(0, k d (1 + c d')) with the sign of the penetration, N m.
+def limiter_torque(
+    depth: Number, velocity: Number, stiffness: Number, damping: Number, viscous: Number = 0.0
+) -> Number:
+    """Return tau^r = max(0, k d (1 + c d') + b d') with the sign of the penetration, N m; zero where there is none.
 
     It enters (18) as -tau^r, so a positive torque acts against positive rotation.
 
@@ -23,8 +25,11 @@ def limiter_torque(depth: Number, velocity: Number, stiffness: Number, damping: 
         velocity: theta', rad/s.
         stiffness: k, N m/rad.
         damping: c, s/rad.
+        viscous: b, N m s/rad.
     """
-    return stiffness * depth * np.maximum(1.0 + damping * velocity * np.sign(depth), 0.0)
+    end = np.sign(depth)
+    push = stiffness * depth * end * (1.0 + damping * velocity * end) + viscous * velocity * end
+    return end * np.maximum(push, 0.0)
 
 
 def limiter_energy(depth: Number, stiffness: Number) -> Number:
@@ -39,24 +44,27 @@ def limiter_loss(torque: Number, depth: Number, velocity: Number, stiffness: Num
 
 def _seen(row: Row, p: Parameters) -> Numbers:
     """Return the side of the nearer limit, 1 or -1, the penetration d, and 1 + c d'."""
-    lower, upper, _, damping = p
+    lower, upper, _, damping, _ = p
     end = 2.0 * (row.length > 0.5 * (lower + upper)) - 1.0
     return end, np.maximum(row.length - upper, lower - row.length), 1.0 + damping * row.speed * end
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
     end, past, factor = _seen(row, p)
-    # The torque bends where the joint meets its limit, and where the limiter would begin to pull.
-    grip = np.minimum(past, factor)
-    torque = p[2] * end * past * factor * beyond(grip, row.side)
+    push = p[2] * end * past * factor + p[4] * row.speed
+    # The torque bends or jumps where the joint meets its limit, and bends where the limiter would begin to pull.
+    grip = np.minimum(past, factor + (p[4] > 0.0) * (end * push - factor))
+    torque = push * beyond(grip, row.side)
     return -torque, 0.0 * row.length, end * np.maximum(past, 0.0), grip
 
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    _, _, stiffness, damping = p
+    _, _, stiffness, damping, viscous = p
     _, past, factor = _seen(row, p)
-    gripping = stiffness * beyond(signals[1], row.side)
-    return (-factor * gripping, -damping * past * gripping, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    held = beyond(signals[1], row.side)
+    gripping = stiffness * held
+    by_speed = -damping * past * gripping - viscous * held
+    return (-factor * gripping, by_speed, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
@@ -67,7 +75,7 @@ def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numb
 #: The limiter of a joint's stroke.
 STROKE_LIMITER = Law(
     name="stroke limiter (2)",
-    parameters=("lower", "upper", "stiffness", "damping"),
+    parameters=("lower", "upper", "stiffness", "damping", "viscous"),
     value=_value,
     slopes=_slopes,
     account=_account,

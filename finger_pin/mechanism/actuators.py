@@ -263,7 +263,7 @@ class Actuators:
                 "backlash",
                 STROKE_LIMITER,
                 self.loose_names,
-                np.array([lower, lower + gap, flank, np.full(count, _REBOUND)]),
+                np.array([lower, lower + gap, flank, np.full(count, _REBOUND), np.zeros(count)]),
                 arm,
                 stored=_FLANKS,
                 powers=(_FLANKS,),

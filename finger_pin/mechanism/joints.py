@@ -146,6 +146,7 @@ class StrokeLimiter:
         upper: Shape (n,), rad.
         stiffness: k, shape (n,), N m/rad.
         damping: c, shape (n,), s/rad.
+        viscous: b, shape (n,), N m s/rad.
         limited: Whether each joint has limits, shape (n,).
     """
 
@@ -153,6 +154,7 @@ class StrokeLimiter:
     upper: Array
     stiffness: Array
     damping: Array
+    viscous: Array
     limited: NDArray[np.bool_]
 
     @classmethod
@@ -163,7 +165,7 @@ class StrokeLimiter:
         size = len(ranges)
         stiffness, damping = expand(settings.stiffness, size), expand(settings.damping, size)
         limited = np.array([joint.limited for joint in description.joints.values()])
-        return cls(ranges[:, 0], ranges[:, 1], stiffness, damping, limited)
+        return cls(ranges[:, 0], ranges[:, 1], stiffness, damping, expand(settings.viscous, size), limited)
 
     def rows(self, names: tuple[str, ...], width: int) -> Rows:
         """Return the table of the limiters."""
@@ -172,7 +174,7 @@ class StrokeLimiter:
             group="limiter",
             law=STROKE_LIMITER,
             names=names,
-            parameters=np.array([lower, upper, self.stiffness, self.damping]),
+            parameters=np.array([lower, upper, self.stiffness, self.damping, self.viscous]),
             arm=np.eye(len(names), width),
             stored=_LIMITERS,
             powers=(_LIMITERS,),

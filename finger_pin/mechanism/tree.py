@@ -191,7 +191,7 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
         return {name: routes.routes[name] for name in names}
 
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
-    limits = [(*each.range, each.limit_stiffness, each.limit_damping) for each in limited.values() if each.range]
+    limits = [each.limiter for each in limited.values()]
     # Law (9) whose level is its floor.
     dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0, 0, 0, 0) for each in rubbing.values()]
     return [

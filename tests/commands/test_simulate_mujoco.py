@@ -1,6 +1,7 @@
 """`simulate --mujoco`: the hand of a MuJoCo model moves, and what cannot be is said."""
 
 import shutil
+import tomllib
 
 import numpy as np
 import pytest
@@ -49,3 +50,14 @@ def test_a_model_without_actuators_says_that_nothing_drives_it(tmp_path, capsys)
     arguments = ["--mujoco", str(tmp_path / "one.xml"), "--duration", "0.05", "--no-figures"]
     assert run_function(simulate, [*arguments, "--output", str(tmp_path / "out")]) == 0
     assert "one: it falls, as nothing drives it" in capsys.readouterr().out
+
+
+def test_motors_without_a_range_are_held_at_zero_and_named(tmp_path, capsys):
+    motors = '<motor name="loose" joint="finger:joint"/><motor name="tame" joint="finger:joint" ctrlrange="0 1"/>'
+    (tmp_path / "one.xml").write_text(HAND.replace("<actuator>", f"<actuator>{motors}"))
+    arguments = ["--mujoco", str(tmp_path / "one.xml"), "--duration", "0.05", "--no-figures"]
+    assert run_function(simulate, [*arguments, "--output", str(tmp_path / "out")]) == 0
+    assert "Held at zero, as their controls have no range: loose\n" in capsys.readouterr().out
+    inputs = tomllib.loads((tmp_path / "out" / "scenario.toml").read_text("utf-8"))["controller"]["inputs"]
+    moved = {name for name, each in inputs.items() if each.get("offset") or each.get("amplitude")}
+    assert moved == {"servo", "tame"}

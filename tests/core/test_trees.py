@@ -33,7 +33,7 @@ def springs(arm, stiffness):
     """Rows that pull back to length zero: limiters whose range is a point, without damping."""
     arm, zero = np.atleast_2d(arm), np.zeros(len(np.atleast_2d(arm)))
     names = tuple(f"spring{k}" for k in range(len(arm)))
-    parameters = np.array([zero, zero, zero + stiffness, zero])
+    parameters = np.array([zero, zero, zero + stiffness, zero, zero])
     return Rows(group="springs", law=STROKE_LIMITER, names=names, parameters=parameters, arm=arm)
 
 

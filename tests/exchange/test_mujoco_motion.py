@@ -1,0 +1,109 @@
+"""Impacts, contacts and starts of MuJoCo models: what is read moves as in MuJoCo's own step."""
+
+import tomllib
+
+import mujoco
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.description.loading import read_scenario
+
+SMOOTH = {"finger.joint_friction.coulomb": 0.0, "finger.joint_friction.stiction": 0.0}
+SMOOTH |= {"finger.tendon_friction.coulomb": 0.0, "finger.tendon_friction.viscous": 0.0}
+
+
+def both(text, seconds, keyframe=None):
+    """Return MuJoCo's data and our result at the end of a motion from a keyframe, the first or the reference."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe or 0).id)
+    mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
+    initial = {"initial": {"keyframe": keyframe}} if keyframe else {}
+    table = {"name": "x", "finger": fp.from_mujoco(model).model_dump(mode="python", exclude_none=True)}
+    table |= {"controller": {"kind": "tensions"}, "simulation": {"duration": seconds, "sample_rate": 50.0} | initial}
+    return data, fp.simulate(read_scenario(table, SMOOTH))
+
+
+SWING = """<mujoco><compiler angle="radian"/><option timestep="2e-5" gravity="0 0 0"/><worldbody>
+<body><joint name="j" axis="0 1 0" JOINT/>
+ <geom type="capsule" size=".005" fromto="0 0 0 .04 0 0" mass=".008" contype="0" conaffinity="0"/></body></worldbody>
+TENDON<actuator><motor joint="j"/></actuator><keyframe><key qvel="SPEED"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize("place", ["JOINT", "TENDON"])
+@pytest.mark.parametrize("soft", ["", 'solreflimit=".02 .3"', 'solreflimit="-4e4 -60"', 'solreflimit="-1e4 0"'])
+@pytest.mark.parametrize("speed", [1.0, 10.0])
+def test_stops_throw_back_as_much_of_any_speed_as_in_mujoco(place, soft, speed):
+    """A spring and a damper that only push, from k x + b v = 0 on at rest: with critical damping exp(-2) comes back."""
+    limited = f'limited="true" range="-1 .1" {soft}'
+    # A sum of joint positions that is no cord, and does not rub.
+    tendon = f'<tendon><fixed name="t" {limited}><joint joint="j" coef="1"/></fixed></tendon>'
+    text = SWING.replace(place, {"JOINT": limited, "TENDON": tendon}[place]).replace("SPEED", str(speed))
+    data, result = both(text.replace("JOINT", "").replace("TENDON", ""), 0.1 / speed + 0.08)
+    share = -float(data.qvel[0]) / speed
+    assert soft or share == pytest.approx(np.exp(-2.0), rel=0.01)
+    # MuJoCo's impedance is smaller within the first 1e-3 of the depth.
+    assert -float(result.joint_velocity[-1, 0]) / speed == pytest.approx(share, rel=0.02)
+
+
+def test_what_is_stiffer_than_descriptions_have_is_listed_with_its_size():
+    """The stiffness k d / R of a time constant of 4e-5 s, at J = 1 / dof_invweight0 and d = 0.95."""
+    limited = 'limited="true" range="-1 .1" solreflimit="-1e12 -100"'
+    model = mujoco.MjModel.from_xml_string(SWING.replace("JOINT", limited).replace("SPEED", "0").replace("TENDON", ""))
+    found = fp.from_mujoco(model)
+    asked = 1e12 / 0.95 * 0.95 / 0.05 / model.dof_invweight0[0]
+    assert found.tree.left_out == (f"stops of joint j: stiffness {asked:.2g} by its solref and solimp, 1e+07 here",)
+    assert found.stroke_limiter.stiffness == (1e7,)
+
+
+BALL = """<mujoco><option timestep="1e-3" cone="CONE" gravity="0 0 -200"/><worldbody>
+<geom type="plane" size="1 1 .1" friction=".8" condim="DIM"/><body pos="0 0 .0095"><freejoint/>
+ <geom name="g" size=".01" mass=".2" friction=".8" condim="DIM" SOFT/></body><body pos="1 0 1"><joint name="j"/>
+ <geom size=".01" mass=".2" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    "cone, dim, soft", [("pyramidal", 3, ""), ("elliptic", 3, ""), ("pyramidal", 1, 'solref=".01 1" solmix="3"')]
+)
+def test_contacts_give_as_in_mujoco_under_a_load(cone, dim, soft):
+    text = BALL.replace("CONE", cone).replace("DIM", str(dim)).replace("SOFT", soft)
+    data, result = both(text, 1.0)
+    # Deeper than the width of solimp, within which MuJoCo's give more.
+    assert data.contact.dist[0] < -1e-3
+    assert float(result.object_position[-1, 0, 2]) - 0.01 == pytest.approx(data.contact.dist[0], rel=0.01)
+
+
+TWO_STARTS = """<mujoco><option timestep="1e-3"/><worldbody><geom type="plane" size="1 1 .1" pos="0 0 -.04"/>
+<body name="ball" pos=".2 0 -.03"><freejoint/><geom size=".01" mass=".02"/></body>
+<body name="f"><joint name="j" axis="0 1 0" damping="3e-3"/>
+ <geom type="capsule" size=".004" fromto="0 0 0 .05 0 0" mass=".01" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><position name="p" joint="j" kp=".1"/></actuator>
+<keyframe><key name="away" qpos=".2 0 -.03 1 0 0 0 0" ctrl=".6"/>
+<key name="thrown" qpos=".05 .1 .3 .6 .8 0 0 .1" qvel="1 0 1 0 3 0 .5" ctrl=".2"/></keyframe></mujoco>"""
+
+
+def test_another_keyframe_moves_free_bodies():
+    data, result = both(TWO_STARTS, 0.2, "thrown")
+    np.testing.assert_allclose(result.object_position.values[-1, 0], data.qpos[:3], atol=1e-3)
+    turned = np.roll(data.qpos[3:7], -1)
+    assert abs(result.object_orientation.values[-1, 0] @ turned) == pytest.approx(1.0, abs=1e-5)
+    assert float(result.joint_position[-1, 0]) == pytest.approx(data.qpos[7], abs=2e-3)
+    # A scenario that is written out has the object in its tree alone, where the keyframe moves it.
+    scenario = read_scenario(tomllib.loads(result.attrs["scenario"]))
+    assert scenario.environment.objects["ball"].position == (0.05, 0.1, 0.3)
+
+
+def test_free_bodies_that_tendons_alone_hold_are_a_model():
+    ball = '<body name="%s" pos="%s"><freejoint/><geom size=".01" mass=".1"/><site name="%s" pos="0 0 .01"/></body>'
+    bodies = ball % ("x", ".1 0 0", "b") + ball % ("y", ".1 .1 -.1", "c")
+    tendon = '<spatial stiffness="50" damping="1"><site site="%s"/><site site="%s"/></spatial>'
+    text = '<mujoco><option timestep="1e-4"/><worldbody><site name="a"/>%s</worldbody><tendon>%s</tendon></mujoco>'
+    data, result = both(text % (bodies, tendon % ("a", "b") + tendon % ("b", "c")), 0.2)
+    moved = result.joint_position.sel(joint=["x_x", "x_y", "x_z", "y_x", "y_y", "y_z"]).values[-1]
+    starts = [0.1, 0.0, 0.0, 0.1, 0.1, -0.1]
+    np.testing.assert_allclose(moved + starts, [*data.qpos[:3], *data.qpos[7:10]], atol=1e-3)
+    with pytest.raises(fp.InputError, match="no free body that a tendon or loop holds"):
+        fp.from_mujoco(mujoco.MjModel.from_xml_string(text % (bodies, "")))
