@@ -92,7 +92,7 @@ def optimise(
     from finger_pin.studies.keys import BaseScenario
 
     goals = [*over, *minimise, *(f"max.{each}" for each in maximise), *constraint, *["no-constraints"] * no_constraints]
-    study = f"optimise-{BaseScenario.load(scenario, changed).scenario.name}"
+    study = f"optimise-{BaseScenario.from_scenario(scenario, changed).scenario.name}"
     folder = output or Path("results", folder_name(study, *settings, *goals, *(f"{k}={v}" for k, v in effort.items())))
 
     def run(progress: Progress | None, stop: Stop) -> xr.Dataset:

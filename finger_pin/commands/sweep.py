@@ -87,7 +87,7 @@ def sweep(
     from finger_pin.studies.keys import BaseScenario
 
     points = build_design(design, over, samples, seed or 0)
-    name = BaseScenario.load(scenario, changed).scenario.name
+    name = BaseScenario.from_scenario(scenario, changed).scenario.name
     chosen = [*over, *metric, *([] if design == "grid" else [design, f"{samples}", f"{seed or 0}"])]
     folder = output or Path("results", folder_name(f"sweep-{name}", *settings, *chosen))
 

@@ -26,14 +26,16 @@ from finger_pin.version import __version__
 NAME = "identification.json"
 
 
-def digest(scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording], more: tuple[Any, ...]) -> str:
+def digest(
+    scenario: Scenario, settings: IdentifySettings, recordings: Sequence[Recording], more: tuple[Any, ...]
+) -> str:
     """Return the digest of an identification: scenario, table, data, options, version."""
     text = [__version__, scenario.model_dump_json(), settings.model_dump_json(), repr(more)]
-    found = hashlib.sha256("\0".join(text).encode())
-    for recording in taken:
+    hasher = hashlib.sha256("\0".join(text).encode())
+    for recording in recordings:
         for values in (*recording.inputs.values(), *recording.outputs.values(), recording.time, recording.speed):
-            found.update(np.ascontiguousarray(values).tobytes())
-    return found.hexdigest()
+            hasher.update(np.ascontiguousarray(values).tobytes())
+    return hasher.hexdigest()
 
 
 class Checkpoint:
@@ -45,8 +47,8 @@ class Checkpoint:
         self._asked, self._done = asked, {}
         if self._path is not None and not restart:
             try:
-                held = json.loads(self._path.read_text("utf-8"))
-                self._done = held["done"] if held["asked"] == asked else {}
+                saved = json.loads(self._path.read_text("utf-8"))
+                self._done = saved["done"] if saved["asked"] == asked else {}
             except (OSError, ValueError, KeyError, TypeError):
                 self._done = {}
 
@@ -82,15 +84,15 @@ class Checkpoint:
         """Return a minimum, or the one found before."""
         if name in self._done:
             z: Array = np.array(self._done[name])
-            return fit(problem, z, held=dict(enumerate(z)))
+            return fit(problem, z, fixed=dict(enumerate(z)))
         try:
-            found = work()
+            minimum = work()
         except Stopped:
             if len(problem.best[1]):
                 self._done[f"{name} so far"] = problem.best[1].tolist()
             raise
-        self._done[name] = found.z.tolist()
-        return found
+        self._done[name] = minimum.z.tolist()
+        return minimum
 
     def reached(self, name: str, start: Array) -> Array:
         """Return the last place of a search that was stopped, shape (p,), or its start."""
@@ -101,13 +103,13 @@ class Checkpoint:
         if name in self._done:
             end, path = self._done[name]
             return ProfileBound(math.nan if end is None else float(end), np.array(path))
-        found = work()
-        if found.better is None:
-            self._done[name] = (found.end, found.path.tolist())
-        return found
+        bound = work()
+        if bound.better is None:
+            self._done[name] = (bound.end, bound.path.tolist())
+        return bound
 
     def comparison(self, work: Callable[[], LawComparison]) -> LawComparison:
         """Return a comparison of laws."""
         if "comparison" not in self._done:
             self._done["comparison"] = work().plain()
-        return LawComparison.of(self._done["comparison"])
+        return LawComparison.from_table(self._done["comparison"])

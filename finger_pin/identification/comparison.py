@@ -17,7 +17,7 @@ from finger_pin.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.typing import Array
 
 #: Name of the law that the scenario has as it stands.
-OWN = "as described"
+DESCRIBED = "as described"
 # Into how many parts one recording is cut.
 _PARTS = 6
 # Where in its range a key is started from that only another law has.
@@ -49,28 +49,28 @@ class LawComparison:
         return asdict(self)
 
     @classmethod
-    def of(cls, table: Mapping[str, Any]) -> Self:
+    def from_table(cls, table: Mapping[str, Any]) -> Self:
         """Read a table of `plain`."""
         return cls(**table)
 
 
-def compare_laws(problem: Problem, settings: IdentifySettings, found: Fit) -> LawComparison:
+def compare_laws(problem: Problem, settings: IdentifySettings, minimum: Fit) -> LawComparison:
     """Return the scenario's law and the alternatives.
 
     Args:
-        problem: Under the own law.
+        problem: Under the scenario's law.
         settings: With the other laws.
-        found: The minimum under the own law, whose noise and weights count for all.
+        minimum: That of the scenario's law, whose noise and weights count for all.
     """
     folds = _folds(problem)
     rows = []
-    for name, law in [(OWN, problem), *other_laws(problem, settings).items()]:
-        best = found if law is problem else _best(law, found.weights, _places(law, problem, found.z))
-        size = float(sum(w * len(e) for e, w in zip(best.residuals, found.weights, strict=True)))
-        value = minus_twice_likelihood(best.residuals, found.weights, law.groups) + law.asked * math.log(size)
+    for name, law in [(DESCRIBED, problem), *other_laws(problem, settings).items()]:
+        best = minimum if law is problem else _best(law, minimum.weights, _places(law, problem, minimum.z))
+        size = float(sum(w * len(e) for e, w in zip(best.residuals, minimum.weights, strict=True)))
+        value = minus_twice_likelihood(best.residuals, minimum.weights, law.groups) + law.asked * math.log(size)
         values = dict(zip(law.keys[: law.asked], law.values(best.z).tolist(), strict=False))
-        out = _held_out(law, best, found, folds)
-        rows.append((name, law.asked, value, _scaled_rms(best.residuals, found.noise), out, values))
+        out = _held_out(law, best, minimum, folds)
+        rows.append((name, law.asked, value, _scaled_rms(best.residuals, minimum.noise), out, values))
     return LawComparison(*(list(column) for column in zip(*rows, strict=True)))
 
 
@@ -86,10 +86,10 @@ def other_laws(problem: Problem, settings: IdentifySettings) -> dict[str, Proble
 def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
     """Return the problem under another law: some keys held, some with bounds of their own."""
     bounds = {key: (float(a), float(b)) for key, a, b in zip(*_asked(problem), strict=True)}
-    held: dict[str, float] = {}
+    fixed: dict[str, float] = {}
     for key, value in law.items():
         if isinstance(value, int | float) and not isinstance(value, bool):
-            held[key] = float(value)
+            fixed[key] = float(value)
             bounds.pop(key, None)
         elif isinstance(value, list | tuple) and len(value) == 2 and value[0] < value[1]:
             bounds[key] = (float(value[0]), float(value[1]))
@@ -97,7 +97,7 @@ def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
             raise InputError(f"identify.compare.{name}.{key}", "must be a number, or the least and the greatest", value)
     low, high = np.array(list(bounds.values())).T if bounds else np.zeros((2, 0))
     try:
-        return Problem(problem.scenario, tuple(bounds), low, high, problem.models, problem.signals, held, problem.stop)
+        return Problem(problem.scenario, tuple(bounds), low, high, problem.models, problem.signals, fixed, problem.stop)
     except InputError as error:
         raise InputError(f"identify.compare.{name}", str(error)) from None
 
@@ -107,17 +107,17 @@ def _asked(problem: Problem) -> tuple[Sequence[str], Array, Array]:
     return problem.keys[: problem.asked], problem.low[: problem.asked], problem.high[: problem.asked]
 
 
-def _places(law: Problem, own: Problem, z: Array) -> list[Array]:
-    """Return the starts of searches under a law: the own one's minimum, further keys spread over their ranges."""
+def _places(law: Problem, default: Problem, z: Array) -> list[Array]:
+    """Return the starts of searches under a law: that of the scenario's law, further keys spread over their ranges."""
     low, high = law.box
-    shared = [key in own.keys for key in law.keys]
-    known = np.array([z[own.keys.index(key)] if key in own.keys else 0.0 for key in law.keys])
+    shared = [key in default.keys for key in law.keys]
+    known = np.array([z[default.keys.index(key)] if key in default.keys else 0.0 for key in law.keys])
     shares = [0.5] if all(shared) else _SHARES
     return [np.clip(np.where(shared, known, low + (high - low) * share), low, high) for share in shares]
 
 
 def _best(law: Problem, weights: Array, places: Sequence[Array]) -> Fit:
-    return min((fit(law, each, weights=weights) for each in places), key=lambda each: each.objective)
+    return min((fit(law, place, weights=weights) for place in places), key=lambda minimum: minimum.objective)
 
 
 def _folds(problem: Problem) -> list[list[NDArray[np.bool_]]]:
@@ -138,12 +138,12 @@ def _folds(problem: Problem) -> list[list[NDArray[np.bool_]]]:
     return [[group == part for group in groups] for part in range(int(max(g.max() for g in groups)) + 1)]
 
 
-def _held_out(law: Problem, best: Fit, own: Fit, folds: Sequence[Sequence[NDArray[np.bool_]]]) -> float:
+def _held_out(law: Problem, best: Fit, minimum: Fit, folds: Sequence[Sequence[NDArray[np.bool_]]]) -> float:
     squares, count = 0.0, 0
     for fold in folds if len(folds) > 1 else []:
         z = fit(law.subset([~each for each in fold]), best.z).z
-        for e, each, noise in zip(law.residuals(z), fold, own.noise, strict=True):
-            squares, count = squares + float(np.sum((e[each] / noise) ** 2)), count + int(each.sum())
+        for e, mask, noise in zip(law.residuals(z), fold, minimum.noise, strict=True):
+            squares, count = squares + float(np.sum((e[mask] / noise) ** 2)), count + int(mask.sum())
     return math.sqrt(squares / count) if count else math.nan
 
 

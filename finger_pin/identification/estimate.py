@@ -69,7 +69,7 @@ def fit(
     problem: Problem,
     start: Array,
     *,
-    held: Mapping[int, float] | None = None,
+    fixed: Mapping[int, float] | None = None,
     weights: Array | None = None,
     loss: str = "linear",
     slopes: Sequence[Array] | None = None,
@@ -80,14 +80,14 @@ def fit(
     Args:
         problem: The problem to fit.
         start: Shape (p,), transformed.
-        held: Entries of z that stay as they are.
+        fixed: Entries of z that stay as they are.
         weights: Of the signals; by default they follow from the residuals at the end.
         loss: One of `LOSSES`, for outliers.
         slopes: Of the residuals near the start, to step with as long as they serve; by default those at the start.
         scale: Beyond which residuals are outliers, of the signals; by default their noise.
     """
     z, free = start.copy(), np.ones(len(start), dtype=bool)
-    for k, value in (held or {}).items():
+    for k, value in (fixed or {}).items():
         z[k], free[k] = value, False
     z = problem.feasible(z, free)
     shares = np.ones(len(problem.signals)) if weights is None else weights
@@ -103,8 +103,8 @@ def fit(
         if weights is not None or not ended or (k > 0 and z is before):
             break
         shares = _independent(problem, residuals)[1]
-    correlation, own = _independent(problem, residuals)
-    shares = own if weights is None else weights
+    correlation, independent = _independent(problem, residuals)
+    shares = independent if weights is None else weights
     noise = _noise(problem, residuals, robust=loss != "linear")
     used = noise if scale is None else scale
     objective = _objective(problem, _counted(residuals, used, loss)[0], shares, used, loss)
@@ -236,14 +236,14 @@ def _counted(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[
 
 def best_of(problem: Problem, fits: Sequence[Fit]) -> Fit:
     """Return the minimum of least misfit with equal weights."""
-    alike = np.ones(len(problem.signals))
-    return min(fits, key=lambda each: minus_twice_likelihood(each.residuals, alike, problem.groups))
+    equal_weights = np.ones(len(problem.signals))
+    return min(fits, key=lambda candidate: minus_twice_likelihood(candidate.residuals, equal_weights, problem.groups))
 
 
-def information(problem: Problem, found: Fit) -> Array:
+def information(problem: Problem, minimum: Fit) -> Array:
     """Return the Fisher information of z at a minimum, shape (p, p)."""
-    slopes = problem.slopes(found.z)
-    factors = found.weights / found.noise**2
+    slopes = problem.slopes(minimum.z)
+    factors = minimum.weights / minimum.noise**2
     total: Array = sum(f * j.T @ j for f, j in zip(factors, slopes, strict=True))
     return total
 
@@ -256,7 +256,7 @@ def typical(problem: Problem, residuals: Sequence[Array]) -> Array:
 
 
 def _noise(problem: Problem, residuals: Sequence[Array], robust: bool = False) -> Array:
-    """Return the rms of the residuals of every output, or what their median tells, never less than its rounding."""
+    """Return the rms of the residuals of every output, or that of their median, never less than its rounding."""
     groups = problem.groups
     count, square = pooled(residuals, np.ones(len(residuals)), groups)
     rms = typical(problem, residuals) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
@@ -269,9 +269,9 @@ def _independent(problem: Problem, residuals: Sequence[Array]) -> tuple[Array, A
     groups, rho = problem.groups, np.zeros(len(residuals))
     for group in np.unique(groups):
         places = np.flatnonzero(groups == group).tolist()
-        own = [k for k in places if problem.signals[k].ordered and len(residuals[k]) > 2]
-        size = sum(float(residuals[k] @ residuals[k]) for k in own)
-        together = sum(float(residuals[k][1:] @ residuals[k][:-1]) for k in own)
-        count = sum(len(residuals[k]) for k in own)
+        ordered = [k for k in places if problem.signals[k].ordered and len(residuals[k]) > 2]
+        size = sum(float(residuals[k] @ residuals[k]) for k in ordered)
+        together = sum(float(residuals[k][1:] @ residuals[k][:-1]) for k in ordered)
+        count = sum(len(residuals[k]) for k in ordered)
         rho[groups == group] = np.clip(together / size, 0.0, 1.0 - 2.0 / count) if size > 0.0 else 0.0
     return rho, (1.0 - rho) / (1.0 + rho)

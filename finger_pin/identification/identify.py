@@ -92,31 +92,36 @@ def identify(
     """
     if loss not in LOSSES:
         raise InputError("loss", f"must be one of {', '.join(LOSSES)}", loss)
-    given = {"parameters": parameters, "recordings": recordings, "compare": compare}
-    entries = {name: {key: _plain(each) for key, each in table.items()} for name, table in given.items() if table}
+    tables = {"parameters": parameters, "recordings": recordings, "compare": compare}
+    entries = {name: {key: _plain(each) for key, each in table.items()} for name, table in tables.items() if table}
     scenario, settings = load_bench(bench, overrides, entries)
-    own = resolve_finger(finger, scenario)
-    scenario = with_finger(scenario, own)
-    taken = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
-    problem = build_problem(scenario, settings, taken, own)
-    held_out = [each for each in taken if each.settings.held_out is not False]
+    custom_finger = resolve_finger(finger, scenario)
+    scenario = with_finger(scenario, custom_finger)
+    recorded = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
+    problem = build_problem(scenario, settings, recorded, custom_finger)
+    held_out = [each for each in recorded if each.settings.held_out is not False]
     # Before any work: an entry that is wrong in them is refused now.
     other_laws(problem, settings)
-    check_predictable(scenario, held_out, own)
+    check_predictable(scenario, held_out, custom_finger)
     for name in dict.fromkeys(each.recording.name for each in problem.models):
         doubts = (each.doubt(problem.keys) for each in problem.models if each.recording.name == name)
         doubt = next(filter(None, doubts), "")
         if doubt:
             warnings.warn(doubt, ScenarioWarning, stacklevel=2)
     problem.stop = CancelToken(stop)
-    asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
+    asked = digest(
+        scenario,
+        settings,
+        recorded,
+        (starts, seed, loss, *([] if custom_finger is None else [finger_digest(custom_finger)])),
+    )
     with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
         work = FitPipeline(problem, ledger, loss, progress)
         result = _work(problem, settings, starting_points(problem, starts, seed), starts, work, profiles)
         result.attrs["undamped"] = ", ".join(_undamped(scenario, problem))
         result.attrs["profiles"] = int(profiles)
-        result.attrs["custom_finger"] = int(own is not None)
-        result.update(predictions(result, scenario, held_out, taken, own))
+        result.attrs["custom_finger"] = int(custom_finger is not None)
+        result.update(predictions(result, scenario, held_out, recorded, custom_finger))
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
         if output is not None:
             write_results(result, Path(output), bench, problem)
@@ -141,7 +146,7 @@ def _work(
         problem.stop = lambda: False
         if not work.fits:
             reached = problem.best[1] if len(problem.best[1]) else problem.start
-            work.fits.append(fit(problem, reached, held=dict(enumerate(reached))))
+            work.fits.append(fit(problem, reached, fixed=dict(enumerate(reached))))
     return results(problem, work.fits, work.best, work.sides, work.spread, work.comparison, unfinished)
 
 

@@ -44,28 +44,28 @@ class ProfileBound:
     better: Fit | None = None
 
 
-def covariance(problem: Problem, found: Fit) -> Array:
+def covariance(problem: Problem, minimum: Fit) -> Array:
     """Return the linearised covariance of z, shape (p, p); no direction is less sure than its bounds are wide."""
-    values, vectors, size = _directions(problem, found)
+    values, vectors, size = _directions(problem, minimum)
     return np.asarray((vectors / np.maximum(values, 1.0)) @ vectors.T * size)
 
 
-def information_of_bounds(problem: Problem, found: Fit) -> Array:
+def information_of_bounds(problem: Problem, minimum: Fit) -> Array:
     """Return the information of z that bounds add to that of the recordings, shape (p, p)."""
-    values, vectors, size = _directions(problem, found)
+    values, vectors, size = _directions(problem, minimum)
     return np.asarray((vectors * np.maximum(1.0 - values, 0.0)) @ vectors.T / size)
 
 
-def _directions(problem: Problem, found: Fit) -> tuple[Array, Array, Array]:
+def _directions(problem: Problem, minimum: Fit) -> tuple[Array, Array, Array]:
     """Return the information of principal directions, these, and products of the ranges that they are scaled by."""
     width = np.subtract(*reversed(problem.box))
     size = np.outer(width, width)
-    return *np.linalg.eigh(information(problem, found) * size), size
+    return *np.linalg.eigh(information(problem, minimum) * size), size
 
 
 @dataclass(frozen=True, eq=False)
 class SmallSample:
-    """Corrections of what follows from few readings, as for a regression: RSS / (n - p), and Student's t.
+    """Corrections for few readings, as for a regression: RSS / (n - p), and Student's t.
 
     Attributes:
         variance: Factors on the variance of every parameter for the same 95 % of a normal distribution, shape (p,).
@@ -78,16 +78,16 @@ class SmallSample:
     noise: Array
 
     @classmethod
-    def of(cls, problem: Problem, found: Fit, spread: Array) -> Self:
+    def from_fit(cls, problem: Problem, minimum: Fit, spread: Array) -> Self:
         """Return the corrections at a minimum with a covariance by the likelihood alone.
 
         Of several outputs each has what is left of its samples by the parameters that it tells (the trace of its part
         of the information), and a parameter the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
         """
-        groups, slopes = problem.groups, problem.slopes(found.z)
+        groups, slopes = problem.groups, problem.slopes(minimum.z)
         parts = np.zeros((int(groups.max()) + 1, *spread.shape))
         count = np.zeros(len(parts))
-        for group, w, n, e, j in zip(groups, found.weights, found.noise, found.residuals, slopes, strict=True):
+        for group, w, n, e, j in zip(groups, minimum.weights, minimum.noise, minimum.residuals, slopes, strict=True):
             parts[group] += w / n**2 * j.T @ j
             count[group] += w * len(e)
         # Correlated samples may count for less than the parameters that they are to tell.
@@ -105,13 +105,13 @@ class SmallSample:
 
 
 def profile(
-    problem: Problem, found: Fit, k: int, way: int, spread: Array, loss: str = "linear", inflation: float = 1.0
+    problem: Problem, minimum: Fit, k: int, way: int, spread: Array, loss: str = "linear", inflation: float = 1.0
 ) -> ProfileBound:
     """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841 times an inflation.
 
     Args:
         problem: The problem that was fitted.
-        found: Its minimum.
+        minimum: Of the problem.
         k: Which parameter.
         way: 1 for the upper end, -1 for the lower.
         spread: Covariance of z.
@@ -121,23 +121,23 @@ def profile(
     """
     low, high = problem.box
     limit = high[k] if way > 0 else low[k]
-    room = abs(limit - found.z[k])
+    room = abs(limit - minimum.z[k])
     deviation = math.sqrt(max(inflation * spread[k, k], 0.0))
-    tilt = spread[:, k] / spread[k, k] if spread[k, k] > 0.0 else np.zeros(len(found.z))
-    path = [(float(found.z[k]), 0.0)]
+    tilt = spread[:, k] / spread[k, k] if spread[k, k] > 0.0 else np.zeros(len(minimum.z))
+    path = [(float(minimum.z[k]), 0.0)]
     reach = min(room, max(math.sqrt(LEVEL) * deviation, 1e-6 * (high[k] - low[k])))
     inner, outer = (0.0, 0.0), (math.inf, math.inf)
-    slopes: Sequence[Array] = problem.slopes(found.z)
+    slopes: Sequence[Array] = problem.slopes(minimum.z)
     # The farthest place within the interval: refits start there, not from one beyond that may have failed.
-    within, end = found, math.inf * way
+    within, end = minimum, math.inf * way
     for _ in range(_REFITS if room > 1e-9 * (high[k] - low[k]) else 0):
-        at = found.z[k] + way * reach
+        at = minimum.z[k] + way * reach
         guess = np.clip(within.z + tilt * (at - within.z[k]), low, high)
-        refit = partial(fit, problem, held={k: at}, weights=found.weights, scale=found.noise, loss=loss)
+        refit = partial(fit, problem, fixed={k: at}, weights=minimum.weights, scale=minimum.noise, loss=loss)
         there = refit(guess, slopes=slopes)
         if not there.converged and math.isfinite(there.objective):
             there = refit(there.z)
-        rise = (there.objective - found.objective) / inflation
+        rise = (there.objective - minimum.objective) / inflation
         path.append((at, rise))
         if rise * inflation < -_DEEPER:
             return ProfileBound(end, np.array(path), there)
@@ -150,7 +150,7 @@ def profile(
                 break
         crossing, near = _crossing(inner, outer), there.converged and abs(rise - LEVEL) < _LEVEL_ERROR * LEVEL
         if near or math.isfinite(outer[0]):
-            end = found.z[k] + way * min(crossing, room)
+            end = minimum.z[k] + way * min(crossing, room)
         if near:
             break
         further = 0.0 if math.isfinite(outer[0]) else max(1.2 * inner[0], 1e-6 * room)
@@ -168,11 +168,11 @@ def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
     return inner[0] + (target - inner[1]) / (outer[1] - inner[1]) * (outer[0] - inner[0])
 
 
-def free_directions(problem: Problem, found: Fit) -> list[tuple[str, list[int]]]:
+def free_directions(problem: Problem, minimum: Fit) -> list[tuple[str, list[int]]]:
     """Return the combinations that the recordings leave open, in words and with their parameters; sorted."""
     low, high = problem.box
     width = high - low
-    values, vectors = np.linalg.eigh(information(problem, found) * np.outer(width, width))
+    values, vectors = np.linalg.eigh(information(problem, minimum) * np.outer(width, width))
     found_free = []
     for value, vector in zip(values, vectors.T, strict=True):
         if 1.0 / math.sqrt(max(value, 1e-300)) >= _FREE_DEVIATION:
@@ -190,8 +190,8 @@ def _in_words(problem: Problem, direction: Array, shown: list[int]) -> str:
     if len(shown) == 1:
         return f"{names[0]} is not determined: the recording hardly feels it"
     if len(shown) == 2 and all(problem.logarithmic[shown]) and min(size[shown]) > 0.8:
-        alike = direction[shown[0]] * direction[shown[1]] > 0.0
-        what = "quotient" if alike else "product"
+        same_sign = direction[shown[0]] * direction[shown[1]] > 0.0
+        what = "quotient" if same_sign else "product"
         return f"of {names[0]} and {names[1]} only the {what} is determined"
     return (
         f"only a combination of {_listed(names)} is determined: {_example(problem, direction, shown)} changes nothing"

@@ -35,7 +35,7 @@ class Limits:
     high: Array
 
     @classmethod
-    def checked(cls, parts: Sequence[ScenarioPart], parameters: Sequence[str], low: Array, high: Array) -> Limits:
+    def from_parts(cls, parts: Sequence[ScenarioPart], parameters: Sequence[str], low: Array, high: Array) -> Limits:
         """Return limits; refuse a bound outside its own range, and all of them if no values within them go together.
 
         Raises:
@@ -53,16 +53,16 @@ class Limits:
                 except InputError as error:
                     at, free = middle.copy(), np.arange(len(keys)) != k
                     at[k] = bound
-                    found = {self.refusal(each) for each in (at, *self._corners(at, free))}
+                    refusals = {self.refusal(each) for each in (at, *self._corners(at, free))}
                     # What is wrong with it alone is the same beside any others.
-                    between = len(found) > 1 or any(each and each[0] in keys and each[0] != key for each in found)
+                    between = len(refusals) > 1 or any(each and each[0] in keys and each[0] != key for each in refusals)
                     if not (between and anywhere):
                         allowed = error.allowed if error.entry == key else f"with it {error.entry} {error.allowed}"
                         raise InputError(entry_of(parameters[k]), allowed, float(bound)) from None
         return self
 
     def refusal(self, values: Array) -> tuple[str, str] | None:
-        """Return the entry that does not go with the others, and what it must be; None if all are allowed."""
+        """Return the entry that does not go with the others, and its allowed values; None if all are allowed."""
         try:
             for part in self.parts:
                 part.at(values)
@@ -94,7 +94,7 @@ class Limits:
         """Yield values with one number at a bound, the nearest first, then those of a few with all of them there."""
         places = np.flatnonzero(free)
         ends = [(k, end) for k in places for end in (self.low[k], self.high[k])]
-        ends.sort(key=lambda each: abs(each[1] - values[each[0]]) / (self.high[each[0]] - self.low[each[0]]))
+        ends.sort(key=lambda bound: abs(bound[1] - values[bound[0]]) / (self.high[bound[0]] - self.low[bound[0]]))
         for k, end in ends:
             corner = values.copy()
             corner[k] = end

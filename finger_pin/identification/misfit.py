@@ -40,7 +40,7 @@ class Repeats:
     chance: float
 
 
-def sandwich(problem: Problem, found: Fit, spread: Array) -> Array:
+def sandwich(problem: Problem, minimum: Fit, spread: Array) -> Array:
     """Return the covariance of z with residuals correlated as they are, shape (p, p).
 
     The estimate weighs samples as if they were independent but for their share; its covariance H^-1 V H^-1 has V of
@@ -49,32 +49,32 @@ def sandwich(problem: Problem, found: Fit, spread: Array) -> Array:
 
     Args:
         problem: The problem that was fitted.
-        found: Its minimum.
+        minimum: Of the problem.
         spread: Covariance by the likelihood alone, H^-1, shape (p, p).
     """
-    slopes = problem.slopes(found.z)
-    scores = [w / n**2 * j for w, n, j in zip(found.weights, found.noise, slopes, strict=True)]
-    total, together = information_of_bounds(problem, found), set[int]()
-    for each in repeats(problem, found.residuals):
-        if each.common == 0.0:
+    slopes = problem.slopes(minimum.z)
+    scores = [w / n**2 * j for w, n, j in zip(minimum.weights, minimum.noise, slopes, strict=True)]
+    total, together = information_of_bounds(problem, minimum), set[int]()
+    for repeated in repeats(problem, minimum.residuals):
+        if repeated.common == 0.0:
             continue
-        together.update(each.signals)
-        members = [problem.signals[k] for k in each.signals]
+        together.update(repeated.signals)
+        members = [problem.signals[k] for k in repeated.signals]
         if members[0].ordered:
-            mean = np.mean([found.residuals[k] for k in each.signals], axis=0)
-            shared = np.sum([scores[k] for k in each.signals], axis=0)
-            total += each.common * _correlated(shared, _process([mean]))
-            apart = [found.residuals[k] - mean for k in each.signals]
-            total += each.scatter * sum(_correlated(scores[k], _process(apart)) for k in each.signals)
+            mean = np.mean([minimum.residuals[k] for k in repeated.signals], axis=0)
+            shared = np.sum([scores[k] for k in repeated.signals], axis=0)
+            total += repeated.common * _correlated(shared, _process([mean]))
+            apart = [minimum.residuals[k] - mean for k in repeated.signals]
+            total += repeated.scatter * sum(_correlated(scores[k], _process(apart)) for k in repeated.signals)
         else:
-            score, alike = scores[each.signals[0]], members[0].alike
-            sums = np.zeros((alike.max() + 1, score.shape[1]))
-            np.add.at(sums, alike, score)
-            total += each.common * sums.T @ sums + each.scatter * score.T @ score
+            score, replicate = scores[repeated.signals[0]], members[0].replicate
+            sums = np.zeros((replicate.max() + 1, score.shape[1]))
+            np.add.at(sums, replicate, score)
+            total += repeated.common * sums.T @ sums + repeated.scatter * score.T @ score
     for group in np.unique(problem.groups):
-        own = [k for k in np.flatnonzero(problem.groups == group).tolist() if k not in together]
-        process = _process([found.residuals[k] for k in own if problem.signals[k].ordered])
-        total += sum(found.noise[k] ** 2 * _correlated(scores[k], process) for k in own)
+        single = [k for k in np.flatnonzero(problem.groups == group).tolist() if k not in together]
+        process = _process([minimum.residuals[k] for k in single if problem.signals[k].ordered])
+        total += sum(minimum.noise[k] ** 2 * _correlated(scores[k], process) for k in single)
     return np.asarray(spread @ total @ spread)
 
 
@@ -83,52 +83,52 @@ def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:
 
     An outlier is less probable than chance among so many, and alone outweighs all others as they mostly are.
     """
-    found, groups = [], problem.groups
+    ratios, groups = [], problem.groups
     count = np.bincount(groups, [len(e) for e in residuals])[groups]
     for e, n, deviation in zip(residuals, count, typical(problem, residuals), strict=True):
         ratio = np.abs(e) / max(deviation, 1e-300)
         chance = 2.0 * n * student.sf(ratio, max(n - len(problem.keys), 1.0))
-        found.append(np.where((chance < CHANCE) & (ratio**2 > n), ratio, 0.0))
-    return found
+        ratios.append(np.where((chance < CHANCE) & (ratio**2 > n), ratio, 0.0))
+    return ratios
 
 
 def repeats(problem: Problem, residuals: Sequence[Array]) -> list[Repeats]:
-    """Return what is repeated among the signals, with residuals of all of them."""
-    found, runs = [], list[list[int]]()
+    """Return the repeats among the signals, with residuals of all of them."""
+    repeated, runs = [], list[list[int]]()
     recordings = {model.recording.name: model.recording for model in problem.models}
     for k, signal in enumerate(problem.signals):
         if signal.ordered:
-            like = [own for own in runs if _alike(problem.signals[own[0]], signal, recordings)]
+            like = [run for run in runs if _are_repeats(problem.signals[run[0]], signal, recordings)]
             if like:
                 like[0].append(k)
             else:
                 runs.append([k])
-        elif signal.alike.max(initial=-1) + 1 < len(signal.measured):
-            found.append(_of_readings(k, signal.alike, residuals[k], len(problem.keys)))
-    found += [_of_runs(tuple(own), [residuals[k] for k in own]) for own in runs if len(own) > 1]
-    return found
+        elif signal.replicate.max(initial=-1) + 1 < len(signal.measured):
+            repeated.append(_of_readings(k, signal.replicate, residuals[k], len(problem.keys)))
+    repeated += [_of_runs(tuple(run), [residuals[k] for k in run]) for run in runs if len(run) > 1]
+    return repeated
 
 
-def _alike(one: RecordedSignal, other: RecordedSignal, recordings: Mapping[str, Recording]) -> bool:
+def _are_repeats(one: RecordedSignal, other: RecordedSignal, recordings: Mapping[str, Recording]) -> bool:
     """Return whether two signals of motions are of the same output, read at the same times, of repeated runs."""
     same = one.name == other.name and np.array_equal(one.instant, other.instant)
     return same and recordings[one.recording].repeats(recordings[other.recording])
 
 
-def scatter(values: Array, alike: NDArray[np.intp]) -> float:
-    """Return the mean square of readings about the mean of those that are alike; not a number if none are."""
-    count = np.bincount(alike)
+def scatter(values: Array, replicate: NDArray[np.intp]) -> float:
+    """Return the mean square of readings about the mean of their replicates; not a number without any."""
+    count = np.bincount(replicate)
     if len(count) == len(values):
         return math.nan
-    mean = np.bincount(alike, values) / count
-    return float(np.sum((values - mean[alike]) ** 2)) / (len(values) - len(count))
+    mean = np.bincount(replicate, values) / count
+    return float(np.sum((values - mean[replicate]) ** 2)) / (len(values) - len(count))
 
 
-def _of_readings(k: int, alike: NDArray[np.intp], residual: Array, parameters: int) -> Repeats:
-    count = np.bincount(alike)
-    mean = np.bincount(alike, residual) / count
+def _of_readings(k: int, replicate: NDArray[np.intp], residual: Array, parameters: int) -> Repeats:
+    count = np.bincount(replicate)
+    mean = np.bincount(replicate, residual) / count
     inner, outer = len(residual) - len(count), max(len(count) - parameters, 1)
-    within = scatter(residual, alike)
+    within = scatter(residual, replicate)
     between = float(np.sum(count * mean**2)) / outer
     chance = float(f_distribution.sf(between / max(within, 1e-300), outer, inner))
     common = max(between - within, 0.0) / float(np.mean(count))

@@ -13,7 +13,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.identification.motions import RecordedMotion
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording, RecordingModel, check_angles, unit_of
-from finger_pin.identification.scenario_parameters import with_own_values
+from finger_pin.identification.scenario_parameters import with_recorded_values
 from finger_pin.identification.steady_data import SteadyReadings
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
@@ -21,14 +21,14 @@ from finger_pin.typing import Array
 
 
 def build_problem(
-    scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording], finger: Finger | None = None
+    scenario: Scenario, settings: IdentifySettings, recordings: Sequence[Recording], finger: Finger | None = None
 ) -> Problem:
     """Return the problem whose objective is to be minimised.
 
     Raises:
         InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
     """
-    models, signals = recording_models(scenario, taken, finger, [~held_out_rows(each) for each in taken])
+    models, signals = recording_models(scenario, recordings, finger, [~held_out_rows(each) for each in recordings])
     bounds = settings.bounds
     low, high = np.array(list(bounds.values()), dtype=float).T
     count = sum(len(signal.measured) for signal in signals)
@@ -38,13 +38,13 @@ def build_problem(
 
 
 def held_out_rows(recording: Recording) -> NDArray[np.bool_]:
-    """Return which rows of a recording are not fitted, shape (m,)."""
+    """Return a mask of the rows of a recording that are not fitted, shape (m,)."""
     part, time = recording.settings.held_out, recording.time
     return np.full(len(time), part) if isinstance(part, bool) else (time >= part[0]) & (time <= part[1])
 
 
 def recording_models(
-    scenario: Scenario, taken: Sequence[Recording], finger: Finger | None, wanted: Sequence[NDArray[np.bool_]]
+    scenario: Scenario, recordings: Sequence[Recording], finger: Finger | None, wanted: Sequence[NDArray[np.bool_]]
 ) -> tuple[list[RecordingModel], list[RecordedSignal]]:
     """Return the models of recordings, one for each window that has wanted rows, and all of their outputs.
 
@@ -53,19 +53,19 @@ def recording_models(
     """
     models: list[RecordingModel] = []
     signals: list[RecordedSignal] = []
-    for recording, rows_wanted in zip(taken, wanted, strict=True):
+    for recording, rows_wanted in zip(recordings, wanted, strict=True):
         steady = recording.settings.kind == "steady"
         pieces = [np.arange(len(recording.time))] if steady else windows(recording)
         parts = [(k, rows) for k, rows in enumerate(pieces) if rows_wanted[rows].any()]
         if not parts:
             continue
-        own = with_own_values(scenario, recording.name, recording.settings)
-        check_angles(recording, own)
-        replacing = None if finger is None else with_parameters_of(finger, scenario, own)
+        recorded_scenario = with_recorded_values(scenario, recording.name, recording.settings)
+        check_angles(recording, recorded_scenario)
+        replacing = None if finger is None else with_parameters_of(finger, scenario, recorded_scenario)
         if steady:
-            models.append(SteadyReadings(recording, own, replacing))
+            models.append(SteadyReadings(recording, recorded_scenario, replacing))
         else:
-            models += [RecordedMotion(recording, own, rows, k, replacing) for k, rows in parts]
+            models += [RecordedMotion(recording, recorded_scenario, rows, k, replacing) for k, rows in parts]
         signals += [
             _signal(recording, name, values, rows, rows_wanted)
             for _, rows in parts
@@ -84,10 +84,10 @@ def _signal(
     loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
     load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
     instant = np.arange(len(values), dtype=float) if steady else recording.time
-    given = np.stack([*recording.inputs.values(), recording.speed, recording.time], axis=1)
-    alike = np.unique(given[at], axis=0, return_inverse=True)[1].ravel()
+    conditions = np.stack([*recording.inputs.values(), recording.speed, recording.time], axis=1)
+    replicate = np.unique(conditions[at], axis=0, return_inverse=True)[1].ravel()
     return RecordedSignal(
-        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], alike, ordered=not steady
+        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], replicate, ordered=not steady
     )
 
 

@@ -18,7 +18,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.identification.recorded_inputs import check_references, put_inputs, with_corrected_inputs
 from finger_pin.identification.recordings import At, Recording
-from finger_pin.identification.scenario_parameters import NuisanceParameter, own_number
+from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
 from finger_pin.identification.starts import check_reachable, far_start, recorded_starts, starts_to_find
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
@@ -46,7 +46,7 @@ class RecordedMotion:
         recording: The recording.
         rows: Which of its rows, shape (m,).
         scenario: Moved by the recorded inputs; its position drives read exact angles.
-        own: Numbers of its own that are to be found: where its joints start.
+        nuisance_parameters: Numbers of this motion alone that are to be found: where its joints start.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class RecordedMotion:
         self.recording, self.rows = recording, rows
         self._entry = f"identify.recordings.{recording.name}"
         self._times = recording.time[rows] - recording.time[rows[0]]
-        self.own: tuple[NuisanceParameter, ...] = ()
+        self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
         table = copy.deepcopy(scenario.model_dump(mode="python", exclude_unset=True, exclude_none=True))
         put_inputs(table, recording, scenario)
         first = float(recording.time[rows[0]])
@@ -92,9 +92,9 @@ class RecordedMotion:
             self.recording, starts, dict(zip(loop.finger.routing.joints, position, strict=True)), self.scenario
         )
 
-    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
+    def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
-        return self._made(scenario, own, self._factor)[0]
+        return self._made(scenario, nuisance, self._factor)[0]
 
     def tune(self, factor: float) -> None:
         """Multiply the scenario's tolerances by a factor from now on."""
@@ -114,7 +114,11 @@ class RecordedMotion:
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
         there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
-        feeling = [k for k, (scenario, own) in enumerate(there) if self._with_own(scenario, own) != motion[0].scenario]
+        feeling = [
+            k
+            for k, (scenario, nuisance) in enumerate(there)
+            if self._with_nuisance(scenario, nuisance) != motion[0].scenario
+        ]
         others = {k: self._setup(*there[k]) for k in feeling}
         # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
         same = self._setup(*here)
@@ -127,8 +131,8 @@ class RecordedMotion:
             if there[k] == here:
                 return [np.zeros(len(each)) for each in computed]
             if not (base.failure or near.get(k, base).failure):
-                found = self._outputs(others.get(k, same), near.get(k, base), there[k][1])
-                slopes = [(f - c) / changes[k] for f, c in zip(found, computed, strict=True)]
+                outputs = self._outputs(others.get(k, same), near.get(k, base), there[k][1])
+                slopes = [(f - c) / changes[k] for f, c in zip(outputs, computed, strict=True)]
                 pairs = zip(slopes, ranges, strict=True)
                 if all(np.max(np.abs(each)) * float(sizes[k]) <= _STEEP * size for each, size in pairs):
                     return slopes
@@ -137,23 +141,27 @@ class RecordedMotion:
             for moved in (values + change, values - change):
                 # At the edge of what goes together there is no such change.
                 with suppress(InputError):
-                    found, other = self._made(*at(moved), factor)
+                    outputs, other = self._made(*at(moved), factor)
                     if other is not None:
-                        return [(f - c) / (moved[k] - values[k]) for f, c in zip(found, plain, strict=True)]
+                        return [(f - c) / (moved[k] - values[k]) for f, c in zip(outputs, plain, strict=True)]
             # Such a motion tells nothing of this number: its interval is that of its bounds.
             return [np.zeros(len(each)) for each in computed]
 
         columns = in_threads(column, range(len(values)))
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
-    def _with_own(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
+    def _with_nuisance(self, scenario: Scenario, nuisance: Mapping[str, float]) -> Scenario:
         """Return a scenario with the starts of joints and the corrections of inputs that are being found."""
-        scenario = with_corrected_inputs(scenario, self.recording, own)
+        scenario = with_corrected_inputs(scenario, self.recording, nuisance)
         if self.recording.settings.start == "rest":
             return scenario
-        moved = {joint: each.corrected(self.recording.name, own) for joint, each in self._starts.items()}
+        moved = {joint: each.corrected(self.recording.name, nuisance) for joint, each in self._starts.items()}
         starts = {joint: angle for joint, (angle, _) in moved.items()}
-        starts |= {joint: own[each.key] for joint, each in zip(starts, self.own, strict=False) if each.key in own}
+        starts |= {
+            joint: nuisance[each.key]
+            for joint, each in zip(starts, self.nuisance_parameters, strict=False)
+            if each.key in nuisance
+        }
         speeds, initial = {joint: speed for joint, (_, speed) in moved.items()}, scenario.simulation.initial
         assert initial is not None
         if starts.items() <= initial.position.items() and speeds.items() <= initial.velocity.items():
@@ -161,49 +169,52 @@ class RecordedMotion:
         changed = {"position": {**initial.position, **starts}, "velocity": {**initial.velocity, **speeds}}
         return scenario.updated(simulation={"initial": changed})
 
-    def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
-        moved = self._with_own(scenario, own)
+    def _setup(self, scenario: Scenario, nuisance: Mapping[str, float]) -> Setup:
+        moved = self._with_nuisance(scenario, nuisance)
         finger = None if self._finger is None else with_parameters_of(self._finger, self.scenario, moved)
         return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger))
 
     def _made(
-        self, scenario: Scenario, own: Mapping[str, float], factor: float
+        self, scenario: Scenario, nuisance: Mapping[str, float], factor: float
     ) -> tuple[list[Array], tuple[Setup, Trajectory] | None]:
         """Return the outputs, not numbers if the motion fails, and the motion, at so much larger tolerances."""
         try:
-            setup = self._setup(scenario, own)
+            setup = self._setup(scenario, nuisance)
             trajectory = setup.integrate(scenario=_tuned(setup.scenario, factor))
             failed = bool(trajectory.failure)
         except IntegrationError:
             failed = True
         if failed:
             return [np.full(len(self.rows), np.nan) for _ in self.recording.outputs], None
-        return self._outputs(setup, trajectory, own), (setup, trajectory)
+        return self._outputs(setup, trajectory, nuisance), (setup, trajectory)
 
-    def _outputs(self, setup: Setup, trajectory: Trajectory, own: Mapping[str, float]) -> list[Array]:
+    def _outputs(self, setup: Setup, trajectory: Trajectory, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, with their own offsets, scales and delays."""
-        name, settings, found = self.recording.name, self.recording.settings.outputs, []
-        delays = {key: each.delay + own_number(own, name, key, "delay") for key, each in settings.items()}
-        seen = {delay: self._seen(setup, trajectory, delay, delays) for delay in dict.fromkeys(delays.values())}
+        name, settings, outputs = self.recording.name, self.recording.settings.outputs, []
+        delays = {key: each.delay + nuisance_value(nuisance, name, key, "delay") for key, each in settings.items()}
+        by_delay = {delay: self._at_delay(setup, trajectory, delay, delays) for delay in dict.fromkeys(delays.values())}
         for key, delay in delays.items():
-            scale, offset = own_number(own, name, key, "scale", 1.0), own_number(own, name, key, "offset")
-            found.append(np.asarray(scale * self._one(seen[delay], key) + offset))
-        return found
+            scale, offset = (
+                nuisance_value(nuisance, name, key, "scale", 1.0),
+                nuisance_value(nuisance, name, key, "offset"),
+            )
+            outputs.append(np.asarray(scale * self._one(by_delay[delay], key) + offset))
+        return outputs
 
-    def _seen(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> RunArrays:
+    def _at_delay(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> RunArrays:
         """Return the variables of the outputs with a delay, at the instants that they are of."""
-        names = dict.fromkeys(key.partition(".")[0] for key, own in delays.items() if own == delay)
+        names = dict.fromkeys(key.partition(".")[0] for key, lag in delays.items() if lag == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
         motions = SampledTrajectory(setup.loop, trajectory, times, tuple(names))
-        found = recorded(motions, tuple(names), f"{self._entry}.outputs")
-        return RunArrays(found, coordinates(setup.scenario, setup.loop, times), {})
+        arrays = recorded(motions, tuple(names), f"{self._entry}.outputs")
+        return RunArrays(arrays, coordinates(setup.scenario, setup.loop, times), {})
 
-    def _one(self, found: RunArrays, name: str) -> Array:
+    def _one(self, arrays: RunArrays, name: str) -> Array:
         """Return one column of a variable, by its labels."""
         variable, _, label = name.partition(".")
-        values, (dims, *_) = found[variable], found.variables[variable]
+        values, (dims, *_) = arrays[variable], arrays.variables[variable]
         for axis, dim in reversed(list(enumerate(dims))[1:]):
-            labels = [str(each) for each in found[dim]]
+            labels = [str(each) for each in arrays[dim]]
             if label not in labels:
                 allowed = f"there is no {label}; there are {', '.join(labels)}"
                 raise InputError(f"{self._entry}.outputs.{name}", allowed)
@@ -223,14 +234,14 @@ class RecordedMotion:
         for k, name in enumerate(("position", "velocity")):
             initial[name] = {**initial.get(name, {}), **{joint: start[k] for joint, start in starts.items()}}
         if kind == "found":
-            self.own = starts_to_find(self.recording.name, window, starts)
+            self.nuisance_parameters = starts_to_find(self.recording.name, window, starts)
 
 
 def _tuned(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario with tolerances multiplied by a factor."""
-    own = scenario.simulation
+    settings = scenario.simulation
     rtol, atol = (
         min(max(factor * each, min(each, _LEAST_TOLERANCE)), max(each, _GREATEST_TOLERANCE))
-        for each in (own.rtol, own.atol_scale)
+        for each in (settings.rtol, settings.atol_scale)
     )
     return scenario.updated(simulation={"rtol": rtol, "atol_scale": atol})

@@ -70,13 +70,15 @@ class FitPipeline:
             return _met(problem, problem.residuals(z))
 
         problem, others = self.problem.rough() if self.problem.moves else self.problem, len(places) - 1
-        found = self._side_by_side("trying starts", lambda item: misfit(item[1], places[1 + item[0]]), others, problem)
-        order = np.argsort(found, kind="stable").tolist()
+        misfits = self._side_by_side(
+            "trying starts", lambda item: misfit(item[1], places[1 + item[0]]), others, problem
+        )
+        order = np.argsort(misfits, kind="stable").tolist()
         tiny = _TINY * np.subtract(*self.problem.box)
 
         def hunts(item: tuple[int, Problem]) -> bool:
             k = order[item[0]]
-            return not abs(misfit(item[1], places[1 + k] + tiny) - found[k]) < _JUMP
+            return not abs(misfit(item[1], places[1 + k] + tiny) - misfits[k]) < _JUMP
 
         near = order[: 2 * (count - 1)] if self.problem.moves else []
         hunting = dict(zip(near, self._side_by_side("trying starts", hunts, len(near), problem), strict=True))
@@ -84,24 +86,24 @@ class FitPipeline:
 
     def search(self, starts: Sequence[Array]) -> None:
         """Search from all starts, of motions roughly first, and go on from the promising ends."""
-        given, starts, hopeless = starts, *self._roughly(starts)
-        found: dict[int, Fit] = {}
+        places, starts, hopeless = starts, *self._roughly(starts)
+        minima: dict[int, Fit] = {}
 
         def one(item: tuple[int, Problem]) -> None:
             k, twin = item
             work = partial(fit, twin, self.ledger.reached(f"start {k}", starts[k]), loss=self.loss)
-            found[k] = self.ledger.fit(f"start {k}", twin, work)
+            minima[k] = self.ledger.fit(f"start {k}", twin, work)
 
         try:
             self._side_by_side("searching", one, len(starts))
         finally:
-            self.fits += [found[k] for k in sorted(found)]
-        self.fits += [fit(self.problem, z, held=dict(enumerate(z))) for z in hopeless]
+            self.fits += [minima[k] for k in sorted(minima)]
+        self.fits += [fit(self.problem, z, fixed=dict(enumerate(z))) for z in hopeless]
         if not np.isfinite(self.best.objective):
             raise InputError(
                 "identify.recordings", "the motion fails wherever the search starts; narrow the parameters"
             )
-        _check_felt(self.problem, self.fits, given)
+        _check_felt(self.problem, self.fits, places)
         if self.problem.moves:
             self._cross()
 
@@ -109,17 +111,17 @@ class FitPipeline:
         """Return the ends of rough searches: those that may be near the best place, and the others."""
         if not self.problem.moves:
             return starts, []
-        rough, found = self.problem.rough(), dict[int, Fit]()
+        rough, minima = self.problem.rough(), dict[int, Fit]()
 
         def one(item: tuple[int, Problem]) -> None:
             k, twin = item
             work = partial(fit, twin, self.ledger.reached(f"rough {k}", starts[k]), loss=self.loss)
-            found[k] = self.ledger.fit(f"rough {k}", twin, work)
+            minima[k] = self.ledger.fit(f"rough {k}", twin, work)
 
         self._side_by_side("searching roughly", one, len(starts), rough)
-        met = {k: _met(rough, found[k].residuals) for k in sorted(found)}
+        met = {k: _met(rough, minima[k].residuals) for k in sorted(minima)}
         near = [k for k in met if met[k] <= min(met.values()) + _HOPELESS]
-        return [found[k].z for k in near], [found[k].z for k in met if k not in near]
+        return [minima[k].z for k in near], [minima[k].z for k in met if k not in near]
 
     def _cross(self) -> None:
         """Move to deeper neighbouring minima as long as there are any."""
@@ -132,8 +134,8 @@ class FitPipeline:
             def misfit(item: tuple[int, Problem], places: Sequence[Array] = places) -> float:
                 return _met(item[1], item[1].residuals(places[item[0]]))
 
-            found = lowest(lines, self._side_by_side(words, misfit, len(places)), _VALLEYS + 1)
-            near = [z for z in found if not np.array_equal(z, best.z)][:_VALLEYS]
+            valleys = lowest(lines, self._side_by_side(words, misfit, len(places)), _VALLEYS + 1)
+            near = [z for z in valleys if not np.array_equal(z, best.z)][:_VALLEYS]
 
             def one(item: tuple[int, Problem], near: Sequence[Array] = near, turn: int = turn) -> Fit:
                 k, twin = item
@@ -151,7 +153,7 @@ class FitPipeline:
         fine, number = self.problem.fine(), self.fits.index(self.best)
         best = self.fits[number] = self.middle = fit(fine, place.z, loss=self.loss, slopes=place.slopes)
         naive = covariance(fine, best)
-        few, spread = SmallSample.of(fine, best, naive), sandwich(fine, best, naive)
+        few, spread = SmallSample.from_fit(fine, best, naive), sandwich(fine, best, naive)
         inflations = np.diag(spread) / np.diag(naive) * few.level / LEVEL
         self.spread = spread * np.sqrt(np.outer(few.variance, few.variance))
         self.problem.join(fine)
@@ -180,11 +182,11 @@ class FitPipeline:
                 self.sides[k, way] = side
             return side.better
 
-        found = self._side_by_side("following the likelihood", one, len(ends), fine)
-        better = [each for each in found if each is not None]
+        lower_minima = self._side_by_side("following the likelihood", one, len(ends), fine)
+        better = [each for each in lower_minima if each is not None]
         if better:
             self.sides.clear()
-            self.profile_all(min(better, key=lambda each: each.objective), turn + 1)
+            self.profile_all(min(better, key=lambda minimum: minimum.objective), turn + 1)
 
     def _side_by_side(
         self, words: str, task: Callable[[tuple[int, Problem]], _Found], count: int, problem: Problem | None = None
@@ -194,9 +196,9 @@ class FitPipeline:
         self.tell(words, 0, count)
 
         def one(item: tuple[int, Problem]) -> _Found:
-            found = task(item)
+            outcome = task(item)
             self.tell(words, next(finished), count)
-            return found
+            return outcome
 
         items = list(enumerate(twins))
         try:
@@ -285,10 +287,10 @@ def lowest(lines: Sequence[Array], met: Sequence[float], count: int) -> list[Arr
         met: How badly the recordings are met at all of them in turn.
         count: Of how many at the most.
     """
-    found, first = [], 0
+    minima, first = [], 0
     for line in lines:
         values = np.array([np.inf, *met[first : first + len(line)], np.inf])
         first += len(line)
         dips = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] < values[2:]))
-        found += [(values[1 + k], line[k]) for k in dips]
-    return [place for _, place in sorted(found, key=lambda each: each[0])[:count]]
+        minima += [(values[1 + k], line[k]) for k in dips]
+    return [place for _, place in sorted(minima, key=lambda minimum: minimum[0])[:count]]

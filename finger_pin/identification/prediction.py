@@ -1,4 +1,4 @@
-"""Predictions: recordings that were not fitted, compared with what an identification says of them."""
+"""Predictions of recordings that were not fitted, from the parameters of an identification."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def predict(
     data: Mapping[str, Mapping[str, Any]] | None = None,
     finger: FingerLike | None = None,
 ) -> xr.Dataset:
-    """Compare recordings with what an identification predicts of them; nothing is fitted.
+    """Compare recordings with the predictions of an identification; nothing is fitted.
 
     The band is that of 95 %: the noise of fitted signals of the same name, and what the covariance of the parameters
     does to the prediction.
@@ -70,23 +70,23 @@ def predict(
     if result.attrs.get("custom_finger") and finger is None:
         raise InputError("finger", "is missing: this identification was given a finger that its scenario does not have")
     scenario = read_scenario(tomllib.loads(result.attrs["scenario_toml"]))
-    taken = []
-    for name, each in recordings.items():
-        given = {**each, "held_out": each.get("held_out") or True}
-        settings = validate(RecordingSettings, given, ("identify", "recordings", name))
-        taken.append(read_recording(name, settings, (data or {}).get(name)))
-    own = resolve_finger(finger, scenario)
-    check_predictable(scenario, taken, own)
-    return predictions(result, scenario, taken, taken, own)
+    recorded = []
+    for name, entries in recordings.items():
+        entries_held_out = {**entries, "held_out": entries.get("held_out") or True}
+        settings = validate(RecordingSettings, entries_held_out, ("identify", "recordings", name))
+        recorded.append(read_recording(name, settings, (data or {}).get(name)))
+    custom_finger = resolve_finger(finger, scenario)
+    check_predictable(scenario, recorded, custom_finger)
+    return predictions(result, scenario, recorded, recorded, custom_finger)
 
 
-def check_predictable(scenario: Scenario, taken: Sequence[Recording], finger: Finger | None) -> None:
-    """Compute what is held out of recordings once, under the scenario as it is, before any work.
+def check_predictable(scenario: Scenario, recordings: Sequence[Recording], finger: Finger | None) -> None:
+    """Compute the held-out part of recordings once, under the scenario as it is, before any work.
 
     Raises:
         InputError: If an entry of one is wrong.
     """
-    for recording in taken:
+    for recording in recordings:
         models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
         if not any(len(signal.measured) for signal in signals):
             entry = f"identify.recordings.{recording.name}.held_out"
@@ -98,37 +98,37 @@ def check_predictable(scenario: Scenario, taken: Sequence[Recording], finger: Fi
 def predictions(
     result: xr.Dataset,
     scenario: Scenario,
-    taken: Sequence[Recording],
+    recordings: Sequence[Recording],
     known: Sequence[Recording],
     finger: Finger | None,
 ) -> xr.Dataset:
-    """Return the Dataset of `predict` of what is held out of recordings; empty without any.
+    """Return the Dataset of `predict` for the held-out parts of recordings; empty without any.
 
     Args:
         result: Dataset of `identify`.
         scenario: Whose numbers were found.
-        taken: Recordings to predict.
+        recordings: To predict.
         known: Recordings among which those with equal inputs are repeated runs.
         finger: Replaces the one that the scenario describes.
     """
     signals: list[dict[str, Any]] = []
-    for recording in taken:
+    for recording in recordings:
         problem, z, spread = _problem(result, scenario, recording, finger)
         computed = zip(problem.signals, problem.residuals(z), problem.slopes(z), strict=True)
-        found: dict[str, list[Array]] = {}
+        rows_by_signal: dict[str, list[Array]] = {}
         for signal, residual, slopes in computed:
             deviation = np.sqrt(
                 _noise(result, recording.name, signal.name) ** 2 + np.sum(slopes @ spread * slopes, axis=1)
             )
             value = np.where(np.isfinite(residual), signal.measured - residual, np.nan)
             rows = np.stack([signal.instant, signal.load, signal.measured, value, _BAND * deviation])
-            found.setdefault(signal.name, []).append(rows)
-        for name, pieces in found.items():
+            rows_by_signal.setdefault(signal.name, []).append(rows)
+        for name, pieces in rows_by_signal.items():
             first = next(each for each in problem.signals if each.name == name)
             scatter = (
                 _repeats(recording, name, known)
                 if first.ordered
-                else math.sqrt(scatter_of(first.measured, first.alike))
+                else math.sqrt(scatter_of(first.measured, first.replicate))
             )
             rows = np.concatenate(pieces, axis=1)
             signals.append(
@@ -141,7 +141,7 @@ def predictions(
 def _problem(
     result: xr.Dataset, scenario: Scenario, recording: Recording, finger: Finger | None
 ) -> tuple[Problem, Array, Array]:
-    """Return the problem of what is held out of a recording, the place that was found, and its covariance."""
+    """Return the problem of the held-out part of a recording, the estimate, and its covariance."""
     models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
 
     def acts(key: str) -> bool:
@@ -170,11 +170,11 @@ def _noise(result: xr.Dataset, recording: str, name: str) -> float:
     """Return the deviation of a fitted signal: of the same recording, else the rms of those of the same name."""
     values = zip(result["signal"].values, result["noise_deviation"].values, strict=True)
     noise = {str(key): float(each) for key, each in values}
-    own = noise.get(f"{recording}.{name}")
-    alike = [each for key, each in noise.items() if key.partition(".")[2] == name]
-    if own is not None:
-        return own
-    return math.sqrt(sum(each**2 for each in alike) / len(alike)) if alike else math.nan
+    same_recording = noise.get(f"{recording}.{name}")
+    same_name = [each for key, each in noise.items() if key.partition(".")[2] == name]
+    if same_recording is not None:
+        return same_recording
+    return math.sqrt(sum(each**2 for each in same_name) / len(same_name)) if same_name else math.nan
 
 
 def _beyond(result: xr.Dataset, load: Array) -> float:
@@ -195,24 +195,24 @@ def _repeats(recording: Recording, name: str, known: Sequence[Recording]) -> flo
 
 def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     """Return the Dataset of predictions."""
-    found: dict[str, list[Any]] = {name: [] for name in _NAMES}
-    for each in signals:
-        _, _, measured, value, band = each["rows"]
+    columns: dict[str, list[Any]] = {name: [] for name in _NAMES}
+    for signal in signals:
+        _, _, measured, value, band = signal["rows"]
         off = measured - value
         of_signal = {
             "rms": float(np.sqrt(np.mean(off**2))),
             "bias": float(np.mean(off)),
             # A run that fails is within no band; without noise there is no band.
             "within": float(np.mean(np.abs(off) <= band)) if np.isfinite(band).all() else math.nan,
-            "scatter": each["scatter"],
-            "beyond": each["beyond"],
+            "scatter": signal["scatter"],
+            "beyond": signal["beyond"],
             "samples": len(off),
-            "units": each["unit"],
-            "steady": each["steady"],
+            "units": signal["unit"],
+            "steady": signal["steady"],
         }
-        for name, values in found.items():
+        for name, values in columns.items():
             values.append(of_signal[name])
-    index = np.repeat(np.arange(len(signals)), found["samples"])
+    index = np.repeat(np.arange(len(signals)), columns["samples"])
     rows = np.concatenate([each["rows"] for each in signals], axis=1)
     names = {
         "instant": "time, s; number of a steady reading",
@@ -222,7 +222,7 @@ def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         "band": "half the width of the 95 % band about it",
     }
     return xr.Dataset(
-        {f"prediction_{name}": ("prediction", values, {"long_name": _NAMES[name]}) for name, values in found.items()}
+        {f"prediction_{name}": ("prediction", values, {"long_name": _NAMES[name]}) for name, values in columns.items()}
         | {"predicted_index": ("predicted", index, {"long_name": "which prediction"})}
         | {
             f"predicted_{name}": ("predicted", values, {"long_name": names[name]})

@@ -40,7 +40,7 @@ class Problem:
         high: Greatest values.
         models: A model for each recording.
         signals: All outputs, in the order of the models.
-        held: Numbers that the scenario is given first, by key.
+        fixed: Values that the scenario is given first, by key.
         stop: Asked before every evaluation.
         evaluations: Number of scenarios computed.
         best: The least objective so far, and where.
@@ -55,7 +55,7 @@ class Problem:
     high: Array
     models: Sequence[RecordingModel]
     signals: Sequence[RecordedSignal]
-    held: Mapping[str, float]
+    fixed: Mapping[str, float]
     stop: Callable[[], bool] = lambda: False
     evaluations: int = 0
     best: tuple[float, Array] = (math.inf, np.zeros(0))
@@ -63,15 +63,19 @@ class Problem:
     means: Sequence[int] = ()
 
     def __post_init__(self) -> None:
-        """Check that every key allows its bounds; numbers of the recordings' own join the parameters."""
+        """Check that every key allows its bounds; nuisance parameters of the recordings join the parameters."""
         self.asked = len(self.keys)
         self._slopes: tuple[Array, list[Array]] | None = None
-        further = [own for model in self.models for own in model.own if own.key not in self.keys]
-        self.keys = (*self.keys, *(own.key for own in further))
-        self.low = np.append(self.low, [own.low for own in further])
-        self.high = np.append(self.high, [own.high for own in further])
-        taken = [model.recording for model in self.models]
-        self.units = {f"{each.name}.{name}": unit_of(name) for each in taken for name in (*each.inputs, *each.outputs)}
+        further = [
+            nuisance for model in self.models for nuisance in model.nuisance_parameters if nuisance.key not in self.keys
+        ]
+        self.keys = (*self.keys, *(nuisance.key for nuisance in further))
+        self.low = np.append(self.low, [nuisance.low for nuisance in further])
+        self.high = np.append(self.high, [nuisance.high for nuisance in further])
+        recordings = [model.recording for model in self.models]
+        self.units = {
+            f"{each.name}.{name}": unit_of(name) for each in recordings for name in (*each.inputs, *each.outputs)
+        }
         self._numbers = np.array(
             [k for k, key in enumerate(self.keys[: self.asked]) if is_of_scenario(key, self.units)], dtype=int
         )
@@ -79,21 +83,24 @@ class Problem:
 
         def part(model: RecordingModel) -> ScenarioPart:
             scenario = model.scenario
-            check_apart(model.recording.name, model.recording.settings, [*keys, *self.held])
-            if self.held:
-                scenario = ParametrisedScenario(scenario, tuple(self.held)).with_values(list(self.held.values()))
+            check_apart(model.recording.name, model.recording.settings, [*keys, *self.fixed])
+            if self.fixed:
+                scenario = ParametrisedScenario(scenario, tuple(self.fixed)).with_values(list(self.fixed.values()))
             return ScenarioPart.from_keys(scenario, model.recording.name, keys)
 
         self._parts = [part(model) for model in self.models]
         self.logarithmic = self.low > 0.0
         # Of recordings that are alike in what limits parameters one is enough.
         by_recording = {model.recording.name: k for k, model in reversed(list(enumerate(self.models)))}
-        own = {m.recording.name for m in self.models if m.recording.settings.values} | {*filter(None, map(owner, keys))}
-        parts = [self._parts[k] for k in sorted({0, *(by_recording[name] for name in own)})]
-        self._limits = Limits.checked(parts, keys, self.low[self._numbers], self.high[self._numbers])
-        known: dict[str, Any] = {own.key: own.start for own in further}
-        for each in reversed(parts):
-            known |= {keys[k]: value for k, value in zip(each.places, each.family.values, strict=True)}
+        constraining = {m.recording.name for m in self.models if m.recording.settings.values} | {
+            *filter(None, map(owner, keys))
+        }
+        parts = [self._parts[k] for k in sorted({0, *(by_recording[name] for name in constraining)})]
+        self._limits = Limits.from_parts(parts, keys, self.low[self._numbers], self.high[self._numbers])
+        known: dict[str, Any] = {nuisance.key: nuisance.start for nuisance in further}
+        for part_of_recording in reversed(parts):
+            values = part_of_recording.family.values
+            known |= {keys[k]: value for k, value in zip(part_of_recording.places, values, strict=True)}
         neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
         middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
         own_values = [known.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
@@ -103,9 +110,9 @@ class Problem:
     def feasible(self, z: Array, free: NDArray[np.bool_] | None = None) -> Array:
         """Return z, shape (p,), or a place near it whose values go together; only free ones change, all by default."""
         values, places = self.values(z), self._numbers
-        found = self._limits.nearest(values[places], None if free is None else free[places])
-        changed = found != values[places]
-        values[places] = found
+        allowed = self._limits.nearest(values[places], None if free is None else free[places])
+        changed = allowed != values[places]
+        values[places] = allowed
         return self.to_search(values) if changed.any() else z
 
     @property
@@ -147,7 +154,7 @@ class Problem:
         pairs = list(zip(self.models, places, strict=True))
         # Closed forms hold Python's lock.
         by_model = in_threads(_compute, pairs) if self.moves else map(_compute, pairs)
-        computed = [each for found in by_model for each in found]
+        computed = [output for outputs in by_model for output in outputs]
         residuals = self._smooth([s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)])
         if not all(np.isfinite(e).all() for e in residuals):
             return [np.full(len(e), np.inf) for e in residuals]
@@ -164,14 +171,14 @@ class Problem:
             raise Stopped
         values = self.values(z)
         sizes = np.where(self.logarithmic, values, self.high - self.low)
-        found = [
+        derivatives = [
             each
             for model, at in zip(self.models, self._places(), strict=True)
             for each in model.slopes(at, values, sizes)
         ]
         self.evaluations += 2 * len(z)
         stretch = np.where(self.logarithmic, values, 1.0)
-        slopes = self._smooth([-each[s.rows] * stretch for each, s in zip(found, self.signals, strict=True)])
+        slopes = self._smooth([-each[s.rows] * stretch for each, s in zip(derivatives, self.signals, strict=True)])
         self._slopes = (z.copy(), slopes)
         return slopes
 
@@ -230,7 +237,7 @@ class Problem:
             self.best = self.best if len(self.best[1]) else (math.inf, twin.best[1])
             return
         self._slopes = twin._slopes or self._slopes
-        self.best = min(self.best, twin.best, key=lambda each: each[0])
+        self.best = min(self.best, twin.best, key=lambda point: point[0])
 
     def _places(self) -> list[At]:
         """Return the scenario at given values, and the numbers of recordings themselves, for every model."""
@@ -248,13 +255,21 @@ class Problem:
         """Return the problem with some of the samples of every signal."""
         signals = [
             RecordedSignal(
-                s.recording, s.name, s.unit, s.measured[k], s.rows[k], s.instant[k], s.load[k], s.alike[k], s.ordered
+                s.recording,
+                s.name,
+                s.unit,
+                s.measured[k],
+                s.rows[k],
+                s.instant[k],
+                s.load[k],
+                s.replicate[k],
+                s.ordered,
             )
             for s, k in zip(self.signals, kept, strict=True)
         ]
         asked = slice(0, self.asked)
         bounds = (self.keys[asked], self.low[asked], self.high[asked])
-        return Problem(self.scenario, *bounds, self.models, signals, self.held, self.stop)
+        return Problem(self.scenario, *bounds, self.models, signals, self.fixed, self.stop)
 
 
 def _compute(pair: tuple[RecordingModel, tuple[Scenario, dict[str, float]]]) -> list[Array]:

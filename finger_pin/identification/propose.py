@@ -57,30 +57,30 @@ def propose(
     # The least that is known: a parameter lies within its bounds.
     before = np.array([(known or {}).get(key, (b - a) / 4.0) for key, a, b in zip(keys, low, high, strict=True)])
     variables = tuple(dict.fromkeys(name.partition(".")[0] for name in outputs))
-    found: dict[str, tuple[float, Array]] = {}
+    outcomes: dict[str, tuple[float, Array]] = {}
     for name, changed in candidates.items():
         entries = {**(overrides or {}), "simulation.sample_rate": rate, **changed}
         run = prepare(load_scenario(scenario, entries), keys, variables, finger=finger).run(sensitivities=True)
         information = np.diag(1.0 / before**2) + sum(_information(run, *each) for each in outputs.items())
         scaled = information * np.outer(before, before)
-        found[name] = (float(np.linalg.slogdet(scaled)[1]), np.sqrt(np.diag(np.linalg.inv(scaled))) * before)
-    order = sorted(found, key=lambda name: -found[name][0])
+        outcomes[name] = (float(np.linalg.slogdet(scaled)[1]), np.sqrt(np.diag(np.linalg.inv(scaled))) * before)
+    order = sorted(outcomes, key=lambda name: -outcomes[name][0])
     long_name = "of the information over that without it"
     return xr.Dataset(
         {
             "log_determinant": (
                 "candidate",
-                [found[name][0] for name in order],
+                [outcomes[name][0] for name in order],
                 {"units": "1", "long_name": long_name},
             ),
-            "deviation": (("candidate", "parameter"), [found[name][1] for name in order]),
+            "deviation": (("candidate", "parameter"), [outcomes[name][1] for name in order]),
         },
         {"candidate": order, "parameter": keys},
     )
 
 
 def _information(run: RunArrays, output: str, noise: float) -> Array:
-    """Return what an output with some noise tells of the parameters, shape (p, p), as far as the derivatives hold."""
+    """Return the information on the parameters in an output with noise, (p, p), while the derivatives hold."""
     slopes = _slopes(run, output)[:, run.time < run.attrs["sensitivities_lost"]]
     return np.asarray(slopes @ slopes.T / noise**2)
 

@@ -1,4 +1,4 @@
-"""Inputs of recorded motions: where they go in a scenario, and who reads them."""
+"""Inputs of recorded motions: their entries in a scenario, and checks that something reads them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import Recording, check_pulling
-from finger_pin.identification.scenario_parameters import own_number
+from finger_pin.identification.scenario_parameters import nuisance_value
 
 # Where the inputs of a motion go in a scenario, by variable.
 _INPUTS = {
@@ -54,7 +54,7 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
         delay = recording.settings.inputs[name].delay
         times = (recording.time - delay + scenario.simulation.start_time).tolist()
         samples = {"kind": "samples", "times": times, "values": values.tolist()}
-        finger, dot, own = label.partition(".")
+        finger, dot, local_label = label.partition(".")
         into = entries.setdefault(group, {})
         if variable in _OF_MOTORS:
             # What the scenario itself tells that motor is not what was recorded.
@@ -62,13 +62,13 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
                 if other != group:
                     entries.get(other, {}).pop(label, None)
         if dot:
-            into.setdefault(finger, {})[own] = samples
+            into.setdefault(finger, {})[local_label] = samples
         else:
             into[label] = samples
-    given = table.get("controller", {})
-    if given.get("kind") == "tensions" and {*scenario.finger.actuated_names} <= {*given.get("tensions", {})}:
+    controller = table.get("controller", {})
+    if controller.get("kind") == "tensions" and {*scenario.finger.actuated_names} <= {*controller.get("tensions", {})}:
         # No tendon is left for it.
-        given.pop("minimum_tension", None)
+        controller.pop("minimum_tension", None)
 
 
 def check_references(recording: Recording, scenario: Scenario) -> None:
@@ -81,17 +81,21 @@ def check_references(recording: Recording, scenario: Scenario) -> None:
     for name in recording.inputs:
         variable, _, label = name.partition(".")
         part = parts.get(label.partition(".")[0]) or next(iter(parts.values()))
-        told, motors = part.controller, part.finger.actuators
-        wound = {**(told.spool_angle or {}), **(told.motor_voltage or {}), **(told.tendon_winding or {})}
+        controller, motors = part.controller, part.finger.actuators
+        wound = {
+            **(controller.spool_angle or {}),
+            **(controller.motor_voltage or {}),
+            **(controller.tendon_winding or {}),
+        }
         follows = any(
             each.drive == "position" and not {motor, *each.tendons} & {*wound} for motor, each in motors.items()
         )
-        if variable == "joint_reference" and told.kind == "tensions" and not follows:
+        if variable == "joint_reference" and controller.kind == "tensions" and not follows:
             allowed = 'is read by nobody: the controller is of kind "tensions", and no motor follows a reference'
             raise InputError(f"identify.recordings.{recording.name}.inputs.{name}", allowed)
 
 
-def with_corrected_inputs(scenario: Scenario, recording: Recording, own: Mapping[str, float]) -> Scenario:
+def with_corrected_inputs(scenario: Scenario, recording: Recording, nuisance: Mapping[str, float]) -> Scenario:
     """Return a scenario with the scales, offsets and delays of a motion's inputs that are being found.
 
     Raises:
@@ -99,7 +103,7 @@ def with_corrected_inputs(scenario: Scenario, recording: Recording, own: Mapping
     """
     for name, values in recording.inputs.items():
         numbers = [
-            own_number(own, recording.name, name, what, default)
+            nuisance_value(nuisance, recording.name, name, what, default)
             for what, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
         ]
         if numbers == [1.0, 0.0, 0.0]:

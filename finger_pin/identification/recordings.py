@@ -60,7 +60,7 @@ class RecordedSignal:
         rows: Which rows of the recording they are, shape (m,).
         instant: Time of each, s; of steady readings its number.
         load: Input of the model there; not a number where there are several.
-        alike: The number of the group of equal readings that each is of, shape (m,).
+        replicate: The number of the group of equal readings that each is of, shape (m,).
         ordered: Whether its samples follow each other in time, so that neighbours may err alike.
     """
 
@@ -71,7 +71,7 @@ class RecordedSignal:
     rows: NDArray[np.intp]
     instant: Array
     load: Array
-    alike: NDArray[np.intp]
+    replicate: NDArray[np.intp]
     ordered: bool
 
 
@@ -122,13 +122,13 @@ class RecordingModel(Protocol):
         """The scenario with the recording's inputs."""
 
     @property
-    def own(self) -> tuple[NuisanceParameter, ...]:
+    def nuisance_parameters(self) -> tuple[NuisanceParameter, ...]:
         """The numbers to be found for it alone."""
 
     def doubt(self, sought: Collection[str]) -> str:
-        """Return a sentence on what is doubtful of it where keys are sought; empty if nothing is."""
+        """Return a warning about it where keys are sought; empty if nothing is doubtful."""
 
-    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
+    def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
@@ -184,11 +184,13 @@ def read_recording(
     return Recording(
         name,
         settings,
-        {key: _signal(table, f"inputs.{key}", given) for key, given in settings.inputs.items()},
-        {key: _signal(table, f"outputs.{key}", given) for key, given in settings.outputs.items()},
+        {key: _signal(table, f"inputs.{key}", column) for key, column in settings.inputs.items()},
+        {key: _signal(table, f"outputs.{key}", column) for key, column in settings.outputs.items()},
         time,
         speed,
-        frozenset(key for key, given in {**settings.inputs, **settings.outputs}.items() if not table.names_unit(given)),
+        frozenset(
+            key for key, column in {**settings.inputs, **settings.outputs}.items() if not table.names_unit(column)
+        ),
     )
 
 
@@ -212,14 +214,14 @@ def check_angles(recording: Recording, scenario: Scenario) -> None:
                 raise InputError(f"identify.recordings.{recording.name}.{group}.{name}", f"{allowed} {hint}", farthest)
 
 
-def _signal(table: Table, key: str, given: Column) -> Array:
+def _signal(table: Table, key: str, column: Column) -> Array:
     """Return a column in SI; cells of outputs may be empty, and angles of joints are asked about.
 
     Raises:
         InputError: As `Table.column`, and if an angle is beyond two turns.
     """
     group, _, name = key.partition(".")
-    values = table.column(key, given, unit_of(name), missing=group == "outputs")
+    values = table.column(key, column, unit_of(name), missing=group == "outputs")
     if name.startswith("joint_position.") and np.nanmax(np.abs(values), initial=0.0) > MOST_ANGLE:
         allowed = f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}"
         raise InputError(f"{table.entry}.{key}", allowed, float(np.nanmax(np.abs(values))))

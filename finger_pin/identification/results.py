@@ -58,13 +58,13 @@ def results(
     # What is met as well as at the ends of the intervals is the same minimum.
     met = [minus_twice_likelihood(each.residuals, best.weights, problem.groups) for each in fits]
     least = minus_twice_likelihood(best.residuals, best.weights, problem.groups)
-    alike = sum(each < least + LEVEL for each in met)
+    searches_alike = sum(each < least + LEVEL for each in met)
     attrs = {
         "scenario": problem.scenario.name,
         "scenario_toml": to_toml(problem.scenario),
         "undetermined": [words for words, _ in free],
         "searches": len(fits),
-        "searches_alike": alike,
+        "searches_alike": searches_alike,
         "evaluations": problem.evaluations,
         "bic": least + count * math.log(max(float(best.weights @ [len(e) for e in best.residuals]), 1.0)),
     }
@@ -141,7 +141,7 @@ def _units(problem: Problem, key: str) -> str:
 
 def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]:
     signals, groups = problem.signals, problem.groups
-    grown = np.ones(len(signals)) if naive is None else SmallSample.of(problem, best, naive).noise
+    grown = np.ones(len(signals)) if naive is None else SmallSample.from_fit(problem, best, naive).noise
     # The first of every output's windows stands for what they share.
     first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
     known = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}

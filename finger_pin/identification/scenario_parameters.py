@@ -65,9 +65,11 @@ class ScenarioPart:
         return cls(ParametrisedScenario(scenario, [bare(keys[k]) for k in places]), np.array(places, dtype=np.intp))
 
 
-def own_number(own: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0) -> float:
+def nuisance_value(
+    nuisance: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0
+) -> float:
     """Return the offset, scale or delay of an input or output that is being found."""
-    return own.get(f"recordings.{recording}.{output}.{what}", default)
+    return nuisance.get(f"recordings.{recording}.{output}.{what}", default)
 
 
 def owner(key: str) -> str | None:
@@ -82,8 +84,10 @@ def bare(key: str) -> str:
 
 def entry_of(key: str) -> str:
     """Return the entry of a bench that a parameter stands at."""
-    own = owner(key)
-    return f"identify.parameters.{key}" if own is None else f"identify.recordings.{own}.parameters.{bare(key)}"
+    recording = owner(key)
+    return (
+        f"identify.parameters.{key}" if recording is None else f"identify.recordings.{recording}.parameters.{bare(key)}"
+    )
 
 
 def is_of_scenario(key: str, columns: Iterable[str]) -> bool:
@@ -96,12 +100,12 @@ def is_of_scenario(key: str, columns: Iterable[str]) -> bool:
     Raises:
         InputError: If it is neither.
     """
-    own = owner(key)
+    recording = owner(key)
     name, _, what = key.removeprefix(OF_RECORDINGS).rpartition(".")
     known = sorted(columns)
-    if own is None or (what in OF_COLUMNS and name in known):
-        return own is None
-    if any(each.startswith(f"{own}.") for each in known) and bare(key).partition(".")[0] in Scenario.model_fields:
+    if recording is None or (what in OF_COLUMNS and name in known):
+        return recording is None
+    if any(each.startswith(f"{recording}.") for each in known) and bare(key).partition(".")[0] in Scenario.model_fields:
         return True
     allowed = f"must be a key of the scenario, or variable.label and .{', '.join(OF_COLUMNS)}; there are"
     raise InputError(entry_of(key), f"{allowed} {', '.join(known)}")
@@ -114,8 +118,8 @@ def check_apart(recording: str, settings: RecordingSettings, keys: Sequence[str]
         InputError: Naming the recording's entry.
     """
     shared = [key for key in keys if owner(key) is None]
-    own = [bare(key) for key in keys if owner(key) == recording]
-    for group, names in (("values", settings.values), ("parameters", own)):
+    recording_keys = [bare(key) for key in keys if owner(key) == recording]
+    for group, names in (("values", settings.values), ("parameters", recording_keys)):
         for key in names:
             hidden = next((each for each in shared if _overlap(key, each)), None)
             if hidden is not None:
@@ -123,7 +127,7 @@ def check_apart(recording: str, settings: RecordingSettings, keys: Sequence[str]
                 raise InputError(f"identify.recordings.{recording}.{group}.{key}", allowed)
 
 
-def with_own_values(scenario: Scenario, recording: str, settings: RecordingSettings) -> Scenario:
+def with_recorded_values(scenario: Scenario, recording: str, settings: RecordingSettings) -> Scenario:
     """Return the scenario of a recording, with the values that hold for it alone.
 
     Raises:

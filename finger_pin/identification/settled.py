@@ -45,8 +45,8 @@ def settled_posture(finger: Finger, load: Array, speed: float | None, near: Arra
     def delivered(position: Array) -> Array:
         if speed is None:
             return load
-        found: Array = steady_state(finger, load[None], np.array([speed]), position[None], True).tension[0]
-        return found
+        tension: Array = steady_state(finger, load[None], np.array([speed]), position[None], True).tension[0]
+        return tension
 
     def acceleration(y: Array) -> Array:
         x = finger.rest_state((size * y)[:joints])
@@ -55,8 +55,8 @@ def settled_posture(finger: Finger, load: Array, speed: float | None, near: Arra
         rates = layout.unpack(finger.rhs(0.0, x, as_inputs(finger, delivered(state.position)), force))
         return np.asarray(np.append(rates.velocity, rates.passive_velocity) / size)
 
-    found = _newton(acceleration, np.append(state.position, state.passive_position) / size)
-    position = near if found is None else found[:joints]
+    zero = _newton(acceleration, np.append(state.position, state.passive_position) / size)
+    position = near if zero is None else zero[:joints]
     for _ in range(_STEPS * _STEPS):
         try:
             rest = equilibrium(finger, delivered(position), position=position, fingertip_force=force).position
@@ -65,7 +65,7 @@ def settled_posture(finger: Finger, load: Array, speed: float | None, near: Arra
                 return np.full(joints, np.nan)
             raise
         # With friction the tension that is delivered belongs to the posture that it leads to.
-        if found is not None or speed is None or float(np.max(np.abs(rest - position))) < 1e-9:
+        if zero is not None or speed is None or float(np.max(np.abs(rest - position))) < 1e-9:
             return rest
         position = rest
     return np.full(joints, np.nan)

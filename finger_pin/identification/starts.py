@@ -1,4 +1,4 @@
-"""Where a recorded motion starts: angles and speeds that its columns begin with."""
+"""Starts of recorded motions: angles and speeds that their columns begin with."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import BEYOND, Recording
-from finger_pin.identification.scenario_parameters import NuisanceParameter, own_number
+from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
 
 # How far a start that is to be found may be from where it was recorded, rad.
 _NEAR = 0.3
@@ -37,18 +37,18 @@ class RecordedStart:
     speed: float
     delay: float
 
-    def corrected(self, recording: str, own: Mapping[str, float]) -> tuple[float, float]:
+    def corrected(self, recording: str, nuisance: Mapping[str, float]) -> tuple[float, float]:
         """Return angle, rad, and speed, rad/s, of the joint with a scale, offset and delay that are being found."""
         scale, offset, delay = (
-            own_number(own, recording, self.column, what, default)
+            nuisance_value(nuisance, recording, self.column, what, default)
             for what, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
         )
         return (self.angle + self.speed * (self.delay + delay) - offset) / scale, self.speed / scale
 
 
 def recorded_starts(recording: Recording, rows: NDArray[np.intp], joints: Collection[str]) -> dict[str, RecordedStart]:
-    """Return where rows of a recording begin, by joint; of joints that are not read there, nothing."""
-    found = {}
+    """Return the starts of rows of a recording, by joint, without joints that are not read there."""
+    starts = {}
     for name, values in recording.outputs.items():
         variable, _, joint = name.partition(".")
         there = rows[:_FIRST][np.isfinite(values[rows[:_FIRST]])]
@@ -57,8 +57,8 @@ def recorded_starts(recording: Recording, rows: NDArray[np.intp], joints: Collec
         degree = 1 if len(there) > 3 else 0
         line = np.polyfit(recording.time[there] - recording.time[rows[0]], values[there], degree)
         delay = recording.settings.outputs[name].delay
-        found[joint] = RecordedStart(name, float(line[-1]), float(line[0]) if degree else 0.0, delay)
-    return found
+        starts[joint] = RecordedStart(name, float(line[-1]), float(line[0]) if degree else 0.0, delay)
+    return starts
 
 
 def check_reachable(entry: str, starts: Mapping[str, tuple[float, float]], scenario: Scenario) -> None:
@@ -88,7 +88,7 @@ def starts_to_find(
 def far_start(
     recording: Recording, starts: Mapping[str, RecordedStart], position: Mapping[str, float], scenario: Scenario
 ) -> str:
-    """Return a sentence on a joint that a motion starts far from where its recording begins; empty without any."""
+    """Return a warning about a joint whose motion starts far from its recording's start; empty without any."""
     for joint, start in starts.items():
         low, high = scenario.finger.joints[joint].range
         angle = start.corrected(recording.name, {})[0]

@@ -10,7 +10,7 @@ from finger_pin.analysis import steady_state
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import At, Recording, check_pulling
-from finger_pin.identification.scenario_parameters import NuisanceParameter, own_number
+from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
 from finger_pin.identification.settled import settled_posture
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
@@ -29,7 +29,7 @@ class SteadyReadings:
         recording: The recording.
         load: The pull at the entrance of the canals, shape (m, a), N.
         scenario: Whose states they are.
-        own: Nothing is to be found for them alone.
+        nuisance_parameters: Nothing is to be found for them alone.
     """
 
     def __init__(self, recording: Recording, scenario: Scenario, replacing: Finger | None = None) -> None:
@@ -41,7 +41,7 @@ class SteadyReadings:
         """
         self.recording, self.scenario, finger = recording, scenario, scenario.finger
         self._replacing = replacing
-        self.own: tuple[NuisanceParameter, ...] = ()
+        self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
         self._entry = f"identify.recordings.{recording.name}"
         rows = len(recording.speed)
         joints, tendons = list(finger.joints), list(finger.actuated_names)
@@ -79,20 +79,24 @@ class SteadyReadings:
         if self._settles:
             self._check_direction()
 
-    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
+    def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
         settings = self.recording.settings
-        load, position = self._corrected(own)
+        load, position = self._corrected(nuisance)
         if self._settles:
             position = self._settled(scenario, load)
-        held = settings.at_rest or self._settles
-        found = steady_state(scenario.finger, load, self.recording.speed, position, held)
-        by_name = {"tendon_tension": found.tension, "tendon_friction": found.friction, "motor_current": found.current}
+        at_rest = settings.at_rest or self._settles
+        steady = steady_state(scenario.finger, load, self.recording.speed, position, at_rest)
+        by_name = {
+            "tendon_tension": steady.tension,
+            "tendon_friction": steady.friction,
+            "motor_current": steady.current,
+        }
         by_name[_POSTURE] = position
         name = self.recording.name
         return [
-            own_number(own, name, output, "scale", 1.0) * by_name[variable][:, place]
-            + own_number(own, name, output, "offset")
+            nuisance_value(nuisance, name, output, "scale", 1.0) * by_name[variable][:, place]
+            + nuisance_value(nuisance, name, output, "offset")
             for output, (variable, place) in zip(self.recording.outputs, self._outputs, strict=True)
         ]
 
@@ -119,18 +123,18 @@ class SteadyReadings:
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
     def doubt(self, sought: Collection[str]) -> str:
-        """Return nothing: readings have no start."""
+        """Return an empty text: readings have no start."""
         return ""
 
     def tune(self, factor: float) -> None:
         """Do nothing: a closed form has no errors."""
 
-    def _corrected(self, own: Mapping[str, float]) -> tuple[Array, Array]:
+    def _corrected(self, nuisance: Mapping[str, float]) -> tuple[Array, Array]:
         """Return tensions, shape (m, a), N, and angles, (m, n), rad, with scales and offsets that are being found."""
         load, position = self.load.copy(), self._position.copy()
         for name, group, place in self._inputs:
-            scale = own_number(own, self.recording.name, name, "scale", 1.0)
-            values = scale * group[:, place] + own_number(own, self.recording.name, name, "offset")
+            scale = nuisance_value(nuisance, self.recording.name, name, "scale", 1.0)
+            values = scale * group[:, place] + nuisance_value(nuisance, self.recording.name, name, "offset")
             if group is self.load:
                 # A tendon only pulls: what a wrong zero takes below it is a slack one.
                 load[:, place] = np.maximum(values, 0.0)
@@ -144,20 +148,20 @@ class SteadyReadings:
         return Finger(scenario.finger, objects=scenario.environment.objects)
 
     def _settled(self, scenario: Scenario, load: Array) -> Array:
-        """Return the posture at rest of every row nearest to what was read, shape (m, n), rad."""
+        """Return the posture at rest of every row nearest to the recorded one, shape (m, n), rad."""
         finger, force = self._finger(scenario), np.array(scenario.environment.fingertip_force)
         speeds = [None] * len(load) if self.recording.settings.speed is None else self.recording.speed.tolist()
         rows = zip(load, speeds, self._position, strict=True)
         return np.array([settled_posture(finger, each, speed, near, force) for each, speed, near in rows])
 
     def _check_direction(self) -> None:
-        """Refuse joints that are both given and read, and a direction that does not tell what friction holds.
+        """Refuse joints that are both input and output, and a direction that leaves the friction open.
 
         Of many postures at rest, a direction of sliding tells one where a single tendon rubs and the joints do not.
         """
-        given = next((name for name in self.recording.inputs if name.startswith(_POSTURE)), None)
-        if given is not None:
-            raise InputError(f"{self._entry}.inputs.{given}", "is an output too: a posture is given or compared")
+        posture = next((name for name in self.recording.inputs if name.startswith(_POSTURE)), None)
+        if posture is not None:
+            raise InputError(f"{self._entry}.inputs.{posture}", "is an output too: a posture is given or compared")
         finger = self._finger(self.scenario)
         pins = finger.joint_friction
         joints_rub = bool(np.any(pins.bearing & ((pins.kinetic > 0.0) | (pins.static > 0.0) | (pins.drag > 0.0))))

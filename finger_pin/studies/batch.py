@@ -71,22 +71,22 @@ def simulate_many(
     _check_kept(runs, variables or (), finger)
     run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
-    found: dict[int, xr.Dataset | BaseException] = {}
+    outcomes: dict[int, xr.Dataset | BaseException] = {}
     texts = [""] * len(runs)
     with CancelToken() as token, open_executor(executor, workers) as pool:
         compile_for(pool, lambda: runs[0])
         for index, result in run_tasks(pool, run, runs, token):
             if isinstance(result, InputError):
                 raise result
-            found[index] = result
+            outcomes[index] = result
             # Here this thread would wait for the others.
             texts[index] = to_toml(runs[index])
             if progress is not None:
-                progress(len(found), len(runs))
+                progress(len(outcomes), len(runs))
     # To fill gigabytes for runs that there are not would take longer than a user waits.
-    stacked = _stack(runs, dict(sorted(found.items())), texts)
+    stacked = _stack(runs, dict(sorted(outcomes.items())), texts)
     if token.cancelled:
-        raise Interrupted(math.nan, stacked, f"after {len(found)} of {len(runs)} runs")
+        raise Interrupted(math.nan, stacked, f"after {len(outcomes)} of {len(runs)} runs")
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
     _warn_of_locking(stacked["self_locking_margin"].values)
@@ -168,27 +168,27 @@ def _stack(
     runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | BaseException], texts: Sequence[str]
 ) -> xr.Dataset:
     order, results = list(done), list(done.values())
-    found = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
-    longest = max(found.values(), key=lambda result: result.sizes["time"], default=xr.Dataset(coords={"time": []}))
+    finished = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
+    longest = max(finished.values(), key=lambda result: result.sizes["time"], default=xr.Dataset(coords={"time": []}))
     times = runs[0].sample_times()
-    labels = _labels(found.values())
+    labels = _labels(finished.values())
     stacked: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]] = {}
-    for name in dict.fromkeys(str(name) for result in found.values() for name in result.data_vars):
-        having = {row: result[name] for row, result in found.items() if name in result}
+    for name in dict.fromkeys(str(name) for result in finished.values() for name in result.data_vars):
+        having = {row: result[name] for row, result in finished.items() if name in result}
         first = next(iter(having.values()))
         dims = tuple(map(str, first.dims))
         sizes = [len(labels[dim]) if dim in labels else first.sizes[dim] for dim in dims[1:]]
-        missing = [order[row] for row in found if row not in having]
+        missing = [order[row] for row in finished if row not in having]
         values = np.empty((len(results), len(times), *sizes))
         values[[row for row in range(len(results)) if row not in having]] = np.nan
         for row, variable in having.items():
-            own, count = {dim: variable[dim].values.tolist() for dim in dims[1:] if dim in labels}, len(variable)
-            if all(labels[dim] == given for dim, given in own.items()):
+            run_labels, count = {dim: variable[dim].values.tolist() for dim in dims[1:] if dim in labels}, len(variable)
+            if all(labels[dim] == names for dim, names in run_labels.items()):
                 values[row, :count], values[row, count:] = variable.values, np.nan
                 continue
             values[row] = np.nan
             places = [
-                [labels[dim].index(label) for label in own[dim]] if dim in own else range(size)
+                [labels[dim].index(label) for label in run_labels[dim]] if dim in run_labels else range(size)
                 for dim, size in zip(dims[1:], sizes, strict=True)
             ]
             values[np.ix_([row], range(count), *places)] = variable.values
@@ -213,9 +213,9 @@ def _stack(
 
 def _labels(results: Iterable[xr.Dataset]) -> dict[str, list[str]]:
     """Return the union of all results' labels by dimension."""
-    found: dict[str, dict[str, None]] = {}
+    labels_by_dim: dict[str, dict[str, None]] = {}
     for result in results:
         for name in result.coords:
             if name != "time":
-                found.setdefault(str(name), {}).update(dict.fromkeys(result[name].values.tolist()))
-    return {name: list(labels) for name, labels in found.items()}
+                labels_by_dim.setdefault(str(name), {}).update(dict.fromkeys(result[name].values.tolist()))
+    return {name: list(labels) for name, labels in labels_by_dim.items()}

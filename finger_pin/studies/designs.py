@@ -168,9 +168,9 @@ class LatinHypercube:
         """
         if not self.ranges:
             raise InputError("over", "at least one key is needed")
-        for key, each in self.ranges.items():
+        for key, interval in self.ranges.items():
             split(key)
-            each.check(key)
+            interval.check(key)
         if self.samples < 1:
             raise InputError("samples", "must be at least 1", self.samples)
         if self.seed < 0:
@@ -200,15 +200,17 @@ def _checked(values: Mapping[str, Sequence[Value]]) -> dict[str, tuple[Value, ..
     if not values:
         raise InputError("over", "at least one key is needed")
     checked: dict[str, tuple[Value, ...]] = {}
-    for key, given in values.items():
+    for key, axis_values in values.items():
         split(key)
-        if isinstance(given, str) or not isinstance(given, Iterable):
-            raise InputError(key, "must be given a list of values", given)
-        axis = np.asarray(list(given)).tolist()
+        if isinstance(axis_values, str) or not isinstance(axis_values, Iterable):
+            raise InputError(key, "must be given a list of values", axis_values)
+        axis = np.asarray(list(axis_values)).tolist()
         if not axis:
             raise InputError(key, "needs at least one value")
-        if len({isinstance(value, str) for value in given}) > 1 or not isinstance(axis[0], str | bool | int | float):
-            raise InputError(key, "must be given numbers, or names, or true and false", list(given))
+        if len({isinstance(value, str) for value in axis_values}) > 1 or not isinstance(
+            axis[0], str | bool | int | float
+        ):
+            raise InputError(key, "must be given numbers, or names, or true and false", list(axis_values))
         checked[key] = tuple(value if isinstance(value, str | bool) else float(value) for value in axis)
         for value in checked[key]:
             if isinstance(value, float) and not math.isfinite(value):

@@ -1,4 +1,4 @@
-"""Digests by value, alike in all processes: of the package, and of what else a run depends on."""
+"""Digests by value, equal in all processes: of the package, and of the other inputs of a run."""
 
 from __future__ import annotations
 
@@ -50,31 +50,31 @@ def finger_digest(finger: Finger) -> str:
     return digest(finger)
 
 
-def _digest(thing: Any, names: frozenset[str], seen: dict[Any, tuple[Any, str]]) -> str:
+def _digest(thing: Any, names: frozenset[str], known: dict[Any, tuple[Any, str]]) -> str:
     """Return a digest of a thing; of a user's module, only of the parts used by one of some names."""
     if type(thing) in _PLAIN:
         # A text such as "module:NAME" may be that of a user's law.
         module, _, name = str(thing).partition(":")
         named = vars(sys.modules[module]).get(name) if module in sys.modules else None
-        return str(joblib.hash((type(thing).__name__, thing, named and _digest(named, names, seen))))
+        return str(joblib.hash((type(thing).__name__, thing, named and _digest(named, names, known))))
     names = _names(thing.__code__) if isinstance(thing, FunctionType) else names
     key = id(thing), names
-    if key not in seen:
+    if key not in known:
         # Kept, so that no other thing gets its identity meanwhile. In a circle it counts as such.
-        seen[key] = thing, "circle"
+        known[key] = thing, "circle"
         try:
             parts = _parts(thing, names)
         except (TypeError, ValueError):
             raise UnknownDependency(f"an object of type {type(thing).__name__}") from None
         # joblib tells one thing twice from two equal ones, but not so for texts, and orders sets by their seed.
-        digests = [_digest(part, names, seen) for part in parts]
+        digests = [_digest(part, names, known) for part in parts]
         digests = sorted(digests) if isinstance(thing, dict | set | frozenset) else digests
-        seen[key] = thing, str(joblib.hash([type(thing).__qualname__, *digests]))
-    return seen[key][1]
+        known[key] = thing, str(joblib.hash([type(thing).__qualname__, *digests]))
+    return known[key][1]
 
 
 def _parts(thing: Any, names: frozenset[str]) -> list[Any]:
-    """Return what determines a thing, of which code uses some names."""
+    """Return the parts that determine a thing, of which code uses some names."""
     module = getattr(thing, "__module__", None)
     match thing:
         case dict():

@@ -37,17 +37,17 @@ class BaseScenario:
     finger: Finger | None = None
 
     @classmethod
-    def load(
-        cls, given: ScenarioLike, overrides: Mapping[str, Any] | None = None, finger: FingerLike | None = None
+    def from_scenario(
+        cls, source: ScenarioLike, overrides: Mapping[str, Any] | None = None, finger: FingerLike | None = None
     ) -> BaseScenario:
         """Load a scenario.
 
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        scenario = load_scenario(given, overrides)
-        own = resolve_finger(finger, scenario)
-        return cls(with_finger(scenario, own), own)
+        scenario = load_scenario(source, overrides)
+        custom_finger = resolve_finger(finger, scenario)
+        return cls(with_finger(scenario, custom_finger), custom_finger)
 
     def at(self, point: Point) -> Scenario:
         """Return the scenario with other numbers or names at some keys.
@@ -76,13 +76,13 @@ class BaseScenario:
         Raises:
             InputError: If there is no such key, it holds something else, or allows none of the values.
         """
-        found = self._found(key)
+        entry = self._entry(key)
         numbers = _is_number(values[0])
         # Of the finger nothing may come into being by a misspelt name, as an entry that is overridden otherwise may.
         if (
             key.startswith("finger.")
             and split(key)[1] is None
-            and not (_is_number(found) if numbers else found is not None)
+            and not (_is_number(entry) if numbers else entry is not None)
             and not self._left_out(key)
         ):
             raise self._nothing(key, numbers)
@@ -111,12 +111,12 @@ class BaseScenario:
         Raises:
             InputError: If it has none.
         """
-        held = self._found(key)
+        entry = self._entry(key)
         if self._left_out(key):
             raise InputError(key, "is left out of the scenario, so that there is no number to start from: state it")
-        if not _is_number(held):
+        if not _is_number(entry):
             raise self._nothing(key, True)
-        return float(held)
+        return float(entry)
 
     def _nothing(self, key: str, numbers: bool) -> InputError:
         hint = suggestion(key, _leaves(self.scenario.model_dump(mode="python"), "", numbers))
@@ -128,7 +128,7 @@ class BaseScenario:
         below = _look_up(self.scenario, parent)
         return isinstance(below, dict) and below.get(name, 0) is None
 
-    def _found(self, key: str) -> Any:
+    def _entry(self, key: str) -> Any:
         return _look_up(self.scenario, key)
 
 
@@ -145,30 +145,30 @@ def describe(key: str) -> dict[str, str]:
     return {"units": str(unit), "long_name": f"{text}{where}" if text else key}
 
 
-def _is_number(held: Any) -> bool:
-    return isinstance(held, int | float) and not isinstance(held, bool)
+def _is_number(entry: Any) -> bool:
+    return isinstance(entry, int | float) and not isinstance(entry, bool)
 
 
-def _leaves(held: Any, key: str, numbers: bool) -> Iterator[str]:
+def _leaves(entry: Any, key: str, numbers: bool) -> Iterator[str]:
     """Yield the keys below one, those of numbers or all."""
-    if isinstance(held, Mapping):
-        for name, below in held.items():
+    if isinstance(entry, Mapping):
+        for name, below in entry.items():
             yield from _leaves(below, f"{key}.{name}" if key else name, numbers)
-    elif isinstance(held, list | tuple):
-        for index, below in enumerate(held):
+    elif isinstance(entry, list | tuple):
+        for index, below in enumerate(entry):
             yield from _leaves(below, f"{key}[{index}]", numbers)
-    elif _is_number(held) or not numbers:
+    elif _is_number(entry) or not numbers:
         yield key
 
 
 def _look_up(scenario: Scenario, key: str) -> Any:
     """Return the entry at a key, or None; of several that it stands for the first."""
     name, index = split(key)
-    held: Any = scenario.model_dump(mode="python")
+    entry: Any = scenario.model_dump(mode="python")
     for part in name.split("."):
-        below = held if isinstance(held, dict) else {}
+        below = entry if isinstance(entry, dict) else {}
         first = part.strip("{}").split(",")[0]
-        held = next(iter(below.values()), None) if part == "*" else below.get(first)
+        entry = next(iter(below.values()), None) if part == "*" else below.get(first)
     if index is None:
-        return held
-    return held[index[0]] if isinstance(held, list | tuple | Series) and max(index) < len(held) else None
+        return entry
+    return entry[index[0]] if isinstance(entry, list | tuple | Series) and max(index) < len(entry) else None

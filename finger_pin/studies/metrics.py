@@ -64,11 +64,11 @@ def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
         InputError: If there are none, one is unknown or comes twice, or cannot be sent to other processes.
     """
     chosen: dict[str, Metric] = {}
-    for each in names:
-        if isinstance(each, str) and each not in METRICS:
-            hint = suggestion(each, METRICS)
-            raise InputError("metric", f"there is no such metric; there are {', '.join(METRICS)}{hint}", each)
-        metric = METRICS[each] if isinstance(each, str) else each
+    for choice in names:
+        if isinstance(choice, str) and choice not in METRICS:
+            hint = suggestion(choice, METRICS)
+            raise InputError("metric", f"there is no such metric; there are {', '.join(METRICS)}{hint}", choice)
+        metric = METRICS[choice] if isinstance(choice, str) else choice
         try:
             cloudpickle.dumps(metric)
         except Exception as error:
@@ -159,8 +159,8 @@ def heat(run: Run) -> float:
 
 def current_peak(run: Run) -> float:
     """Return the largest current of any motor, A; 0 for a finger without motors."""
-    found = run.result
-    return float(np.max(np.abs(found["motor_current"].values))) if "motor_current" in found else 0.0
+    result = run.result
+    return float(np.max(np.abs(result["motor_current"].values))) if "motor_current" in result else 0.0
 
 
 def locking_margin(run: Run) -> float:

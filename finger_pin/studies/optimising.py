@@ -116,13 +116,13 @@ def optimise(
     """
     effort = effort or Effort()
     goals = Goals.from_metrics(minimise, maximise, constraints)
-    base = BaseScenario.load(scenario, overrides, finger)
+    base = BaseScenario.from_scenario(scenario, overrides, finger)
     metrics_of(base.scenario, goals.metrics)
     variables = _variables(over, base)
-    own = start_of(variables, base)
+    start = start_of(variables, base)
     with open_study(base, goals.metrics, output, PRODUCTS, executor, stop, restart) as study:
         course = _Course(study, goals, variables, effort, progress or notebook_bar("runs"))
-        result = _assembled(base, goals, *course.follow(own)).assign_attrs(vars(effort))
+        result = _assembled(base, goals, *course.follow(start)).assign_attrs(vars(effort))
         if output is not None:
             _write(result, base, Path(output))
     return checked(result, study.token.cancelled)
@@ -130,8 +130,8 @@ def optimise(
 
 def _variables(over: Iterable[Variable | str] | None, base: BaseScenario) -> list[Variable]:
     """Return the variables of a search, by default the winding radii of the finger."""
-    given = radii(base.scenario.finger) if over is None else over
-    variables = [parse_variable(each) if isinstance(each, str) else each for each in given]
+    chosen = radii(base.scenario.finger) if over is None else over
+    variables = [parse_variable(each) if isinstance(each, str) else each for each in chosen]
     check_variables(variables, base)
     return variables
 
@@ -146,20 +146,20 @@ class _Course:
     effort: Effort
     progress: Progress | None
 
-    def follow(self, own: Mapping[str, float]) -> tuple[list[Point], list[RunRecord | None]]:
+    def follow(self, start: Mapping[str, float]) -> tuple[list[Point], list[RunRecord | None]]:
         """Return all points with their records, the scenario's own first."""
         sizes = len(self.variables), len(self.goals.objectives), self.effort.population
-        search = Search(*sizes, self.effort.seed, _shares(self.variables, own))
-        points: list[Point] = [own]
+        search = Search(*sizes, self.effort.seed, _shares(self.variables, start))
+        points: list[Point] = [start]
         records = self._evaluate(points, [])
         for _ in range(self.effort.generations):
             if records[-1] is None or self.study.token():
                 break
             asked = [point_at(self.variables, shares) for shares in search.ask()]
-            found = self._evaluate(asked, records)
-            points, records = points + asked, records + found
-            done = [record for record in found if record is not None]
-            if len(done) < len(found):
+            evaluated = self._evaluate(asked, records)
+            points, records = points + asked, records + evaluated
+            done = [record for record in evaluated if record is not None]
+            if len(done) < len(evaluated):
                 break
             judged = [self._judge(record) for record in done]
             search.tell(np.array([value for value, _ in judged]), np.array([excess for _, excess in judged]))
@@ -184,13 +184,13 @@ class _Course:
         return np.full(len(self.goals.objectives), HOPELESS), np.full(len(self.goals.constraints), HOPELESS)
 
 
-def _shares(variables: Sequence[Variable], own: Mapping[str, float]) -> Array | None:
+def _shares(variables: Sequence[Variable], start: Mapping[str, float]) -> Array | None:
     """Return the coordinates of the scenario's own design in the unit cube, or None outside of it."""
     shares = []
     for variable in variables:
-        first = own[variable.keys[0]]
+        first = start[variable.keys[0]]
         for key, sign in zip(variable.keys, variable.signs, strict=True):
-            if own[key] != sign * first:
+            if start[key] != sign * first:
                 return None
         if not variable.range.low <= first <= variable.range.high:
             return None

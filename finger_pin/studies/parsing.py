@@ -53,9 +53,9 @@ def parse_range(text: str) -> tuple[str, Range]:
     if len(parts) != 2:
         raise InputError("over", _RANGE, text)
     low, high = (_number(text, each, _RANGE) for each in parts)
-    found = Range(low, high, logarithmic)
-    found.check(key)
-    return key, found
+    interval = Range(low, high, logarithmic)
+    interval.check(key)
+    return key, interval
 
 
 def _split(text: str, allowed: str) -> tuple[str, str]:

@@ -50,7 +50,7 @@ def parse_variable(text: str) -> Variable:
     Raises:
         InputError: If it is neither.
     """
-    names, found = parse_range(text)
+    names, interval = parse_range(text)
     keys, signs = [], []
     for name in names.split(","):
         spelt = re.fullmatch(r"\s*(-?)\s*(\S+)\s*", name)
@@ -60,7 +60,7 @@ def parse_variable(text: str) -> Variable:
         signs.append(-1 if spelt[1] else 1)
     if signs[0] < 0:
         raise InputError("over", "the range is that of the first key, which has no sign", text)
-    return Variable(tuple(keys), tuple(signs), found)
+    return Variable(tuple(keys), tuple(signs), interval)
 
 
 def radii(finger: FingerLike) -> list[Variable]:
@@ -96,13 +96,13 @@ def check_variables(variables: Sequence[Variable], base: BaseScenario) -> None:
     """
     if not variables:
         raise InputError("over", "at least one key is needed")
-    seen: set[str] = set()
+    varied: set[str] = set()
     for variable in variables:
         variable.range.check(variable.keys[0])
         for key, sign in zip(variable.keys, variable.signs, strict=True):
-            if key in seen:
+            if key in varied:
                 raise InputError(key, "must not come twice")
-            seen.add(key)
+            varied.add(key)
             base.check(key, [sign * float(variable.range.at(share)) for share in (0.5, 0.0, 1.0)])
 
 
@@ -162,14 +162,14 @@ def parse_constraint(text: str) -> Constraint:
     Raises:
         InputError: If it is neither.
     """
-    found = _CONSTRAINT.fullmatch(text)
+    match = _CONSTRAINT.fullmatch(text)
     try:
-        bound = float(found["bound"]) if found else math.nan
+        bound = float(match["bound"]) if match else math.nan
     except ValueError:
         bound = math.nan
-    if found is None or not math.isfinite(bound):
+    if match is None or not math.isfinite(bound):
         raise InputError("constraint", "must be NAME>=VALUE or NAME<=VALUE, such as self_locking_margin>=1.5", text)
-    return Constraint(found["name"], bound, 1 if found["sense"] == "<=" else -1)
+    return Constraint(match["name"], bound, 1 if match["sense"] == "<=" else -1)
 
 
 @dataclass(frozen=True)
@@ -225,5 +225,5 @@ class Goals:
         """Return the names of the metrics, and the constraints, by kind."""
         minimise = [each.name for each in self.objectives if each.sign > 0]
         maximise = [each.name for each in self.objectives if each.sign < 0]
-        told = {"minimise": minimise, "maximise": maximise, "constraints": map(str, self.constraints)}
-        return {kind: ", ".join(names) for kind, names in told.items()}
+        texts = {"minimise": minimise, "maximise": maximise, "constraints": map(str, self.constraints)}
+        return {kind: ", ".join(names) for kind, names in texts.items()}

@@ -166,8 +166,8 @@ def _open_folder(folder: Path, products: Sequence[str], restart: bool) -> tuple[
         if foreign:
             what = f"holds a {foreign[0]} of an earlier version or of something else; name another folder"
             raise InputError("output", what, str(folder))
-        for each in present if restart else ():
-            each.unlink()
+        for stale in present if restart else ():
+            stale.unlink()
         folder.mkdir(parents=True, exist_ok=True)
         with filelock.FileLock(folder / _LOCK), path.open("ab+") as file:
             dropped = _cut_off_half_line(file)
@@ -188,7 +188,7 @@ def _open_folder(folder: Path, products: Sequence[str], restart: bool) -> tuple[
 
 
 def _cut_off_half_line(file: BinaryIO) -> int:
-    """Cut off what a process that was killed in the middle of a line has left; return the number of such lines."""
+    """Cut off a line that a killed process has left unfinished; return the number of such lines."""
     file.seek(max(file.seek(0, os.SEEK_END) - 1, 0))
     if file.read() in (b"", b"\n"):
         return 0
@@ -198,7 +198,7 @@ def _cut_off_half_line(file: BinaryIO) -> int:
 
 
 def _common_digest(base: BaseScenario, metrics: Sequence[Metric], warn: bool) -> str:
-    """Return a digest of what all runs depend on."""
+    """Return a digest of the inputs that all runs share."""
     _import_laws(lambda: base.scenario)
     parts: dict[str, Any] = {f"the metric {each.name}": each for each in metrics}
     parts |= {"the scenario": base.scenario, "the finger": base.finger}

@@ -40,8 +40,8 @@ class Run:
     def parts(self) -> dict[str, tuple[Scenario, Finger]]:
         """Return scenario and finger of every finger of a hand, or of the only one, by name."""
         parts = self.scenario.parts()
-        own = self._finger if len(parts) == 1 else None
-        return {name: (part, own or Finger(part.finger)) for name, part in parts.items()}
+        custom_finger = self._finger if len(parts) == 1 else None
+        return {name: (part, custom_finger or Finger(part.finger)) for name, part in parts.items()}
 
     @cached_property
     def result(self) -> xr.Dataset:
@@ -98,11 +98,11 @@ def fingertip_hysteresis(run: Run) -> float:
     Raises:
         InputError: If neither moves to and fro.
     """
-    found = [_hysteresis(run, name, finger) for name, (_, finger) in run.parts().items()]
-    if all(np.isnan(found)):
+    by_finger = [_hysteresis(run, name, finger) for name, (_, finger) in run.parts().items()]
+    if all(np.isnan(by_finger)):
         what = "the reference" if has_reference(run.scenario) else "without a reference the command"
         raise InputError("fingertip_hysteresis", f"{what} must move to and fro")
-    return float(np.nanmax(found))
+    return float(np.nanmax(by_finger))
 
 
 def has_reference(scenario: Scenario) -> bool:
@@ -112,14 +112,14 @@ def has_reference(scenario: Scenario) -> bool:
 
 def _commands(result: xr.Dataset, prefix: str) -> Array:
     """Return all commands of a finger in parts of their ranges, shape (m, k), less those that stand still."""
-    found = [np.zeros((result.sizes["time"], 0))]
-    for name, each in result.data_vars.items():
+    commands = [np.zeros((result.sizes["time"], 0))]
+    for name, variable in result.data_vars.items():
         if name in _COMMANDS or str(name).endswith("_input"):
-            own = [column for column in each.dims if column != "time"]
-            columns = np.asarray(each.transpose("time", ...).values).reshape(result.sizes["time"], -1)
-            names = [str(label) for label in each[own[0]].values] if own else [""]
-            found.append(columns[:, [label.startswith(prefix) for label in names]])
-    stacked = np.hstack(found)
+            dims = [column for column in variable.dims if column != "time"]
+            columns = np.asarray(variable.transpose("time", ...).values).reshape(result.sizes["time"], -1)
+            names = [str(label) for label in variable[dims[0]].values] if dims else [""]
+            commands.append(columns[:, [label.startswith(prefix) for label in names]])
+    stacked = np.hstack(commands)
     span = np.ptp(stacked, axis=0)
     return np.asarray(stacked[:, span > 0.0] / span[span > 0.0])
 

@@ -74,7 +74,7 @@ def sweep(
     """
     design = Grid(over) if isinstance(over, Mapping) else over
     _refuse_varied(overrides or {}, design)
-    base = BaseScenario.load(scenario, overrides, finger)
+    base = BaseScenario.from_scenario(scenario, overrides, finger)
     chosen = metrics_of(base.scenario, metrics)
     for key, values in design.values.items():
         base.check(key, values, alone=len(design.values) == 1)
@@ -87,7 +87,7 @@ def sweep(
 
 
 def _refuse_varied(overrides: Mapping[str, Any], design: Design) -> None:
-    """Refuse an override of what a key of the design replaces: itself, or an entry of a finger, hand or motor."""
+    """Refuse an override of an entry that a key of the design replaces: itself, or one of a finger, hand or motor."""
     for name in (split(key)[0].removesuffix(".base") for key in design.values if split(key)[1] is None):
         for entry in overrides:
             if fnmatchcase(entry, name) or fnmatchcase(entry, f"{name}.*"):

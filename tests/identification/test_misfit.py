@@ -12,14 +12,14 @@ from finger_pin.identification.misfit import repeats, sandwich
 from finger_pin.views.report import summarize_identification
 
 
-def stub(residual, slopes, *, ordered=True, alike=None, weight=1.0):
+def stub(residual, slopes, *, ordered=True, replicate=None, weight=1.0):
     """One signal of a linear problem, and its minimum."""
     count = len(residual)
-    alike = np.arange(count) if alike is None else alike
+    replicate = np.arange(count) if replicate is None else replicate
     settings = SimpleNamespace(values={}, start="rest")
     recording = SimpleNamespace(name="one", settings=settings, inputs={}, time=np.arange(count))
     signal = SimpleNamespace(
-        recording="one", name="out", instant=np.arange(count), alike=alike, ordered=ordered, measured=residual
+        recording="one", name="out", instant=np.arange(count), replicate=replicate, ordered=ordered, measured=residual
     )
     problem = SimpleNamespace(
         signals=[signal],
@@ -50,10 +50,10 @@ def test_a_slope_that_swings_has_the_variance_of_the_noise_at_its_frequency(rho,
 
 def test_readings_whose_law_misses_something_count_as_one_for_each_setting():
     """Fifty settings of eight readings share a miss of 0.3 each beside a scatter of 0.1: variance of their mean."""
-    rng, alike = np.random.default_rng(2), np.repeat(np.arange(50), 8)
-    residual = 0.3 * rng.normal(size=50)[alike] + 0.1 * rng.normal(size=400)
+    rng, replicate = np.random.default_rng(2), np.repeat(np.arange(50), 8)
+    residual = 0.3 * rng.normal(size=50)[replicate] + 0.1 * rng.normal(size=400)
     residual -= residual.mean()
-    problem, found, naive = stub(residual, np.ones((400, 1)), ordered=False, alike=alike)
+    problem, found, naive = stub(residual, np.ones((400, 1)), ordered=False, replicate=replicate)
     variance = sandwich(problem, found, naive)[0, 0]
     means = residual.reshape(50, 8).mean(axis=1)
     assert variance == pytest.approx(means.var(ddof=1) / 50, rel=0.02)
@@ -61,10 +61,10 @@ def test_readings_whose_law_misses_something_count_as_one_for_each_setting():
 
 
 def test_readings_whose_law_holds_are_said_to_miss_something_as_rarely_as_chance_has_it():
-    rng, alike = np.random.default_rng(3), np.repeat(np.arange(8), 5)
+    rng, replicate = np.random.default_rng(3), np.repeat(np.arange(8), 5)
     chances = []
     for _ in range(400):
-        problem, found, _ = stub(rng.normal(size=40), np.zeros((40, 0)), ordered=False, alike=alike)
+        problem, found, _ = stub(rng.normal(size=40), np.zeros((40, 0)), ordered=False, replicate=replicate)
         chances.append(repeats(problem, found.residuals)[0].chance)
     # Uniform: the share below 0.2 is 0.2, with a standard deviation of 0.02.
     assert np.mean(np.array(chances) < 0.2) == pytest.approx(0.2, abs=0.06)

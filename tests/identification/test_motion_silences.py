@@ -54,10 +54,14 @@ def test_a_recorded_start_is_that_of_a_joint_whose_column_has_a_wrong_zero(late)
     asked = problem(data, outputs=columns, start="recorded", settle=0.0)
     model = asked.models[0]
     key = "recordings.pull.joint_position.drum"
-    for own, angle in (({}, 0.8), ({f"{key}.offset": 0.3}, 0.5), ({f"{key}.offset": 0.3, f"{key}.scale": 2.0}, 0.25)):
-        initial = model._with_own(model.scenario, own).simulation.initial
+    for nuisance, angle in (
+        ({}, 0.8),
+        ({f"{key}.offset": 0.3}, 0.5),
+        ({f"{key}.offset": 0.3, f"{key}.scale": 2.0}, 0.25),
+    ):
+        initial = model._with_nuisance(model.scenario, nuisance).simulation.initial
         assert initial.position["drum"] == pytest.approx(angle, abs=1e-9)
-        assert initial.velocity["drum"] == pytest.approx(0.2 / own.get(f"{key}.scale", 1.0), abs=1e-9)
+        assert initial.velocity["drum"] == pytest.approx(0.2 / nuisance.get(f"{key}.scale", 1.0), abs=1e-9)
 
 
 def test_a_start_far_from_the_first_row_of_a_recording_is_told():

@@ -19,11 +19,11 @@ TIME, TRUTH = np.arange(4.5, 8.0, 0.0025), np.array([0.12, 0.5])
 class Ringing:
     """Rings at 2000 rad/s times the coefficient, and rises with both."""
 
-    scenario, own = fp.load_scenario("canal"), ()
+    scenario, nuisance_parameters = fp.load_scenario("canal"), ()
     settings = RecordingSettings.model_construct(values={}, parameters={})
     recording = SimpleNamespace(name="pull", settings=settings, inputs={}, outputs={}, time=TIME)
 
-    def compute(self, scenario, own):
+    def compute(self, scenario, nuisance):
         friction = scenario.finger.tendon_friction
         ringing = np.sin(2000.0 * friction.coulomb * TIME)
         return [ringing + 40.0 * friction.coulomb * TIME**2 + friction.drag * (1.0 + TIME)]

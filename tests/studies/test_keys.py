@@ -12,7 +12,7 @@ LENGTH = "finger.joints.distal.link.length"
 
 @pytest.fixture(scope="module")
 def reversals():
-    return BaseScenario.load("reversals")
+    return BaseScenario.from_scenario("reversals")
 
 
 def test_a_point_changes_its_keys_and_nothing_else(reversals):
@@ -31,13 +31,13 @@ def test_what_a_file_leaves_to_its_default_follows_a_length(reversals):
 def test_an_index_means_one_number_of_a_list(reversals):
     changed = reversals.at({"environment.fingertip_force[2]": -0.5, "environment.fingertip_force[0]": 0.1})
     assert changed.environment.fingertip_force == (0.1, 0.0, -0.5)
-    listed = BaseScenario.load("reversals", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
+    listed = BaseScenario.from_scenario("reversals", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
     assert listed.at({"controller.gain[1]": 9.0}).controller.gain == (1.0, 9.0, 3.0, 4.0)
     assert listed.scenario.controller.gain == (1.0, 2.0, 3.0, 4.0)
 
 
 def test_a_whole_number_stays_one(reversals):
-    changed = BaseScenario.load("reversals", {"finger.tendons.T5.mass_after": 1}).at(
+    changed = BaseScenario.from_scenario("reversals", {"finger.tendons.T5.mass_after": 1}).at(
         {"finger.tendons.T5.mass_after": 2.0}
     )
     assert changed.finger.tendons["T5"].mass_after == 2
@@ -104,7 +104,7 @@ def test_a_name_that_a_key_cannot_hold_is_told_in_one_line(reversals, key, value
 
 
 def test_a_reference_that_a_scenario_leaves_out_is_a_key():
-    still = BaseScenario.load("reversals", {"reference.joints": {}})
+    still = BaseScenario.from_scenario("reversals", {"reference.joints": {}})
     still.check("reference.joints.medial.offset", [0.1])
     assert still.at({"reference.joints.medial.offset": 0.1}).reference.joints["medial"].offset == 0.1
 
@@ -124,7 +124,7 @@ def test_what_a_key_holds_has_unit_and_name():
 
 
 def test_a_star_stands_for_every_name_and_holds_what_the_first_one_holds():
-    servo = BaseScenario.load("servo")
+    servo = BaseScenario.from_scenario("servo")
     motor, radius = "finger.actuators.*.motor", "finger.actuators.*.spool_radius"
     servo.check(motor, ["XC330-M288", "STS3215"])
     servo.check(radius, [0.004, 0.006])
@@ -132,4 +132,4 @@ def test_a_star_stands_for_every_name_and_holds_what_the_first_one_holds():
     changed = servo.at({motor: "STS3215", radius: 0.006}).finger.actuators.values()
     assert [(each.motor.voltage, each.spool_radius) for each in changed] == [(7.4, 0.006)] * 4
     with pytest.raises(fp.InputError, match=r"finger\.actuators\.\*\.spool_radius"):
-        BaseScenario.load("reversals").check(radius, [0.004])
+        BaseScenario.from_scenario("reversals").check(radius, [0.004])

@@ -11,7 +11,7 @@ import finger_pin as fp
 from finger_pin.studies.keys import BaseScenario
 from finger_pin.studies.records import RunRecord, open_study
 
-BASE = BaseScenario.load("reversals")
+BASE = BaseScenario.from_scenario("reversals")
 
 
 def record(key, value=1.0):
