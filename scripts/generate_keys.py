@@ -183,7 +183,9 @@ _FURTHER: tuple[tuple[str, dict[str, Any]], ...] = (
 
 def variables_page() -> str:
     """Return the page: a table for each condition."""
-    loops = [Setup.of(load_scenario(*each)).loop for each in (*((name,) for name in list_scenarios()), *_FURTHER)]
+    loops = [
+        Setup.from_scenario(load_scenario(*each)).loop for each in (*((name,) for name in list_scenarios()), *_FURTHER)
+    ]
     found: dict[str, dict[tuple[int, str], Quantity]] = {}
     for k, loop in enumerate(loops):
         tables = [table.group for table in loop.finger.extra_rows]

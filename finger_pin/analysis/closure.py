@@ -114,14 +114,14 @@ def closure_over_range(finger: FingerLike, samples: int = 512) -> ClosureRange:
     positions = list(lower + spread * (upper - lower))
     margins = [_closure(finger, each)[1] for each in positions]
     for start in np.argsort(margins, kind="stable")[:_DEEPER]:
-        found = scipy.optimize.minimize(
+        minimum = scipy.optimize.minimize(
             lambda theta: _closure(finger, theta)[1],
             positions[start],
             method="Nelder-Mead",
             bounds=list(zip(lower, upper, strict=True)),
             options={"maxfev": 60 * len(lower)},
         )
-        positions.append(np.clip(found.x, lower, upper))
+        positions.append(np.clip(minimum.x, lower, upper))
     closures = [_closure(finger, each) for each in positions]
     return ClosureRange(
         positions=np.array(positions),
@@ -146,10 +146,10 @@ def locking_over_range(finger: FingerLike, samples: int = 64) -> tuple[CriticalF
         InputError: If no posture has force closure.
     """
     finger = as_finger(finger)
-    found = closure_over_range(finger, samples)
-    taut = found.positions[found.taut]
+    closure = closure_over_range(finger, samples)
+    taut = closure.positions[closure.taut]
     if not len(taut):
-        raise InputError("finger.tendons", str(found))
+        raise InputError("finger.tendons", str(closure))
     critical = [critical_friction(posed(finger, each), each) for each in taut]
     worst = int(np.argmin([each.coefficient for each in critical]))
     return critical[worst], np.asarray(taut[worst])

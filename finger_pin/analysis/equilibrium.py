@@ -85,7 +85,7 @@ def equilibrium(
         if position is None
         else np.array(finite_vector("position", position, joints))
     )
-    problem = _Statics.of(finger, command, pushed, start)
+    problem = _Statics.from_posture(finger, command, pushed, start)
     y = problem.start
     begun = float(np.max(np.abs(problem.acceleration(y))))
     if begun >= _REST:
@@ -116,17 +116,17 @@ class _Statics:
     scale: Array
 
     @classmethod
-    def of(cls, finger: Finger, command: Array, pushed: Array, position: Array) -> _Statics:
+    def from_posture(cls, finger: Finger, command: Array, pushed: Array, position: Array) -> _Statics:
         """Return the problem that starts at a posture, shape (n,)."""
         rest, passive = finger.rest_state(position), finger.routing.passive
-        held = finger.layout.unpack(rest).actuator_state
+        actuator_state = finger.layout.unpack(rest).actuator_state
         for table in finger.mechanism.rows:
             if table.group in (STATEFUL, MUSCLES):
                 # What comes late has come; the input's limits are those of an activation as well.
                 limits = [4, 5, -2, -1] if table.group == STATEFUL else [-2, -1, -2, -1]
                 least, most, lowest, highest = table.parameters[limits]
-                held[: table.count] = np.clip(np.clip(command[table.channels], least, most), lowest, highest)
-                held = held[table.count :]
+                actuator_state[: table.count] = np.clip(np.clip(command[table.channels], least, most), lowest, highest)
+                actuator_state = actuator_state[table.count :]
         return cls(finger, command, pushed, rest, np.concatenate([np.ones(len(position)), np.full(passive, 1e-3)]))
 
     @property
@@ -143,15 +143,15 @@ class _Statics:
         return x
 
     def energy(self, y: Array) -> float:
-        """Return what is stored less what inputs and force have given, J."""
+        """Return the stored energy less the work of inputs and force, J."""
         finger, joints, actuated = self.finger, len(self.finger.routing.joints), self.finger.routing.actuated
         theta = (self.scale * y)[:joints]
-        found = finger.evaluate(self.packed(y), self.command, self.pushed)
-        stored, _ = found.mechanism.account()
+        signals = finger.evaluate(self.packed(y), self.command, self.pushed)
+        stored, _ = signals.mechanism.account()
         raised = finger.motion(theta, np.zeros(joints)).potential_energy
-        given = (~finger.routing.winched * found.tendons.entering[:actuated]) @ finger.excursion(theta)
-        given += self.pushed @ finger.rigid_body.tip_position(theta) + _given_by_actuators(found)
-        return float(sum(stored.values()) + raised - given)
+        work = (~finger.routing.winched * signals.tendons.entering[:actuated]) @ finger.excursion(theta)
+        work += self.pushed @ finger.rigid_body.tip_position(theta) + _work_of_actuators(signals)
+        return float(sum(stored.values()) + raised - work)
 
     def acceleration(self, y: Array) -> Array:
         """Return the acceleration from rest there, shape (k,)."""
@@ -168,34 +168,34 @@ class _Statics:
 
 
 def _refuse_restless(finger: Finger) -> None:
-    """Refuse a finger that is no single one, or has parts whose rest inputs alone do not say."""
+    """Refuse a hand, and a finger with parts whose rest the inputs alone do not determine."""
     description, tables = finger.description, finger.mechanism.rows
     driven = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
-    own = any(table.states for table in finger.constructor_args.rows)
+    stateful = any(table.states for table in finger.constructor_args.rows)
     free = finger.layout.names_of("object_pose")
     refused = {
         "several fingers": description.hand is not None,
         f"actuators ({', '.join(description.actuators)})": driven and bool(description.actuators),
         "drives of its own": driven and not description.actuators,
         f"free objects ({', '.join(free)})": bool(free),
-        "rows with states": own,
+        "rows with states": stateful,
     }
-    found = ", ".join(what for what, there in refused.items() if there)
-    if found:
+    unsupported = ", ".join(what for what, there in refused.items() if there)
+    if unsupported:
         allowed = "must be one finger with ideal sources of tension, without free objects"
-        raise InputError("finger", f"{allowed}; it has {found}")
-    for name, each in description.tree.actuators.items():
-        if each.integrates or each.integral:
+        raise InputError("finger", f"{allowed}; it has {unsupported}")
+    for name, actuator in description.tree.actuators.items():
+        if actuator.integrates or actuator.integral:
             raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")
 
 
-def _given_by_actuators(found: FingerSignals) -> float:
+def _work_of_actuators(signals: FingerSignals) -> float:
     """Return the work of a tree's actuators along their lengths, J: the integral of a force that limits cut."""
     total = 0.0
     for group in (STATELESS, STATEFUL, WINCHES):
-        if group not in found.mechanism.rows:
+        if group not in signals.mechanism.rows:
             continue
-        rows = found.mechanism.rows[group]
+        rows = signals.mechanism.rows[group]
         by_length, least, most = rows.rows.parameters[[2, 6, 7]]
         wanted = rows["wanted"]
         cut = np.clip(wanted, least, most)
@@ -203,8 +203,8 @@ def _given_by_actuators(found: FingerSignals) -> float:
         affine = np.where(wanted == cut, 0.5 * wanted**2, cut * wanted - 0.5 * cut**2)
         flat = by_length == 0.0
         total += float(np.sum(np.where(flat, cut * rows.row.length, affine / np.where(flat, 1.0, by_length))))
-    if MUSCLES in found.mechanism.rows:
-        rows = found.mechanism.rows[MUSCLES]
+    if MUSCLES in signals.mechanism.rows:
+        rows = signals.mechanism.rows[MUSCLES]
         total += float(np.sum(active_work(rows.row.length, rows.row.state, rows.rows.parameters)))
     return total
 
@@ -230,8 +230,8 @@ def _downhill(
         return np.transpose([of(y + each) - of(y - each) for each in shifts]) / (2.0 * _SHIFT)
 
     def curvature(y: Array) -> Array:
-        found = by_place(slope, y)
-        return 0.5 * (found + found.T) + _TETHER * np.eye(len(y))
+        hessian = by_place(slope, y)
+        return 0.5 * (hessian + hessian.T) + _TETHER * np.eye(len(y))
 
     enough = _ARRIVED * float(np.max(np.abs(slope(start))))
     radii = {"initial_trust_radius": 0.5 * _LONGEST_STEP, "max_trust_radius": _LONGEST_STEP}

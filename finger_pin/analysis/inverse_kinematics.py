@@ -23,7 +23,7 @@ _THERE = 1e-6
 # Weight of a posture near the wanted one against the distance, m/rad: it decides between postures that all reach.
 _NEAR = 1e-9
 # Weight of couplings and loops against the distance, m/rad, and steps that bring the posture found onto them.
-_HELD, _LAST_STEPS = 1e3, 3
+_CONSTRAINT_WEIGHT, _LAST_STEPS = 1e3, 3
 # Shares of the joints' ranges from which a search begins, and most of their combinations.
 _STARTS, _MOST = (0.1, 0.5, 0.9), 27
 
@@ -48,7 +48,7 @@ class TipPosture(BriefRepr):
         return self.distance < _THERE
 
 
-def _held(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
+def _constraints(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
     """Return a function of theta: by how much couplings and loops are missed, shape (k,), and its slopes, (k, n)."""
     joints = len(finger.routing.joints)
     tables = [table for table in finger.mechanism.rows if table.group in ("coupling", "loop")]
@@ -59,8 +59,8 @@ def _held(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
     rest = np.concatenate([table.parameters[table.law.parameters.index("rest")] for table in tables])
 
     def missed(theta: Array) -> tuple[Array, Array]:
-        found = path_kinematics(finger.rigid_body, theta, paths, joints)
-        return arm @ theta + found.length - rest, arm + found.arm
+        kinematics = path_kinematics(finger.rigid_body, theta, paths, joints)
+        return arm @ theta + kinematics.length - rest, arm + kinematics.arm
 
     return missed
 
@@ -91,50 +91,52 @@ def inverse_kinematics(
     coupling = PassiveCoupling.inextensible(finger.routing)
     free = coupling.free
     followers, moved = list(coupling.followers), coupling.matrix[:, free]
-    body, held = finger.rigid_body, _held(finger)
+    body, constraints = finger.rigid_body, _constraints(finger)
 
     def misses(angles: Array) -> Array:
         theta = moved @ angles
         # A driven joint has a range as well: what is beyond it counts as if the tip were as far away, m/rad.
         beyond = np.maximum(0.0, low - theta)[followers] + np.maximum(0.0, theta - high)[followers]
-        off = _HELD * held(theta)[0]
+        off = _CONSTRAINT_WEIGHT * constraints(theta)[0]
         return np.concatenate([body.tip_position(theta) - target, beyond, off, _NEAR * (theta - wanted)])
 
     def slopes(angles: Array) -> Array:
         theta = moved @ angles
         side = (theta > high).astype(float) - (theta < low)
-        off = _HELD * held(theta)[1] @ moved
+        off = _CONSTRAINT_WEIGHT * constraints(theta)[1] @ moved
         return np.concatenate([body.jacobian(theta) @ moved, (side[:, None] * moved)[followers], off, _NEAR * moved])
 
     span = high[free] - low[free]
     starts = [np.clip(wanted[free], low[free], high[free])]
     starts += [low[free] + np.array(shares) * span for shares in list(product(_STARTS, repeat=len(free)))[:_MOST]]
-    found: list[tuple[float, Array]] = []
+    solutions: list[tuple[float, Array]] = []
     for start in starts:
         # Strictly inside, as bounded least squares want it.
         inside = np.clip(start, low[free] + 1e-6 * span, high[free] - 1e-6 * span)
         best = scipy.optimize.least_squares(
             misses, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15
         )
-        found.append((float(best.cost), moved @ best.x))
+        solutions.append((float(best.cost), moved @ best.x))
         near_enough = np.linalg.norm(misses(best.x)[: 3 + len(followers)]) < 0.01 * _THERE
-        if near_enough and np.linalg.norm(held(moved @ best.x)[0]) < 0.01 * _THERE:
+        if near_enough and np.linalg.norm(constraints(moved @ best.x)[0]) < 0.01 * _THERE:
             break
-    theta = _onto_couplings(min(found, key=lambda each: each[0])[1], held, low, high)
+    theta = _onto_couplings(min(solutions, key=lambda solution: solution[0])[1], constraints, low, high)
     tip = np.asarray(body.tip_position(theta))
     return TipPosture(theta, tip, float(np.linalg.norm(tip - target)))
 
 
-def _onto_couplings(theta: Array, held: Callable[[Array], tuple[Array, Array]], low: Array, high: Array) -> Array:
+def _onto_couplings(
+    theta: Array, constraints: Callable[[Array], tuple[Array, Array]], low: Array, high: Array
+) -> Array:
     """Return the posture within the ranges that keeps to a tree's couplings and loops, next to one that nearly does.
 
     Raises:
         InputError: If there is none.
     """
     for _ in range(_LAST_STEPS):
-        off, by_theta = held(theta)
+        off, by_theta = constraints(theta)
         if off.size:
             theta = np.clip(theta - np.linalg.pinv(by_theta) @ off, low, high)
-    if held(theta)[0].size and np.linalg.norm(held(theta)[0]) > _THERE:
+    if constraints(theta)[0].size and np.linalg.norm(constraints(theta)[0]) > _THERE:
         raise InputError("finger.tree", "no posture within the joints' ranges keeps to its couplings and loops")
     return theta

@@ -99,8 +99,8 @@ def linearise(
 
     # The map is smooth on its steps, but curved where a kink is on the way: there steps are small.
     part = 1.0 if dt is None else _OF_MAPS
-    by_state = _slopes(lambda each: both(finger, each, u), x, part * _OF_STATES * finger.layout.scales())
-    by_input = _slopes(lambda each: both(finger, x, each), u, np.full(len(u), part * _OF_INPUTS))
+    by_state = _slopes(lambda varied: both(finger, varied, u), x, part * _OF_STATES * finger.layout.scales())
+    by_input = _slopes(lambda varied: both(finger, x, varied), u, np.full(len(u), part * _OF_INPUTS))
     by_parameter = np.zeros((len(by_state[0]), 0)), np.zeros(0, int)
     if parameters:
         assert scenario is not None
@@ -111,7 +111,7 @@ def linearise(
         values = np.array(family.values, dtype=float)
         sizes = part * _OF_PARAMETERS * np.where(values == 0.0, 1.0, np.abs(values))
         by_parameter = _slopes(
-            lambda each: both(_built(family.with_values(each.tolist())), x, u), values, sizes, least=values == 0.0
+            lambda varied: both(_built(family.with_values(varied.tolist())), x, u), values, sizes, least=values == 0.0
         )
     return _dataset(finger, both(finger, x, u), (by_state, by_input, by_parameter), list(parameters), dt)
 
@@ -149,14 +149,14 @@ def _slope(line: Callable[[Array], Array], value: Array, step: float) -> tuple[A
         central = _CENTRAL @ values / h
         above, below = [weights @ values[3:] / h for weights in _FORWARD], [-w @ values[3::-1] / h for w in _FORWARD]
 
-        def alike(first: Array, second: Array, h: float = h) -> bool:
+        def agree(first: Array, second: Array, h: float = h) -> bool:
             tolerance = _APART * np.maximum(abs(first), abs(second)) + _ROUNDING * np.max(abs(value)) / h
             return bool((abs(first - second) <= tolerance).all())
 
         centrals.append(central)
-        if alike(above[0], below[0]):
+        if agree(above[0], below[0]):
             return central, 0
-        if (side := alike(*above) - alike(*below)) != 0:
+        if (side := agree(*above) - agree(*below)) != 0:
             return (above if side > 0 else below)[0], side
     return centrals[0], 0
 
@@ -175,10 +175,10 @@ def _over(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
         stepper.hold(inputs)
         if ends is not None:
             stepper.repeat([Steps.whole(each) for each in ends])
-        found = integrate_compiled(stepper, dt, other.layout.names)
-        if found.failure:
-            raise InputError("state", f"cannot be integrated over dt: {found.failure}")
-        return stepper.x, [each.ends for each in found.steps]
+        trajectory = integrate_compiled(stepper, dt, other.layout.names)
+        if trajectory.failure:
+            raise InputError("state", f"cannot be integrated over dt: {trajectory.failure}")
+        return stepper.x, [each.ends for each in trajectory.steps]
 
     # At rest nothing moves, and one step would do: those of a motion nearby follow what a change sets off.
     ends = stepped(finger, x + _NEARBY * finger.layout.scales(), u, None)[1]
@@ -187,13 +187,13 @@ def _over(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
 
 def _outputs(finger: Finger, x: Array, u: Array) -> Array:
     compiled = CompiledFinger(finger)
-    found = compiled.evaluate(x, u)
-    state = found.state
-    routing, strands = finger.routing, found.tendons.strands
+    signals = compiled.evaluate(x, u)
+    state = signals.state
+    routing, strands = finger.routing, signals.tendons.strands
     # Of a passive tendon, the distal half.
     tension = np.concatenate([strands[: routing.actuated], strands[routing.actuated + 1 :: 2]])
     tip = np.ravel(compiled.motion(state.position, state.velocity).tip)
-    current = found.motors.current if found.motors is not None else np.zeros(0)
+    current = signals.motors.current if signals.motors is not None else np.zeros(0)
     return np.concatenate([state.position, state.velocity, tension, tip, current])
 
 

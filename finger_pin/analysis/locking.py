@@ -74,15 +74,15 @@ def critical_friction(
     elif velocity is None:
         signs, sliding = directions_of_motion(tendons, moving)
     else:
-        given = np.where(moving, finite_vector("velocity", velocity, size), 0.0)
-        signs, sliding = np.sign(given)[None], np.sign(sliding_velocity(tendons, given))[None]
+        moving_velocity = np.where(moving, finite_vector("velocity", velocity, size), 0.0)
+        signs, sliding = np.sign(moving_velocity)[None], np.sign(sliding_velocity(tendons, moving_velocity))[None]
     if position is None:
         theta, sliding = np.zeros(size), np.zeros_like(sliding)
     else:
         theta = finite_vector("position", position, size)
     stiffness = None if gain is None else finite_vector("gain", expand(gain, size), size)
     cases = np.broadcast_to(theta, (len(signs), size))
-    kappa, torque, command = FrictionLoop.of(tendons, stiffness).critical(cases, signs, sliding)
+    kappa, torque, command = FrictionLoop.from_tendons(tendons, stiffness).critical(cases, signs, sliding)
     worst = int(np.argmin(kappa))
     return CriticalFriction(
         coefficient=float(kappa[worst]),

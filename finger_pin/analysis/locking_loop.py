@@ -78,7 +78,7 @@ class FrictionLoop:
     gears: Array
 
     @classmethod
-    def of(cls, tendons: Tendons, gain: Array | None, gears: Array | None = None) -> FrictionLoop:
+    def from_tendons(cls, tendons: Tendons, gain: Array | None, gears: Array | None = None) -> FrictionLoop:
         """Build the loop.
 
         Args:
@@ -149,11 +149,11 @@ class FrictionLoop:
                     mean = np.einsum("cj,mcej->mce", self.passive[:, index], rays)
                     slack = _INSIDE * np.max(np.abs(self.passive[:, index]))
                     inside &= (mean >= -slack) if is_taut else (mean <= slack)
-                found = np.where(inside, 1.0 / np.where(real, values.real, 1.0), np.inf).reshape(size, -1)
-                best = np.argmin(found, axis=1)
+                coefficients = np.where(inside, 1.0 / np.where(real, values.real, 1.0), np.inf).reshape(size, -1)
+                best = np.argmin(coefficients, axis=1)
                 case = np.arange(size)
-                better = found[case, best] < worst
-                worst[better] = found[case, best][better]
+                better = coefficients[case, best] < worst
+                worst[better] = coefficients[case, best][better]
                 cell = best // rays.shape[2]
                 ray = rays.reshape(size, -1, rays.shape[3])[case, best]
                 ray = ray / np.max(np.abs(ray), axis=1, keepdims=True)
@@ -237,8 +237,10 @@ class FrictionLoop:
         """
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
         count, size = len(self.internal), len(position)
-        cases, own = (size, count), np.where(np.arange(count) < actuated, 0.0, sliding[0])
-        shares, drags = (of(position, np.broadcast_to(own, cases))[..., 0] for of in (self._shares, self._drags))
+        cases, passive_sliding = (size, count), np.where(np.arange(count) < actuated, 0.0, sliding[0])
+        shares, drags = (
+            of(position, np.broadcast_to(passive_sliding, cases))[..., 0] for of in (self._shares, self._drags)
+        )
         arms = routing.strand_coupling.T - weights[:, None] * routing.loads
         balance = arms @ (shares[:, :, None] * routing.strand_tension(np.eye(count)).T)
         needed = weight + drags @ arms.T
@@ -246,7 +248,7 @@ class FrictionLoop:
         kernel = axes[:, -1] * np.sign(axes[:, -1].sum(axis=1, keepdims=True))
         base = np.einsum("mit,mi->mt", axes[:, :-1], np.einsum("mji,mj->mi", turned, needed) / lengths)
         moves = np.all(kernel > _INSIDE * np.max(kernel, axis=1, keepdims=True), axis=1)
-        found = np.where(moves, 0.0, np.inf)
+        largest = np.where(moves, 0.0, np.inf)
         kernel, base, at = kernel[moves], base[moves], position[moves]
         share, drag = np.ones_like(base), np.zeros_like(base)
         for way in sliding if moves.any() else ():
@@ -257,8 +259,8 @@ class FrictionLoop:
             least = np.max((np.maximum(minimum * share - drag, 0.0) - base) / kernel, axis=1, keepdims=True)
             delivered = base + least * kernel
             command = np.where(delivered > _INSIDE * delivered.max(), (delivered + drag) / share, minimum)
-            found[moves] = np.maximum(found[moves], command[:, :actuated].max(axis=1))
-        return found
+            largest[moves] = np.maximum(largest[moves], command[:, :actuated].max(axis=1))
+        return largest
 
     def _of_joints(self, strands: Array) -> tuple[Array, Array]:
         """Return joint torques and pin loads, (m, n) each, of tensions of the strands at every joint, (m, s, n)."""

@@ -106,7 +106,7 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
     routing, (count, size) = finger.routing, positions.shape
     signs, sliding = directions_of_motion(finger.tendons, np.ones(size, dtype=bool))
     weight = np.array([finger.static_torque(theta) for theta in positions])
-    loop, pins = FrictionLoop.of(finger.tendons, None), finger.joint_friction
+    loop, pins = FrictionLoop.from_tendons(finger.tendons, None), finger.joint_friction
     static = pins.static
     coefficient, tension = np.full(count, np.inf), np.zeros(count)
     alone = len(routing.tendons) == size + 1 and not loop.tendons.several

@@ -75,7 +75,7 @@ def self_locking_margin(
     if len(parts) > 1:
         return min(
             (self_locking_margin(part, samples, most, servos=servos) for part in parts.values()),
-            key=lambda each: each.margin,
+            key=lambda candidate: candidate.margin,
         )
     scenario = next(iter(parts.values()))
     tendons = Tendons.from_description(scenario.finger)
@@ -93,7 +93,9 @@ def self_locking_margin(
     gain = expand(scenario.controller.gain, size)
     # Without gain there is no lag that would say what passive tendons carry: they count as planned.
     gears = gear_shares(scenario.finger) if servos else np.ones((2, routing.actuated))
-    loop = FrictionLoop.of(tendons, gain if np.all(gain > 0.0) else None, np.where(np.isfinite(gears), gears, 1.0))
+    loop = FrictionLoop.from_tendons(
+        tendons, gain if np.all(gain > 0.0) else None, np.where(np.isfinite(gears), gears, 1.0)
+    )
     if most is not None and len(chosen) > most:
         worst_first = np.argsort(-loop.growth(motion.position[chosen], weights, sliding), kind="stable")[:most]
         chosen, signs, sliding, weights = (each[worst_first] for each in (chosen, signs, sliding, weights))
@@ -138,8 +140,8 @@ def _within_reach(
     )
 
     def fits(scale: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:
-        case, held = scale[:, None] * weights[at], weight[at] + scale[:, None] * drag[at]
-        needed = loop.command_to_move(position[at], case, sliding[at], minimum, held)[:, :actuated]
+        case, load = scale[:, None] * weights[at], weight[at] + scale[:, None] * drag[at]
+        needed = loop.command_to_move(position[at], case, sliding[at], minimum, load)[:, :actuated]
         # What gears take is in the limit, and in the share of what is let out.
         return np.asarray(np.all(needed * loop.gears[0] <= limits, axis=1), dtype=bool)
 
@@ -171,8 +173,8 @@ def quick_margin(scenario: Scenario, reference: LoopReference | None = None) -> 
         parts = scenario.parts().values()
         for part in parts:
             most = max(1, _CASES // 2 ** len(part.finger.passive_names))
-            given = reference if len(parts) == 1 else None
-            margin = min(margin, self_locking_margin(part, most=most, reference=given).margin)
+            part_reference = reference if len(parts) == 1 else None
+            margin = min(margin, self_locking_margin(part, most=most, reference=part_reference).margin)
     return margin
 
 

@@ -20,16 +20,18 @@ def micro_damping_advice(finger: FingerDescription) -> str:
     ratio = expand(tendons.stiction_ratio, len(finger.tendons))
     coulomb = expand(joints.coulomb, len(finger.joints))
     static = expand(joints.stiction, len(finger.joints))
-    found = [
+    warnings = [
         _exceeded("tendon", finger.tendons, tendons.micro_damping, tendons.viscous, np.ones_like(ratio), ratio),
         _exceeded("joint", finger.joints, joints.micro_damping, joints.viscous, coulomb, static),
     ]
-    return "; ".join(filter(None, found))
+    return "; ".join(filter(None, warnings))
 
 
-def _exceeded(kind: str, names: Iterable[str], given: Numbers, viscous: Numbers, kinetic: Array, static: Array) -> str:
+def _exceeded(
+    kind: str, names: Iterable[str], micro_damping: Numbers, viscous: Numbers, kinetic: Array, static: Array
+) -> str:
     listed = list(names)
-    micro, b = expand(given, len(listed)), expand(viscous, len(listed))
+    micro, b = expand(micro_damping, len(listed)), expand(viscous, len(listed))
     most = passive_micro_damping(b, kinetic, static)
     wrong = [index for index in range(len(listed)) if micro[index] > most[index]]
     if not wrong:

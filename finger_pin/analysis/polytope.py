@@ -119,7 +119,7 @@ def force_polytope(
     if friction is Friction.HINDERING:
         raise InputError("friction", "must be none or helping; hindering friction has a direction", friction.value)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
-    statics = TipStatics.of(finger, theta, friction)
+    statics = TipStatics.from_finger(finger, theta, friction)
     left, values, _ = np.linalg.svd(statics.jacobian)
     basis = left[:, : int(np.sum(values > _RANK * np.max(values)))]
     if not basis.shape[1]:
@@ -129,12 +129,12 @@ def force_polytope(
 
     def extreme(direction: Array) -> Array:
         cost = np.concatenate([-direction, np.zeros(sum(statics.sizes))])
-        found = statics.solve(cost, extra, [*[(None, None)] * rank, *bounds], np.zeros(len(theta)))
-        if found.status == UNBOUNDED:
+        solution = statics.solve(cost, extra, [*[(None, None)] * rank, *bounds], np.zeros(len(theta)))
+        if solution.status == UNBOUNDED:
             raise InputError("finger.tendons", "the forces are unbounded: passive tendons alone balance some of them")
-        if found.status != 0:
+        if solution.status != 0:
             raise InputError("limit", "no tensions within the limits balance the finger's weight", bounds)
-        return np.asarray(found.x[:rank])
+        return np.asarray(solution.x[:rank])
 
     points, spanned = _spanning(rank, extreme)
     axes, thin = basis @ spanned.T, basis @ _complement(spanned).T

@@ -56,7 +56,7 @@ class SpringReturn(BriefRepr):
 
     @property
     def margin(self) -> float:
-        """Factor by which springs exceed what resists the return, at the worst joint and posture."""
+        """Factor by which springs exceed the resistance to the return, at the worst joint and posture."""
         return float(self.margins.min())
 
     @property
@@ -116,7 +116,7 @@ def spring_return(finger: FingerLike, cord: str | None = None) -> SpringReturn:
 
 
 def _index(finger: Finger, cord: str | None) -> int:
-    """Return the index of a cord, and refuse what other tendons than the finger's own decide."""
+    """Return the index of a cord; refuse fingers with passive tendons or tendons of a tree."""
     routing = finger.routing
     names = routing.tendons[: routing.actuated]
     if routing.passive or finger.description.canals:
@@ -129,7 +129,7 @@ def _index(finger: Finger, cord: str | None) -> int:
 
 
 def _cord(finger: Finger, positions: Array, index: int, crossed: Indices, side: float) -> tuple[Array, Array]:
-    """Return the share of the tension that arrives at joints, and what drag takes besides, shape (m, k) each."""
+    """Return the share of the tension that arrives at joints, and the tension lost to drag, shape (m, k) each."""
     ways = np.zeros((len(positions), len(finger.routing.tendons)))
     ways[:, index] = side
     share, lost = finger.tendons.in_sliding(positions, ways)
@@ -143,6 +143,6 @@ def _postures(finger: Finger, crossed: Indices, way: Array) -> Array:
     travel = np.where(way > 0.0, limiter.upper, limiter.lower) - rest
     count = int(np.clip(_POSTURES ** (1.0 / len(crossed)), _FEWEST, _MOST))
     shares = np.array(list(product(np.arange(1, count + 1) / count, repeat=len(crossed))))
-    found = np.repeat(rest[None], len(shares), axis=0)
-    found[:, crossed] += shares * travel[crossed]
-    return found
+    postures = np.repeat(rest[None], len(shares), axis=0)
+    postures[:, crossed] += shares * travel[crossed]
+    return postures

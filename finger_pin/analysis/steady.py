@@ -63,12 +63,14 @@ def steady_state(
     coefficient = friction_coefficient(v, kinetic, ratio * kinetic, stribeck, exponent)
     tension = sliding_tension(command, coefficient, v, viscous, drag, floor)
     for k, places in tendons.several.items():
-        own = np.asarray(command, dtype=float)[:, k]
+        strand_tension = np.asarray(command, dtype=float)[:, k]
         for bends, offset, _ in places:
             kinetic = capstan_coefficient(tendons.surface[k], np.abs(posture) @ bends + offset)
             coefficient = friction_coefficient(v[:, 0], kinetic, ratio[k] * kinetic, stribeck[k], exponent[k])
-            own = sliding_tension(own, coefficient, v[:, 0], viscous[k] / len(places), drag[k] / len(places), floor[k])
-        tension[:, k] = own
+            strand_tension = sliding_tension(
+                strand_tension, coefficient, v[:, 0], viscous[k] / len(places), drag[k] / len(places), floor[k]
+            )
+        tension[:, k] = strand_tension
     if at_rest:
         tension = np.where(tension > 0.0, np.maximum(0.0, tension + viscous * v), tension)
     return SteadyState(tension, command - tension, _current(actuators, command, v, at_rest))

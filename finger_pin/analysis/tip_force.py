@@ -83,15 +83,15 @@ def largest_force(
 
 def _most(finger: Finger, theta: Array, along: Array, friction: Friction, slip: Slip | None, bounds: Any) -> float:
     """Return the largest force along a direction for one pattern of slip, N; minus infinity if there is none."""
-    statics = TipStatics.of(finger, theta, friction, slip)
+    statics = TipStatics.from_finger(finger, theta, friction, slip)
     extra = (statics.jacobian.T @ along)[:, None]
     if slip is not None:
         extra = extra + (slip.joints * finger.joint_friction.kinetic)[:, None]
     cost = np.append(-1.0, np.zeros(sum(statics.sizes)))
-    found = statics.solve(cost, extra, [(None, None), *bounds], np.zeros(len(theta)))
-    if found.status == INFEASIBLE:
+    solution = statics.solve(cost, extra, [(None, None), *bounds], np.zeros(len(theta)))
+    if solution.status == INFEASIBLE:
         return -np.inf
-    return np.inf if found.status == UNBOUNDED else float(found.x[0])
+    return np.inf if solution.status == UNBOUNDED else float(solution.x[0])
 
 
 def tension_for_force(
@@ -120,18 +120,18 @@ def tension_for_force(
     jacobian = finger.rigid_body.jacobian(theta)
     needed: list[RequiredTension] = []
     for ways in slips(finger, jacobian, wanted, friction):
-        found = [each for slip in ways if (each := _least(finger, theta, wanted, friction, slip, bounds))]
-        if not found:
+        candidates = [required for slip in ways if (required := _least(finger, theta, wanted, friction, slip, bounds))]
+        if not candidates:
             raise InputError("force", "no tensions, however large, exert it", wanted.tolist())
-        needed.append(min(found, key=lambda each: each.largest))
-    return max(needed, key=lambda each: each.largest)
+        needed.append(min(candidates, key=lambda required: required.largest))
+    return max(needed, key=lambda required: required.largest)
 
 
 def _least(
     finger: Finger, theta: Array, wanted: Array, friction: Friction, slip: Slip | None, bounds: Any
 ) -> RequiredTension | None:
     """Return the tensions with the least maximum for one pattern of slip, or None."""
-    statics = TipStatics.of(finger, theta, friction, slip)
+    statics = TipStatics.from_finger(finger, theta, friction, slip)
     demand = statics.jacobian.T @ wanted
     if slip is not None:
         demand = demand + slip.joints * finger.joint_friction.kinetic * np.linalg.norm(wanted)
@@ -139,15 +139,15 @@ def _least(
     cost, largest = np.append(1.0, np.zeros(a + s + n)), [(0.0, None)]
     # z is the largest command: an inequality for each.
     below_largest = np.hstack([-np.ones((a, 1)), np.eye(a)])
-    found = statics.solve(cost, np.zeros((n, 1)), [*largest, *bounds], demand, below_largest)
-    if found.status != 0:
+    solution = statics.solve(cost, np.zeros((n, 1)), [*largest, *bounds], demand, below_largest)
+    if solution.status != 0:
         return None
-    tensions, segments = found.x[1 + a : 1 + a + s], statics.segments
+    tensions, segments = solution.x[1 + a : 1 + a + s], statics.segments
     # A radius r of a strand enters its joint's row as r f: d(value) = -(multiplier) f dr.
-    by_segment = -np.asarray(found.eqlin.marginals)[:n, None] * tensions * (segments.loads > 0.0)
+    by_segment = -np.asarray(solution.eqlin.marginals)[:n, None] * tensions * (segments.loads > 0.0)
     by_radius = np.zeros((len(finger.routing.tendons), n))
     np.add.at(by_radius, segments.tendon, by_segment.T)
-    return RequiredTension(float(found.x[0]), found.x[1 : 1 + a], tensions[segments.strands], by_radius)
+    return RequiredTension(float(solution.x[0]), solution.x[1 : 1 + a], tensions[segments.strands], by_radius)
 
 
 def _unit(direction: Sequence[float] | Array) -> Array:

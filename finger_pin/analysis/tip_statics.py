@@ -103,7 +103,7 @@ class Segments:
     drag: Array
 
     @classmethod
-    def of(cls, tendons: Tendons, theta: Array) -> Segments:
+    def from_tendons(cls, tendons: Tendons, theta: Array) -> Segments:
         """Cut the strands at theta, shape (n,)."""
         routing, a = tendons.routing, tendons.routing.actuated
         whole, everywhere = routing.curvature(theta), np.ones(len(routing.joints), dtype=bool)
@@ -112,8 +112,8 @@ class Segments:
         # Of every place: tendon, near and far end, curvature, and the tendon's number of places.
         places: list[tuple[int, int, int, float, int]] = []
         for k in range(a):
-            own = tendons.several.get(k)
-            cuts = own or [(routing.curvature_matrix[k], routing.curvature_offset[k], everywhere)]
+            several = tendons.several.get(k)
+            cuts = several or [(routing.curvature_matrix[k], routing.curvature_offset[k], everywhere)]
             for number, (bends, offset, beyond) in enumerate(cuts):
                 after = cuts[number + 1][2] if number + 1 < len(cuts) else ~everywhere
                 here = a + len(tendon)
@@ -170,9 +170,9 @@ class TipStatics:
     sizes: tuple[int, int, int]
 
     @classmethod
-    def of(cls, finger: Finger, theta: Array, friction: Friction, slip: Slip | None = None) -> TipStatics:
+    def from_finger(cls, finger: Finger, theta: Array, friction: Friction, slip: Slip | None = None) -> TipStatics:
         """Collect the constraints; ``slip`` serves HINDERING alone."""
-        a, segments = finger.routing.actuated, Segments.of(finger.tendons, theta)
+        a, segments = finger.routing.actuated, Segments.from_tendons(finger.tendons, theta)
         s, n = segments.coupling.shape
         loss, drag = segments.loss[:, None], segments.drag[:, None]
         command, strand, joint, one = np.split(np.eye(a + s + n + 1), [a, a + s, a + s + n])

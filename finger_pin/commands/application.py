@@ -58,19 +58,19 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
     """Run a command line for one function, by default for any command; return the exit code."""
     _set_up_process()
     program = "finger-pin" if function is None else f"{function.__name__}.py"
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if function is None and given == ["--version"]:
+    command_line = list(sys.argv[1:] if arguments is None else arguments)
+    if function is None and command_line == ["--version"]:
         print_text(f"{program} {__version__}")
         return DONE
     app = typer.Typer(help="Tendon-driven robot fingers.", add_completion=function is None, rich_markup_mode=None)
-    for each in COMMANDS if function is None else (function,):
-        app.command(each.__name__.replace("_", "-"))(_with_exit_code(each, program))
+    for command in COMMANDS if function is None else (function,):
+        app.command(command.__name__.replace("_", "-"))(_with_exit_code(command, program))
     try:
         code = typer.main.get_command(app).main(
-            given if given or function else ["--help"], prog_name=program, standalone_mode=False
+            command_line if command_line or function else ["--help"], prog_name=program, standalone_mode=False
         )
     except typer.TyperException as error:
-        complain(program, _usage(error, given))
+        complain(program, _usage(error, command_line))
         return WRONG_INPUT
     return int(code or DONE)
 
@@ -113,14 +113,16 @@ def _with_exit_code(command: Callable[..., Any], program: str) -> Callable[..., 
     return coded
 
 
-def _usage(error: typer.TyperException, given: Sequence[str]) -> str:
+def _usage(error: typer.TyperException, command_line: Sequence[str]) -> str:
     """Return the message about a wrong command line: the option, its value and the allowed ones, or all options."""
     option, context = getattr(error, "option_name", None), getattr(error, "ctx", None)
     text = str(error.format_message()) if hasattr(error, "format_message") else str(error)
     if isinstance(error, typer.BadParameter) and error.param is not None:
         names = error.param.opts
-        values = [after for name, after in pairwise(given) if name in names]
-        values += [value for name, equals, value in (each.partition("=") for each in given) if equals and name in names]
+        values = [after for name, after in pairwise(command_line) if name in names]
+        values += [
+            value for name, equals, value in (each.partition("=") for each in command_line) if equals and name in names
+        ]
         return f"{names[0]} = {', '.join(values)}: {error.message.removeprefix('Value error, ').rstrip('.')}"
     if context is None or not text.startswith("No such option"):
         return text

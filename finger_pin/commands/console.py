@@ -14,7 +14,7 @@ from finger_pin.exceptions import FingerPinError, InputError
 
 
 class Unsuccessful(FingerPinError):
-    """Runs were made, and none of them serves."""
+    """No run of a study is usable."""
 
 
 @contextmanager

@@ -68,7 +68,7 @@ def force_capability(
     for name, figure in figures.items():
         save_figure(figure, output / name, format)
     lines = [f"Largest tension for a force of {np.linalg.norm(wish):g} N, N"]
-    lines += [f"  friction {friction.value:10} {found.largest:8.3f}" for friction, found in needed.items()]
+    lines += [f"  friction {friction.value:10} {required.largest:8.3f}" for friction, required in needed.items()]
     if limit == "servos":
         pulled = zip(built.routing.tendons, tension_limits(built), strict=False)
         lines += ["Greatest tension that motors can pull, N", *(f"  {name:19} {each:8.3f}" for name, each in pulled)]

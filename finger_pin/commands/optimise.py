@@ -85,8 +85,8 @@ def optimise(
     if no_constraints and constraint:
         raise wrong("--no-constraints", "contradicts --constraint")
     refuse_format(figures, format)
-    given = {"population": population, "generations": generations, "seed": seed}
-    effort = {name: value for name, value in given.items() if value is not None}
+    search_options = {"population": population, "generations": generations, "seed": seed}
+    effort = {name: value for name, value in search_options.items() if value is not None}
     changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.studies import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
     from finger_pin.studies.keys import BaseScenario

@@ -62,18 +62,18 @@ def overrides(settings: list[str], **short: str | None) -> dict[str, Any]:
     Raises:
         TyperException: If a text is none, or an entry is set twice.
     """
-    found = {}
+    entries = {}
     for text in settings:
         key, equals, value = text.partition("=")
         if not equals or not key.strip():
             raise wrong("--set", f"{text}: must be KEY=VALUE, such as controller.gain=2")
-        if key.strip() in found:
+        if key.strip() in entries:
             raise wrong("--set", f"{text}: an earlier one sets the same entry")
-        found[key.strip()] = _value(key.strip(), value)
-    given = {f"simulation.{name}": text for name, text in short.items() if text is not None}
-    if twice := [key for key in given if key in found]:
+        entries[key.strip()] = _value(key.strip(), value)
+    short_entries = {f"simulation.{name}": text for name, text in short.items() if text is not None}
+    if twice := [key for key in short_entries if key in entries]:
         raise wrong("--set", f"{twice[0]}: --{twice[0].rpartition('.')[2]} sets the same entry")
-    return found | {key: _value(key, text) for key, text in given.items()}
+    return entries | {key: _value(key, text) for key, text in short_entries.items()}
 
 
 def _value(key: str, text: str) -> Any:
@@ -148,10 +148,10 @@ def folder_name(name: str, *variants: str) -> str:
         variants: Such as ``controller.gain=2``. What a shell would want to have quoted is replaced; what is
             too long, or lost that way, is told apart by a digest.
     """
-    told = [re.sub(r"[\s\[\]{}\"']", "", each) for each in variants]
-    words = [_OUTER.sub("", each).replace("=", "-").replace(":", "to").replace(",", "_") for each in told]
+    unquoted = [re.sub(r"[\s\[\]{}\"']", "", each) for each in variants]
+    words = [_OUTER.sub("", each).replace("=", "-").replace(":", "to").replace(",", "_") for each in unquoted]
     text = "-".join([name, *words])
     plain = re.sub(r"[^\w.+-]+", "_", text, flags=re.ASCII)
     if plain == text and len(text) <= _LONGEST:
         return text
-    return f"{plain[:_LONGEST]}-{hashlib.sha256(','.join(told).encode(errors='surrogateescape')).hexdigest()[:6]}"
+    return f"{plain[:_LONGEST]}-{hashlib.sha256(','.join(unquoted).encode(errors='surrogateescape')).hexdigest()[:6]}"

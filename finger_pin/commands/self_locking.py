@@ -40,16 +40,16 @@ def self_locking(
     finger = loaded.finger
     sprung = finger.hand is None and any(joint.spring for joint in finger.joints.values())
     if sprung and not fp.Finger(finger).routing.force_closure().holds:
-        if given := [name for name, each in (("--output", output), ("--format", format)) if each is not None]:
-            raise wrong(given[0], "has no effect: of a finger that springs return nothing is drawn")
+        if unused := [name for name, each in (("--output", output), ("--format", format)) if each is not None]:
+            raise wrong(unused[0], "has no effect: of a finger that springs return nothing is drawn")
         print_text(summarize_return(fp.analysis.spring_return(finger)))
         return
     output = output or Path("results/self_locking")
     margin = self_locking_margin(loaded)
-    found = self_locking_map(fp.Finger(finger))
-    text = summarize_locking(loaded, found)
+    locking_map = self_locking_map(fp.Finger(finger))
+    text = summarize_locking(loaded, locking_map)
     output.mkdir(parents=True, exist_ok=True)
-    figures = {"critical_friction": plot_critical_friction(finger), "map": plot_self_locking_map(found)}
+    figures = {"critical_friction": plot_critical_friction(finger), "map": plot_self_locking_map(locking_map)}
     if np.isfinite(margin.margin):
         with warnings.catch_warnings():
             # Runs on both sides are the point.

@@ -152,8 +152,8 @@ def compute(
         if not check:
             return whole, None
         try:
-            found = check_convergence(scenario, whole, progress=progress, stop=token)
-            return found.attach(whole), None
+            convergence = check_convergence(scenario, whole, progress=progress, stop=token)
+            return convergence.attach(whole), None
         except IntegrationError as error:
             complain("simulate", f"convergence could not be checked: {error}")
         except Interrupted as error:

@@ -142,15 +142,15 @@ def build_design(kind: str, over: list[str], samples: int | None, seed: int) -> 
     from finger_pin.studies.parsing import parse_range, parse_values
 
     parse_one: Any = parse_range if kind == "latin" else parse_values
-    given: dict[str, Any] = {}
+    axes: dict[str, Any] = {}
     for text in over:
         key, values = parse_one(text)
-        if key in given:
+        if key in axes:
             raise InputError("over", "a key must not come twice", text)
-        given[key] = values
+        axes[key] = values
     if kind == "latin":
-        return LatinHypercube(given, samples or 0, seed)
-    return PointList(given) if kind == "list" else Grid(given)
+        return LatinHypercube(axes, samples or 0, seed)
+    return PointList(axes) if kind == "list" else Grid(axes)
 
 
 def summary(result: xr.Dataset) -> str:

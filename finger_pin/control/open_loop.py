@@ -110,7 +110,7 @@ class OpenLoopTensions(LoopController):
     @classmethod
     def joined(cls, controllers: Sequence[OpenLoopTensions], routing: Routing) -> OpenLoopTensions:
         """Return the schedule of a hand from those of its fingers."""
-        return cls(Signal.joined([each.signal for each in controllers]), routing)
+        return cls(Signal.from_signals([each.signal for each in controllers]), routing)
 
 
 @lru_cache

@@ -81,7 +81,7 @@ class Checkpoint:
             write_text(self._path, json.dumps({"asked": self._asked, "done": self._done}))
 
     def fit(self, name: str, problem: Problem, work: Callable[[], Fit]) -> Fit:
-        """Return a minimum, or the one found before."""
+        """Return a minimum, or the stored one."""
         if name in self._done:
             z: Array = np.array(self._done[name])
             return fit(problem, z, fixed=dict(enumerate(z)))

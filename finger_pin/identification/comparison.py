@@ -45,7 +45,7 @@ class LawComparison:
     estimate: list[dict[str, float]]
 
     def plain(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the comparison as plain lists, for JSON."""
         return asdict(self)
 
     @classmethod
@@ -55,7 +55,7 @@ class LawComparison:
 
 
 def compare_laws(problem: Problem, settings: IdentifySettings, minimum: Fit) -> LawComparison:
-    """Return the scenario's law and the alternatives.
+    """Compare the scenario's law with the alternatives.
 
     Args:
         problem: Under the scenario's law.
@@ -84,7 +84,7 @@ def other_laws(problem: Problem, settings: IdentifySettings) -> dict[str, Proble
 
 
 def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
-    """Return the problem under another law: some keys held, some with bounds of their own."""
+    """Return the problem under another law: some keys fixed, some with other bounds."""
     bounds = {key: (float(a), float(b)) for key, a, b in zip(*_asked(problem), strict=True)}
     fixed: dict[str, float] = {}
     for key, value in law.items():
@@ -138,11 +138,11 @@ def _folds(problem: Problem) -> list[list[NDArray[np.bool_]]]:
     return [[group == part for group in groups] for part in range(int(max(g.max() for g in groups)) + 1)]
 
 
-def _held_out(law: Problem, best: Fit, minimum: Fit, folds: Sequence[Sequence[NDArray[np.bool_]]]) -> float:
+def _held_out(law: Problem, best: Fit, reference: Fit, folds: Sequence[Sequence[NDArray[np.bool_]]]) -> float:
     squares, count = 0.0, 0
     for fold in folds if len(folds) > 1 else []:
         z = fit(law.subset([~each for each in fold]), best.z).z
-        for e, mask, noise in zip(law.residuals(z), fold, minimum.noise, strict=True):
+        for e, mask, noise in zip(law.residuals(z), fold, reference.noise, strict=True):
             squares, count = squares + float(np.sum((e[mask] / noise) ** 2)), count + int(mask.sum())
     return math.sqrt(squares / count) if count else math.nan
 

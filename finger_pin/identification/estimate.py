@@ -47,7 +47,7 @@ class Fit:
     Attributes:
         z: Search variables, shape (p,).
         residuals: Of every signal.
-        noise: rms of the residuals of every signal, shape (s,); where outliers count less, what the median tells.
+        noise: rms of the residuals of every signal, shape (s,); where outliers count less, that of their median.
         correlation: Of neighbouring residuals, shape (s,).
         weights: Part of the samples that are independent, (1 - rho) / (1 + rho), shape (s,) (Bartlett).
         objective: Sum of w n log(SSE / n), outliers as they count.
@@ -168,7 +168,7 @@ def _descend(
 
 
 def _least_gain(problem: Problem) -> float:
-    """Return the gain of minus twice the log-likelihood that is not worth a step."""
+    """Return the gain of minus twice the log-likelihood below which no step is made."""
     if not problem.moves:
         return _GAIN_CLOSED
     return _GAIN_FINE if problem.finely else _GAIN_ROUGH if problem.means else _GAIN

@@ -151,7 +151,7 @@ def _work(
 
 
 def _undamped(scenario: Scenario, problem: Problem) -> list[str]:
-    """Return the joints that nothing damps in motions: where friction holds them they ring, in ten times the steps."""
+    """Return the undamped joints in motions: where friction holds them they ring, in ten times the steps."""
     finger, joints = scenario.finger, list(scenario.finger.joints)
     friction = finger.joint_friction
     damped = np.add(expand(friction.viscous, len(joints)), expand(friction.micro_damping, len(joints)))

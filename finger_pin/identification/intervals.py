@@ -57,7 +57,7 @@ def information_of_bounds(problem: Problem, minimum: Fit) -> Array:
 
 
 def _directions(problem: Problem, minimum: Fit) -> tuple[Array, Array, Array]:
-    """Return the information of principal directions, these, and products of the ranges that they are scaled by."""
+    """Return eigenvalues and eigenvectors of the scaled information, and the products of ranges that scale it."""
     width = np.subtract(*reversed(problem.box))
     size = np.outer(width, width)
     return *np.linalg.eigh(information(problem, minimum) * size), size
@@ -173,14 +173,14 @@ def free_directions(problem: Problem, minimum: Fit) -> list[tuple[str, list[int]
     low, high = problem.box
     width = high - low
     values, vectors = np.linalg.eigh(information(problem, minimum) * np.outer(width, width))
-    found_free = []
+    directions = []
     for value, vector in zip(values, vectors.T, strict=True):
         if 1.0 / math.sqrt(max(value, 1e-300)) >= _FREE_DEVIATION:
             direction = vector * width
             size = np.abs(direction) / np.max(np.abs(direction))
             shown = [k for k in range(len(size)) if size[k] > _SMALL_ENTRY]
-            found_free.append((_in_words(problem, direction, shown), shown))
-    return found_free
+            directions.append((_in_words(problem, direction, shown), shown))
+    return directions
 
 
 def _in_words(problem: Problem, direction: Array, shown: list[int]) -> str:

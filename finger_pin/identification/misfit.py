@@ -79,7 +79,7 @@ def sandwich(problem: Problem, minimum: Fit, spread: Array) -> Array:
 
 
 def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:
-    """Return residuals over the deviation that their median tells, by signal; zero of those that are no outliers.
+    """Return residuals over the deviation of their median, by signal; zero for all but outliers.
 
     An outlier is less probable than chance among so many, and alone outweighs all others as they mostly are.
     """

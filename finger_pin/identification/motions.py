@@ -80,7 +80,7 @@ class RecordedMotion:
         self._factor = 1.0
 
     def doubt(self, sought: Collection[str]) -> str:
-        """Return a sentence on a start far from where the recording begins, unless its columns' zeros are sought."""
+        """Return a warning about a start far from where the recording begins, unless its columns' zeros are sought."""
         starts = {} if self.recording.settings.start != "rest" else self._starts
         prefix = f"recordings.{self.recording.name}."
         starts = {joint: each for joint, each in starts.items() if f"{prefix}{each.column}.offset" not in sought}
@@ -172,7 +172,7 @@ class RecordedMotion:
     def _setup(self, scenario: Scenario, nuisance: Mapping[str, float]) -> Setup:
         moved = self._with_nuisance(scenario, nuisance)
         finger = None if self._finger is None else with_parameters_of(self._finger, self.scenario, moved)
-        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=finger))
+        return Setup.from_scenario(moved, ClosedLoop.from_scenario(moved, finger=finger))
 
     def _made(
         self, scenario: Scenario, nuisance: Mapping[str, float], factor: float
@@ -189,7 +189,7 @@ class RecordedMotion:
         return self._outputs(setup, trajectory, nuisance), (setup, trajectory)
 
     def _outputs(self, setup: Setup, trajectory: Trajectory, nuisance: Mapping[str, float]) -> list[Array]:
-        """Return the outputs at the recorded times, with their own offsets, scales and delays."""
+        """Return the outputs at the recorded times, with their offsets, scales and delays."""
         name, settings, outputs = self.recording.name, self.recording.settings.outputs, []
         delays = {key: each.delay + nuisance_value(nuisance, name, key, "delay") for key, each in settings.items()}
         by_delay = {delay: self._at_delay(setup, trajectory, delay, delays) for delay in dict.fromkeys(delays.values())}
@@ -202,7 +202,7 @@ class RecordedMotion:
         return outputs
 
     def _at_delay(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> RunArrays:
-        """Return the variables of the outputs with a delay, at the instants that they are of."""
+        """Return the variables of the outputs with a delay, at the instants before it."""
         names = dict.fromkeys(key.partition(".")[0] for key, lag in delays.items() if lag == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
         motions = SampledTrajectory(setup.loop, trajectory, times, tuple(names))

@@ -26,7 +26,7 @@ _FINE_TOLERANCE, _ROUGH_TOLERANCE, _MEAN_COUNT = 0.1, 10.0, 40
 
 
 class Stopped(Exception):
-    """Somebody asked for an end."""
+    """Stop of an identification that its caller asked for."""
 
 
 @dataclass(eq=False)
@@ -103,8 +103,8 @@ class Problem:
             known |= {keys[k]: value for k, value in zip(part_of_recording.places, values, strict=True)}
         neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
         middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
-        own_values = [known.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
-        start = [float(v) if isinstance(v, int | float) else m for v, m in zip(own_values, middle, strict=True)]
+        known_values = [known.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
+        start = [float(v) if isinstance(v, int | float) else m for v, m in zip(known_values, middle, strict=True)]
         self.start: Array = self.feasible(self.to_search(np.clip(start, self.low, self.high)))
 
     def feasible(self, z: Array, free: NDArray[np.bool_] | None = None) -> Array:
@@ -183,7 +183,7 @@ class Problem:
         return slopes
 
     def alone(self) -> Problem:
-        """Return the same problem with a memory of its own, for another thread."""
+        """Return a copy of the problem with separate memory, for another thread."""
         twin = copy.copy(self)
         twin.models = [copy.copy(model) for model in self.models]
         twin.evaluations, twin.best = 0, (math.inf, np.zeros(0))

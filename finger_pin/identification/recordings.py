@@ -126,16 +126,16 @@ class RecordingModel(Protocol):
         """The numbers to be found for it alone."""
 
     def doubt(self, sought: Collection[str]) -> str:
-        """Return a warning about it where keys are sought; empty if nothing is doubtful."""
+        """Return a warning about the recording where keys are sought; empty if nothing is doubtful."""
 
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
-        """Return the derivatives of that by the values, shape (m, p) each, by changes of given sizes."""
+        """Return the derivatives of the outputs by the values, shape (m, p) each, by changes of given sizes."""
 
     def tune(self, factor: float) -> None:
-        """Compute from now on with the errors asked for times a factor."""
+        """Multiply the tolerances of further computations by a factor."""
 
 
 def unit_of(name: str) -> str:

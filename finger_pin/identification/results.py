@@ -1,4 +1,4 @@
-"""The result of an identification: a Dataset, a scenario with the numbers found, and a page."""
+"""The result of an identification: a Dataset, a scenario with the estimates, and a page."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ def write_results(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem
 
 
 def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> str:
-    """Return the text of a scenario with the numbers found and their intervals.
+    """Return the text of a scenario with the estimates and their intervals.
 
     It extends the bench; where no file says all of it, as it was given as a Scenario or with overrides, or where a key
     stands for more or less than one entry, it is whole.

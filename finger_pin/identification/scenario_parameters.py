@@ -50,7 +50,7 @@ class ScenarioPart:
 
     @classmethod
     def from_keys(cls, scenario: Scenario, recording: str, keys: Sequence[str]) -> ScenarioPart:
-        """Return the scenarios of a recording, by those of the keys that are shared or its own.
+        """Return the scenarios of a recording, by the keys that are shared or of this recording.
 
         Raises:
             InputError: If the scenario has no such key.

@@ -1,4 +1,4 @@
-"""Settled postures: where a finger comes to rest under given tensions."""
+"""Settled postures: equilibria of a finger under given tensions."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class Action(LoopController):
         self._drives: Drives | None = None
         if kind == "tension":
             if holds.any():
-                names = [name for name, held in zip(finger.actuators.names, holds, strict=True) if held]
+                names = [name for name, holding in zip(finger.actuators.names, holds, strict=True) if holding]
                 raise InputError("action", f'"tension" is not for motors in position drive: {", ".join(names)}')
             if finger.routing.winched.any():
                 raise InputError("action", '"tension" is not for winches; "tendon_winding" is')
@@ -94,11 +94,11 @@ class Action(LoopController):
 
     def reset(self, delay: float) -> None:
         """Reset for an episode with an action delay, s."""
-        self._delay, self.given = delay, self.low.copy()
-        self.held = np.zeros(self._finger.mechanism.channels)
+        self._delay, self.last_action = delay, self.low.copy()
+        self.inputs = np.zeros(self._finger.mechanism.channels)
         self._begins: list[float] = []
         self._values: list[Array] = []
-        self._value = self.held
+        self._value = self.inputs
         self._waiting: deque[tuple[float, Array]] = deque()
         if self._drives is not None:
             for name in _MEMORY:
@@ -106,7 +106,7 @@ class Action(LoopController):
 
     def take(self, action: Array, time: float) -> None:
         """Apply an action at a time, s; the first one has no delay."""
-        self.given = action
+        self.last_action = action
         arrival = time + self._delay if self._begins or self._waiting else time
         self._waiting.append((arrival, self._goals(action)))
 
@@ -124,7 +124,7 @@ class Action(LoopController):
                 # A sample at this instant has been taken already, but not before the first action.
                 self._drives.goals[int(self._drives.latest(begin)) + 1 if self._begins else 0 :] = self._value
         if self._drives is None:
-            self.held = self._value
+            self.inputs = self._value
             stepper.hold(self._value)
         self._begins.append(begin)
         self._values.append(self._value)
@@ -141,7 +141,7 @@ class Action(LoopController):
         if self._drives is None:
             return Replayed(self._begins, self._values)
         # The loops set all inputs.
-        return Replayed(self._begins, [np.zeros_like(self.held)] * len(self._begins))
+        return Replayed(self._begins, [np.zeros_like(self.inputs)] * len(self._begins))
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
@@ -151,9 +151,9 @@ class Action(LoopController):
         lead = np.shape(time)
         tension, inputs = np.zeros((*lead, len(routing.tendons))), None
         if self._drives is None and self._begins:
-            found = np.array(self._values)[self._places(time)]
-            tension[..., : routing.actuated] = found[..., : routing.actuated]
-            inputs = found[..., routing.actuated :] if found.shape[-1] > routing.actuated else None
+            held_inputs = np.array(self._values)[self._places(time)]
+            tension[..., : routing.actuated] = held_inputs[..., : routing.actuated]
+            inputs = held_inputs[..., routing.actuated :] if held_inputs.shape[-1] > routing.actuated else None
         return ControlSignals(np.zeros((*lead, len(routing.joints))), tension, inputs=inputs)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:

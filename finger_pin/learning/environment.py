@@ -78,7 +78,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         Raises:
             InputError: Naming the argument, key or variable that is wrong.
         """
-        self.task, self.render_mode = Task.of(task), read_render_mode(render_mode)
+        self.task, self.render_mode = Task.from_entries(task), read_render_mode(render_mode)
         self._worlds = Worlds(scenario, self.task, 1, finger)
         self.observation_space, actions = self._worlds.spaces()
         self.action_space, self._limits = actions, (actions.low.astype(float), actions.high.astype(float))
@@ -92,7 +92,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self._begun = True
         self._worlds.reset((0,), [self.np_random])
         observations, _ = self._worlds.observe(_ALONE, judged=False)
-        return observations[0], {"drawn": dict(self._worlds.each[0].sampled)}
+        return observations[0], {"drawn": dict(self._worlds.worlds[0].sampled)}
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Act for one control period.
@@ -103,7 +103,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """
         if not self._begun:
             raise ResetNeeded("there is no episode yet: call reset before step")
-        worlds, world = self._worlds, self._worlds.each[0]
+        worlds, world = self._worlds, self._worlds.worlds[0]
         worlds.act(read_actions(action, *self._limits)[None], (0,))
         observations, signals = worlds.observe(_ALONE)
         reward, done = self.task.judge(signals, 1)
@@ -115,7 +115,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     @property
     def action_names(self) -> tuple[str, ...]:
         """Names of the numbers of an action: tendons and actuators, motors, or joints."""
-        return self._worlds.each[0].action.names
+        return self._worlds.worlds[0].action.names
 
     def __copy__(self) -> Self:
         """Return an independent environment: two that share their worlds would step each other."""
@@ -125,8 +125,8 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """Return a picture of the present posture, shape (height, width, 3), of bytes."""
         if self.render_mode is None:
             return None
-        return self._worlds.each[0].picture()
+        return self._worlds.worlds[0].picture()
 
     def result(self, *, sample_rate: float = 1000.0) -> xr.Dataset:
         """Return the episode so far as `simulate` returns a run: for figures, `fp.view` and `fp.save`."""
-        return self._worlds.each[0].result(sample_rate)
+        return self._worlds.worlds[0].result(sample_rate)

@@ -36,11 +36,13 @@ class Randomisation:
         Raises:
             InputError: If a key of a sensor or of the action is none.
         """
-        given = task.randomise
-        found = read_identified(given) if isinstance(given, str | os.PathLike) else given
-        if not isinstance(found, Mapping):
-            raise InputError("randomise", "must be distributions by key, or the path of an identified scenario", found)
-        self._distributions: Mapping[str, Distribution] = dict(found)
+        source = task.randomise
+        distributions = read_identified(source) if isinstance(source, str | os.PathLike) else source
+        if not isinstance(distributions, Mapping):
+            raise InputError(
+                "randomise", "must be distributions by key, or the path of an identified scenario", distributions
+            )
+        self._distributions: Mapping[str, Distribution] = dict(distributions)
         for key, distribution in self._distributions.items():
             if not callable(getattr(distribution, "draw", None)):
                 allowed = "must be Uniform, LogUniform, Normal, Choice, or have draw(random)"
@@ -84,8 +86,8 @@ class Randomisation:
     def sensor(self, name: str, sensor: Sensor, drawn: Mapping[str, Any]) -> Sensor:
         """Return a sensor with the numbers that were drawn for it."""
         keys = {number: f"{_SENSOR}{name}.{number}" for number in _OF_SENSOR}
-        own = {number: drawn[key] for number, key in keys.items() if key in drawn}
-        return replace(sensor, **own) if own else sensor
+        drawn_entries = {number: drawn[key] for number, key in keys.items() if key in drawn}
+        return replace(sensor, **drawn_entries) if drawn_entries else sensor
 
     def delay(self, drawn: Mapping[str, Any], delay: float) -> float:
         """Return the delay of the action that was drawn, s; that of the task if none was.
@@ -93,10 +95,10 @@ class Randomisation:
         Raises:
             InputError: If it is negative.
         """
-        found = drawn.get(DELAY, delay)
-        if not is_number(found) or not 0.0 <= found < np.inf:
-            raise InputError(DELAY, "must be a finite number of seconds, not negative", found)
-        return float(found)
+        drawn_delay = drawn.get(DELAY, delay)
+        if not is_number(drawn_delay) or not 0.0 <= drawn_delay < np.inf:
+            raise InputError(DELAY, "must be a finite number of seconds, not negative", drawn_delay)
+        return float(drawn_delay)
 
 
 def _ends(distribution: Distribution) -> Sequence[Any]:
@@ -123,8 +125,8 @@ def read_identified(path: str | os.PathLike[str]) -> dict[str, Distribution]:
     results = Path(path).with_name("identification.nc")
     if not results.is_file():
         raise InputError("randomise", f"has no {results.name} beside it, where the intervals stand", str(path))
-    with xr.open_dataset(results) as found:
-        keys, low, high = (found[name].values for name in ("parameter", "lower", "upper"))
+    with xr.open_dataset(results) as identified:
+        keys, low, high = (identified[name].values for name in ("parameter", "lower", "upper"))
     distributions: dict[str, Distribution] = {}
     for key, least, most in zip(keys.tolist(), low.tolist(), high.tolist(), strict=True):
         if not np.isfinite([least, most]).all():

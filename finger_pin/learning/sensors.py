@@ -74,26 +74,26 @@ class Measurement:
             worlds: Their numbers, shape (k,).
             randoms: Of all worlds.
         """
-        seen = truth if self._perfect else self._spoilt(truth, worlds, randoms)
+        reading = truth if self._perfect else self._spoilt(truth, worlds, randoms)
         if not self._periods:
-            return seen
-        if self._kept.shape[2:] != seen.shape[1:]:
-            self._kept = np.zeros((*self._kept.shape[:2], *seen.shape[1:]))
+            return reading
+        if self._kept.shape[2:] != reading.shape[1:]:
+            self._kept = np.zeros((*self._kept.shape[:2], *reading.shape[1:]))
         first, rows = self._count[worlds] == 0, len(self._kept)
-        self._kept[:, worlds[first]] = seen[first]
-        self._kept[self._count[worlds] % rows, worlds] = seen
+        self._kept[:, worlds[first]] = reading[first]
+        self._kept[self._count[worlds] % rows, worlds] = reading
         self._count[worlds] += 1
         # One row further is the oldest.
         return self._kept[self._count[worlds] % rows, worlds]
 
     def _spoilt(self, truth: Array, worlds: NDArray[np.int64], randoms: Sequence[np.random.Generator]) -> Array:
         wide = (-1, *(1 for _ in truth.shape[1:]))
-        seen = truth + self._offset[worlds].reshape(wide)
+        reading = truth + self._offset[worlds].reshape(wide)
         for row, world in enumerate(worlds.tolist()):
             if self._noise[world]:
-                seen[row] += randoms[world].normal(0.0, self._noise[world], seen.shape[1:])
+                reading[row] += randoms[world].normal(0.0, self._noise[world], reading.shape[1:])
         step = self._quantisation[worlds].reshape(wide)
-        return np.where(step > 0.0, step * np.round(seen / np.where(step > 0.0, step, 1.0)), seen)
+        return np.where(step > 0.0, step * np.round(reading / np.where(step > 0.0, step, 1.0)), reading)
 
 
 def measurements(sensors: Mapping[str, Sensor], worlds: int, period: float) -> dict[str, Measurement]:

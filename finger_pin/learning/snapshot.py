@@ -39,7 +39,7 @@ _STAYING = {"loop", "times", "packed", "state", "_outputs"}
 
 
 class BatchedSnapshot(SampledTrajectory):
-    """Worlds at the states that they have reached, and all that follows from these."""
+    """Worlds at their present states, with signals that are computed on first use."""
 
     def __init__(self, loop: BatchedLoop) -> None:
         """Make room for the present times, shape (w,), s, and packed states, shape (w, size)."""
@@ -82,7 +82,9 @@ class BatchedLoop(ClosedLoop):
     accelerated: bool = False
 
     @classmethod
-    def of(cls, loops: list[ClosedLoop], actions: list[Action], names: Sequence[str], *, apart: bool) -> BatchedLoop:
+    def from_loops(
+        cls, loops: list[ClosedLoop], actions: list[Action], names: Sequence[str], *, apart: bool
+    ) -> BatchedLoop:
         """Put worlds side by side.
 
         Args:
@@ -92,15 +94,15 @@ class BatchedLoop(ClosedLoop):
             apart: Whether every world has numbers of its own.
         """
         first, accelerated = loops[0], "joint_acceleration" in names
-        own = {each.name: getattr(first, each.name) for each in fields(ClosedLoop)}
-        own["drives"] = None if actions[0].compiled is None else actions[0]
+        parts = {each.name: getattr(first, each.name) for each in fields(ClosedLoop)}
+        parts["drives"] = None if actions[0].compiled is None else actions[0]
         if apart:
-            own["dynamics"] = CompiledFingers([_compiled(each) for each in loops], accelerated=accelerated)
-            own["palm"] = first.palm and replace(first.palm, signal=cast(Signal, _PalmSignals(loops)))
-        return cls(**own, loops=loops, actions=actions, accelerated=accelerated)
+            parts["dynamics"] = CompiledFingers([_compiled(each) for each in loops], accelerated=accelerated)
+            parts["palm"] = first.palm and replace(first.palm, signal=cast(Signal, _PalmSignals(loops)))
+        return cls(**parts, loops=loops, actions=actions, accelerated=accelerated)
 
     def replace_world(self, index: int, loop: ClosedLoop, action: Action) -> None:
-        """Put another world in the place of one; all have loops of their own then."""
+        """Put another world in the place of one; all have separate loops then."""
         self.loops[index], self.actions[index] = loop, action
         assert isinstance(self.dynamics, CompiledFingers)
         self.dynamics.replace(index, _compiled(loop))
@@ -108,12 +110,12 @@ class BatchedLoop(ClosedLoop):
     def spool_goals(self, time: Array) -> Array | None:
         """Return the goals of the worlds' motors, each at its own time, shape (w, k), rad."""
         drives = [action.compiled for action in self.actions]
-        found = [each.held(each.goals, at) for each, at in zip(drives, time, strict=True) if each is not None]
-        return np.array(found) if found else None
+        goals = [each.held(each.goals, at) for each, at in zip(drives, time, strict=True) if each is not None]
+        return np.array(goals) if goals else None
 
     def wound(self, angle: Array) -> Array:
-        """Return what every world's spools wind in, shape (w, k'), m."""
-        return np.array([loop.wound(own[None])[0] for loop, own in zip(self.loops, angle, strict=True)])
+        """Return the lengths that every world's spools wind in, shape (w, k'), m."""
+        return np.array([loop.wound(goals[None])[0] for loop, goals in zip(self.loops, angle, strict=True)])
 
     @property
     def shared(self) -> bool:
@@ -129,7 +131,7 @@ class BatchedLoop(ClosedLoop):
     def evaluate(self, time: Array | float, x: Array, outputs: Outputs = "all") -> LoopSignals:
         """Return all signals at times (w,) and states (w, size); the base's motion counts for accelerations alone."""
         times, routing = np.asarray(time), self.finger.routing
-        command = np.array([action.held for action in self.actions])
+        command = np.array([action.inputs for action in self.actions])
         tension = np.zeros((len(times), len(routing.tendons)))
         tension[:, : routing.actuated] = command[:, : routing.actuated]
         inputs = command[:, routing.actuated :]
@@ -157,8 +159,8 @@ class _PalmSignals:
 
     def at(self, time: Array) -> tuple[Array, Array]:
         """Return values and rates at times (w,), shape (w, 6) each."""
-        found = [loop.palm.signal.at(each) for loop, each in zip(self._loops, time, strict=True) if loop.palm]
-        return np.array([value for value, _ in found]), np.array([rate for _, rate in found])
+        samples = [loop.palm.signal.at(each) for loop, each in zip(self._loops, time, strict=True) if loop.palm]
+        return np.array([value for value, _ in samples]), np.array([rate for _, rate in samples])
 
 
 def _compiled(loop: ClosedLoop) -> CompiledFinger:

@@ -66,8 +66,8 @@ class StableBaselinesEnvironment(VecEnv):
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """Return the result of a method of the worlds, once for each."""
-        found = getattr(self.worlds, method_name)(*args, **kwargs)
-        return [found for _ in self._get_indices(indices)]
+        value = getattr(self.worlds, method_name)(*args, **kwargs)
+        return [value for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """Return False for every world: none is wrapped."""

@@ -45,20 +45,20 @@ class Task:
     randomise: Mapping[str, Distribution] | str | os.PathLike[str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> Task:
+    def from_entries(cls, entries: Mapping[str, Any]) -> Task:
         """Return a task with entries by name.
 
         Raises:
             InputError: If there is no such entry, the reward is missing, or an entry is wrong.
         """
         names = [each.name for each in fields(cls)]
-        for name in given:
+        for name in entries:
             if name not in names:
                 known = ", ".join(["finger", "render_mode", *names])
                 raise InputError(name, f"no such argument; there are {known}{suggestion(name, names)}")
-        if "reward" not in given:
+        if "reward" not in entries:
             raise InputError("reward", "is missing: a function of the signals")
-        return cls(**given)
+        return cls(**entries)
 
     def __post_init__(self) -> None:
         """Check the entries that do not depend on the scenario."""
@@ -81,9 +81,9 @@ class Task:
                 raise InputError(name, "must be a list of names of variables", value)
         if not (self.observation or self.draw):
             raise InputError("observation", "must name at least one variable", [])
-        for name, each in self._observed.items():
-            if not (isinstance(each, Sensor) or callable(each)):
-                raise InputError(f"observation.{name}", "must be a Sensor or a function of what is observed", each)
+        for name, source in self._observed.items():
+            if not (isinstance(source, Sensor) or callable(source)):
+                raise InputError(f"observation.{name}", "must be a Sensor or a function of what is observed", source)
         if isinstance(self.start, str) and self.start not in ("reference", "random"):
             raise InputError("start", 'must be "reference", "random" or a function of a generator', self.start)
 
@@ -94,8 +94,8 @@ class Task:
 
     @cached_property
     def _observed(self) -> Mapping[str, Sensor | Function]:
-        given = self.observation
-        return dict(given) if isinstance(given, Mapping) else {name: Sensor() for name in given}
+        observation = self.observation
+        return dict(observation) if isinstance(observation, Mapping) else {name: Sensor() for name in observation}
 
     @cached_property
     def observed(self) -> tuple[str, ...]:
@@ -107,28 +107,28 @@ class Task:
         """The sensor of every observed variable; perfect ones unless given."""
         return {name: each for name, each in self._observed.items() if isinstance(each, Sensor)}
 
-    def derive(self, told: Signals, worlds: int) -> dict[str, Array]:
+    def derive(self, signals: Signals, worlds: int) -> dict[str, Array]:
         """Return the task's own signals, of readings and of draws, by name, shapes (worlds, ...).
 
         Raises:
             InputError: If a function returns another shape, or what is not finite.
         """
-        found = {}
+        derived = {}
         for name, (entry, function) in self._derived.items():
-            value = _numbers(entry, function, told)
+            value = _numbers(entry, function, signals)
             if value.shape[:1] != (worlds,):
                 allowed = f"must return arrays with the worlds in front, shape ({worlds}, ...); see per_world"
                 raise InputError(entry, allowed, list(value.shape))
             if not all_finite(value):
                 raise InputError(entry, "must return finite numbers", value.tolist())
-            found[name] = value
-        return found
+            derived[name] = value
+        return derived
 
     @cached_property
     def _derived(self) -> Mapping[str, tuple[str, Function]]:
         """The functions among the observations, with their entries."""
-        given = self._observed.items()
-        return {name: (f"observation.{name}", each) for name, each in given if not isinstance(each, Sensor)}
+        observed = self._observed.items()
+        return {name: (f"observation.{name}", each) for name, each in observed if not isinstance(each, Sensor)}
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
@@ -184,11 +184,11 @@ def _numbers(name: str, function: Function, signals: Signals) -> Array:
 
 def _shaped(name: str, function: Function, signals: Signals, worlds: int) -> Array:
     """Return the result of a function of signals, one number per world."""
-    found = _numbers(name, function, signals)
-    if found.shape != (worlds,):
+    values = _numbers(name, function, signals)
+    if values.shape != (worlds,):
         allowed = f"must return one value per world, shape ({worlds},): signals have the worlds in front; see per_world"
-        raise InputError(name, allowed, list(found.shape))
-    return found
+        raise InputError(name, allowed, list(values.shape))
+    return values
 
 
 def all_finite(values: np.ndarray) -> bool:

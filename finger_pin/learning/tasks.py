@@ -89,7 +89,7 @@ def _pressed(signals: Signals) -> Array:
     return _nearness(np.abs(missing_force(signals)[..., 0]), _GENTLE)
 
 
-def _held(signals: Signals) -> Array:
+def _grip_reward(signals: Signals) -> Array:
     near = _nearness(_length(from_grip(signals)), _NEAR)
     return np.asarray(near - _COST * signals["contact_normal_force"].sum(axis=-1))
 
@@ -139,7 +139,7 @@ def _grasp() -> dict[str, Any]:
     return {
         "scenario": _scenario("pinch", (("title", "two fingers hold a ball while the palm is shaken"),)),
         "limits": (0.0, _FIRM * 2),
-        "reward": _held,
+        "reward": _grip_reward,
         "done": _lost,
         "observation": _observed(
             "joint_position",

@@ -50,7 +50,11 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """
         if not isinstance(num_envs, int | np.integer) or num_envs < 1:
             raise InputError("num_envs", "must be a whole number above 0", num_envs)
-        self.task, self.num_envs, self.render_mode = Task.of(task), int(num_envs), read_render_mode(render_mode)
+        self.task, self.num_envs, self.render_mode = (
+            Task.from_entries(task),
+            int(num_envs),
+            read_render_mode(render_mode),
+        )
         self._worlds = Worlds(scenario, self.task, self.num_envs, finger)
         self.single_observation_space, single = self._worlds.spaces()
         self.single_action_space = single
@@ -64,7 +68,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         }
         self._randoms: list[np.random.Generator] = []
         self._ended, self._all = np.zeros(self.num_envs, dtype=bool), np.arange(self.num_envs)
-        self._seen: NDArray[Any] = np.zeros(self.observation_space.shape or (), dtype=np.float32)
+        self._observations: NDArray[Any] = np.zeros(self.observation_space.shape or (), dtype=np.float32)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -81,7 +85,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         if len(seeds) != self.num_envs or mask.shape != (self.num_envs,):
             raise InputError("seed and reset_mask", f"must have {self.num_envs} entries, one per world")
         if not self._randoms:
-            self._randoms = [np_random(own)[0] for own in seeds]
+            self._randoms = [np_random(world_seed)[0] for world_seed in seeds]
         else:
             for i in np.flatnonzero(mask):
                 if seeds[i] is not None:
@@ -90,9 +94,9 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         begun = np.flatnonzero(mask)
         self._worlds.reset(begun.tolist(), self._randoms)
         if len(begun):
-            self._seen[begun] = self._worlds.observe(begun, judged=False)[0]
+            self._observations[begun] = self._worlds.observe(begun, judged=False)[0]
         self._ended[mask] = False
-        return self._seen.copy(), self._drawn(begun)
+        return self._observations.copy(), self._drawn(begun)
 
     def step(
         self, actions: NDArray[Any]
@@ -110,18 +114,18 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         at_start = np.flatnonzero(begun)
         worlds.reset(at_start.tolist(), self._randoms)
         worlds.act(commands, np.flatnonzero(~begun).tolist())
-        self._seen, signals = worlds.observe(self._all)
+        self._observations, signals = worlds.observe(self._all)
         rewards, done = self.task.judge(signals, self.num_envs)
         rewards, done, over = np.where(begun, 0.0, rewards), done & ~begun, worlds.over & ~begun
         self._ended = done | over
         info = self._drawn(at_start)
         if self.task.privileged:
-            told = {name: signals[name] for name in self.task.privileged}
-            info |= {"privileged": told | {f"_{name}": ~begun for name in told}, "_privileged": ~begun}
+            privileged = {name: signals[name] for name in self.task.privileged}
+            info |= {"privileged": privileged | {f"_{name}": ~begun for name in privileged}, "_privileged": ~begun}
         for i in np.flatnonzero(over).tolist():
-            if worlds.each[i].reason:
-                info = self._add_info(info, {"reason": worlds.each[i].reason}, i)
-        return self._seen.copy(), rewards, done, over, info
+            if worlds.worlds[i].reason:
+                info = self._add_info(info, {"reason": worlds.worlds[i].reason}, i)
+        return self._observations.copy(), rewards, done, over, info
 
     def __copy__(self) -> Self:
         """Return an independent environment: two that share their worlds would step each other."""
@@ -131,10 +135,10 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """Return a picture of every world, shape (height, width, 3) each, of bytes."""
         if self.render_mode is None:
             return None
-        return tuple(world.picture() for world in self._worlds.each)
+        return tuple(world.picture() for world in self._worlds.worlds)
 
     def _drawn(self, begun: NDArray[np.int64]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        info: dict[str, Any] = {}
         for i in begun.tolist():
-            found = self._add_info(found, {"drawn": self._worlds.each[i].sampled}, i)
-        return found
+            info = self._add_info(info, {"drawn": self._worlds.worlds[i].sampled}, i)
+        return info

@@ -62,8 +62,8 @@ class World:
         finger: Finger | None,
         origin: ClosedLoop | None = None,
     ) -> None:
-        """Build the scenario, unless another world's loop serves; use `of` or `twin`."""
-        self.task, self._family, self._randomisation, self._given = task, family, randomisation, finger
+        """Build the scenario, unless another world's loop serves; use `from_scenario` or `twin`."""
+        self.task, self._family, self._randomisation, self._custom_finger = task, family, randomisation, finger
         self.sampled: dict[str, Any] = {}
         self.context: dict[str, Array] = {}
         self.sensors: dict[str, Sensor] = {}
@@ -73,26 +73,26 @@ class World:
         self.stepper = self._stepper_at(self.origin.initial_state())
 
     @classmethod
-    def of(cls, scenario: ScenarioLike, task: Task, finger: FingerLike | None = None) -> World:
-        """Return a world of a scenario, with another finger in place of its own if one is given.
+    def from_scenario(cls, scenario: ScenarioLike, task: Task, finger: FingerLike | None = None) -> World:
+        """Return a world of a scenario, on a custom finger if there is one.
 
         Raises:
             InputError: Naming the key or variable that is wrong.
         """
-        given = load_scenario(scenario)
-        own = resolve_finger(finger, given)
-        scenario = with_finger(given, own)
+        loaded = load_scenario(scenario)
+        custom_finger = resolve_finger(finger, loaded)
+        scenario = with_finger(loaded, custom_finger)
         if scenario.simulation.method not in TABLEAUS:
             raise InputError("simulation.method", f"must be one of {', '.join(TABLEAUS)}", scenario.simulation.method)
         randomisation = Randomisation(task)
-        for key in randomisation.keys if is_other_hand(own, scenario) else ():
+        for key in randomisation.keys if is_other_hand(custom_finger, scenario) else ():
             if key.startswith("hand."):
                 raise InputError("randomise", "does not act: the hand that was given is not the scenario's", key)
         family = ParametrisedScenario(scenario, randomisation.keys)
         for values in randomisation.ends():
             # What cannot be drawn is said now, not at the hundredth reset.
             family.with_values(values)
-        world = cls(family, task, randomisation, own)
+        world = cls(family, task, randomisation, custom_finger)
         known = known_variables(world.origin)
         for name in task.variables:
             if name not in known:
@@ -103,17 +103,17 @@ class World:
     def twin(self) -> World:
         """Return another world of the same scenario and task; all share the parts that no reset draws anew."""
         origin = None if self._randomisation.keys else self.origin
-        return World(self._family, self.task, self._randomisation, self._given, origin)
+        return World(self._family, self.task, self._randomisation, self._custom_finger, origin)
 
     @property
     def rebuilt(self) -> bool:
-        """Whether every episode has a loop and a stepper of its own."""
+        """Whether every episode builds a new loop and stepper."""
         return bool(self._randomisation.keys)
 
     def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
         """Build the loop, under inputs that are held."""
         if origin is None:
-            finger = self._given
+            finger = self._custom_finger
             if self._nominal is not None:
                 finger = with_parameters_of(self._nominal[0], self._family.scenario, scenario)
                 if finger.layout.names != self._nominal[0].layout.names:
@@ -187,14 +187,14 @@ class World:
         drawn = self.task.draw(self._random)
         if not isinstance(drawn, Mapping):
             raise InputError("draw", "must return arrays by name", drawn)
-        found = {name: np.asarray(value, dtype=float) for name, value in drawn.items()}
+        draws = {name: np.asarray(value, dtype=float) for name, value in drawn.items()}
         shapes = {name: value.shape for name, value in self.context.items()}
-        for name, value in found.items():
+        for name, value in draws.items():
             if not np.isfinite(value).all():
                 raise InputError(f"draw.{name}", "must be finite", value.tolist())
             if shapes.get(name, value.shape) != value.shape:
                 raise InputError(f"draw.{name}", f"must keep its shape {shapes[name]}", list(value.shape))
-        return found
+        return draws
 
     def _start(self) -> Array:
         """Return the packed state at the start."""
@@ -250,22 +250,22 @@ class World:
         stepper, end = self._stepper_at(self._begun), self.stepper.time
         if self.action.compiled is not None:
             stepper.drive(self.action.again())
-        held = self.action.replayed()
-        trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, held=held)
+        replayed = self.action.replayed()
+        trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, held=replayed)
         # None beyond the end, also by rounding.
         times = np.minimum(np.arange(int(end * sample_rate * (1.0 + 1e-12)) + 1) / sample_rate, end)
         motions = SampledTrajectory(self.loop, trajectory, times)
-        found = record(self._scenario, motions, self._scenario.simulation.method)
-        found.attrs["custom"] = "policy"
-        return found
+        dataset = record(self._scenario, motions, self._scenario.simulation.method)
+        dataset.attrs["custom"] = "policy"
+        return dataset
 
     def picture(self) -> NDArray[np.uint8]:
         """Return a picture of the present posture, from a point with all postures in view, of bytes."""
         method = self._scenario.simulation.method
         motions = snapshot(self.loop, self.stepper.time, self.stepper.x)
-        found = record(self._scenario, motions, method, list(known_variables(self.origin)))
+        dataset = record(self._scenario, motions, method, list(known_variables(self.origin)))
         goal = self.context.get("goal")
-        return draw_picture(found, self._stage, goal if goal is not None and goal.shape == (3,) else None)
+        return draw_picture(dataset, self._stage, goal if goal is not None and goal.shape == (3,) else None)
 
     @cached_property
     def _stage(self) -> Array:

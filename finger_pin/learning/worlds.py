@@ -31,21 +31,21 @@ class Worlds:
     """
 
     def __init__(self, scenario: ScenarioLike, task: Task, count: int, finger: FingerLike | None) -> None:
-        """Build them.
+        """Build the worlds.
 
         Raises:
             InputError: Naming the key or variable that is wrong.
         """
-        first = World.of(scenario, task, finger)
-        self.task, self.each = task, [first, *(first.twin() for _ in range(count - 1))]
-        loops, actions = [world.origin for world in self.each], [world.action for world in self.each]
-        self._now = BatchedLoop.of(loops, actions, task.variables, apart=first.rebuilt)
+        first = World.from_scenario(scenario, task, finger)
+        self.task, self.worlds = task, [first, *(first.twin() for _ in range(count - 1))]
+        loops, actions = [world.origin for world in self.worlds], [world.action for world in self.worlds]
+        self._now = BatchedLoop.from_loops(loops, actions, task.variables, apart=first.rebuilt)
         self._present = BatchedSnapshot(self._now)
         self._name_variables()
         self._measurements = measurements(task.sensors, count, task.period)
         self._context: dict[str, Array] = {}
         self._randoms = [np.random.default_rng(0)] * count
-        self._steppers = BatchStepper([world.stepper for world in self.each])
+        self._steppers = BatchStepper([world.stepper for world in self.worlds])
         self.reset(range(count), self._randoms)
 
     def _name_variables(self) -> None:
@@ -57,7 +57,7 @@ class Worlds:
         return {name: value for name, value in self.__dict__.items() if name != "_variables"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take it up, and find these again."""
+        """Restore the state, and look the functions up again."""
         self.__dict__ |= state
         self._name_variables()
 
@@ -67,9 +67,11 @@ class Worlds:
         Raises:
             InputError: If limits do not fit.
         """
-        low, high = self.each[0].action.limited(self.task.limits)
-        seen = self.observe(np.arange(1), judged=False)[0]
-        return Box(-np.inf, np.inf, seen.shape[1:], np.float32), Box(low.astype(np.float32), high.astype(np.float32))
+        low, high = self.worlds[0].action.limited(self.task.limits)
+        observations = self.observe(np.arange(1), judged=False)[0]
+        return Box(-np.inf, np.inf, observations.shape[1:], np.float32), Box(
+            low.astype(np.float32), high.astype(np.float32)
+        )
 
     def reset(self, places: Sequence[int], randoms: Sequence[np.random.Generator]) -> None:
         """Reset some worlds.
@@ -83,32 +85,32 @@ class Worlds:
         """
         self._randoms = list(randoms)
         for i in places:
-            world = self.each[i]
+            world = self.worlds[i]
             world.reset(randoms[i])
             for name, measurement in self._measurements.items():
                 measurement.reset(i, world.sensors[name])
             for name, value in world.context.items():
                 if name not in self._context:
-                    self._context[name] = np.zeros((len(self.each), *value.shape))
+                    self._context[name] = np.zeros((len(self.worlds), *value.shape))
                 self._context[name][i] = value
             if world.rebuilt:
                 self._now.replace_world(i, world.origin, world.action)
-        if self.each[0].rebuilt and len(places):
-            self._steppers = BatchStepper([world.stepper for world in self.each])
+        if self.worlds[0].rebuilt and len(places):
+            self._steppers = BatchStepper([world.stepper for world in self.worlds])
 
     def act(self, actions: Array, places: Sequence[int]) -> None:
         """Act in some worlds for a control period, shape (w, k).
 
         Where actions arrive within the period, it has several pieces.
         """
-        each, ends = self.each, [IDLE] * len(self.each)
+        worlds, ends = self.worlds, [IDLE] * len(self.worlds)
         for i in places:
-            ends[i] = each[i].act(actions[i])
+            ends[i] = worlds[i].act(actions[i])
         while max(ends) != IDLE:
             statuses = self._steppers.advance(ends)
             for i in places:
                 if ends[i] != IDLE:
-                    ends[i] = each[i].finish_piece(ends[i], statuses[i])
+                    ends[i] = worlds[i].finish_piece(ends[i], statuses[i])
 
     def observe(self, places: _Places, *, judged: bool = True) -> tuple[NDArray[np.float32], dict[str, Array]]:
         """Return the observations in some worlds, shape (k, o), and the true signals in all by name, shapes (w, ...).
@@ -120,26 +122,28 @@ class Worlds:
         """
         motions = self._present
         motions.forget()
-        motions.times[:] = [world.now for world in self.each]
+        motions.times[:] = [world.now for world in self.worlds]
         self._steppers.read(motions.packed)
         wanted = self._variables if judged else self.task.sensors
         signals = {name: np.array(self._variables[name].value(motions)) for name in wanted}
         count = len(places)
-        whole = count == len(self.each)
-        told = {name: value if whole else value[places] for name, value in self._context.items()}
+        whole = count == len(self.worlds)
+        observed = {name: value if whole else value[places] for name, value in self._context.items()}
         for name, measurement in self._measurements.items():
-            told[name] = measurement.sample(signals[name] if whole else signals[name][places], places, self._randoms)
-        told |= self.task.derive(told, count)
-        seen = [told[name] for name in (*self.task.observed, *self._context)]
-        flat = [each if each.ndim == 2 else each.reshape(count, -1) for each in seen]
+            observed[name] = measurement.sample(
+                signals[name] if whole else signals[name][places], places, self._randoms
+            )
+        observed |= self.task.derive(observed, count)
+        columns = [observed[name] for name in (*self.task.observed, *self._context)]
+        flat = [each if each.ndim == 2 else each.reshape(count, -1) for each in columns]
         signals |= {name: value.copy() for name, value in self._context.items()}
-        signals["action"] = np.array([world.action.given for world in self.each])
+        signals["action"] = np.array([world.action.last_action for world in self.worlds])
         return np.concatenate(flat, axis=1, dtype=np.float32), signals
 
     @property
     def over(self) -> NDArray[np.bool_]:
         """A mask of the worlds whose episode is truncated, shape (w,)."""
-        return np.array([world.over for world in self.each])
+        return np.array([world.over for world in self.worlds])
 
 
 def read_actions(actions: Any, low: Array, high: Array) -> Array:
@@ -149,14 +153,14 @@ def read_actions(actions: Any, low: Array, high: Array) -> Array:
         InputError: If they have another shape, or are not finite.
     """
     try:
-        found = np.asarray(actions, dtype=float)
+        array = np.asarray(actions, dtype=float)
     except (TypeError, ValueError):
         raise InputError("action", "must be numbers", actions) from None
-    if found.shape != low.shape:
-        raise InputError("action", f"must have shape {low.shape}", list(found.shape))
-    if not all_finite(found):
-        raise InputError("action", "must be finite", found.tolist())
-    return np.asarray(np.minimum(np.maximum(found, low), high))
+    if array.shape != low.shape:
+        raise InputError("action", f"must have shape {low.shape}", list(array.shape))
+    if not all_finite(array):
+        raise InputError("action", "must be finite", array.tolist())
+    return np.asarray(np.minimum(np.maximum(array, low), high))
 
 
 def read_render_mode(mode: str | None) -> str | None:

@@ -23,7 +23,7 @@ _COSINE_PIECES = 32
 
 def polynomials(settings: Sequence[SignalSettings], tolerance: float) -> list[PPoly | None]:
     """Return the polynomials that the kinds of signals add to the sinusoids, or None."""
-    found = [None if each.kind == "samples" else _polynomial(each) for each in settings]
+    pieces = [None if each.kind == "samples" else _polynomial(each) for each in settings]
     rest = [index for index, each in enumerate(settings) if each.kind == "samples"]
     while rest:
         from scipy.interpolate import PPoly
@@ -34,9 +34,9 @@ def polynomials(settings: Sequence[SignalSettings], tolerance: float) -> list[PP
         values = np.transpose([np.asarray(settings[index].values) for index in together])
         knots, coefficients = thinned(np.asarray(times), values, tolerance)
         for column, index in enumerate(together):
-            found[index] = PPoly(coefficients[:, :, column], knots)
+            pieces[index] = PPoly(coefficients[:, :, column], knots)
         rest = [index for index in rest if index not in together]
-    return found
+    return pieces
 
 
 def _polynomial(settings: SignalSettings) -> PPoly | None:
@@ -78,26 +78,26 @@ def _half_cosines(times: Array, values: Array) -> PPoly:
 
 def joined(columns: Sequence[PPoly | None]) -> tuple[Array, Array]:
     """Return knots, shape (m,), and coefficients, shape (6, m - 1, k), of polynomials about shared knots."""
-    own = [each.x for each in columns if each is not None]
-    if not own:
+    breakpoints = [each.x for each in columns if each is not None]
+    if not breakpoints:
         return np.array([0.0, 1.0]), np.zeros((ORDER, 1, len(columns)))
-    if all(np.array_equal(each, own[0]) for each in own):
-        together = np.zeros((ORDER, len(own[0]) - 1, len(columns)))
-        for index, each in enumerate(columns):
-            if each is not None:
-                together[ORDER - len(each.c) :, :, index] = each.c
-        return own[0], together
-    knots = np.unique(np.concatenate(own))
+    if all(np.array_equal(each, breakpoints[0]) for each in breakpoints):
+        together = np.zeros((ORDER, len(breakpoints[0]) - 1, len(columns)))
+        for index, polynomial in enumerate(columns):
+            if polynomial is not None:
+                together[ORDER - len(polynomial.c) :, :, index] = polynomial.c
+        return breakpoints[0], together
+    knots = np.unique(np.concatenate(breakpoints))
     start, middle = knots[:-1], 0.5 * (knots[:-1] + knots[1:])
     coefficients = np.zeros((ORDER, len(start), len(columns)))
-    for column, each in enumerate(columns):
-        if each is None:
+    for column, polynomial in enumerate(columns):
+        if polynomial is None:
             continue
-        powers = np.vstack([np.zeros((ORDER - len(each.c), len(each.x) - 1)), each.c])[::-1]
-        piece = np.clip(np.searchsorted(each.x, middle) - 1, 0, len(each.x) - 2)
+        powers = np.vstack([np.zeros((ORDER - len(polynomial.c), len(polynomial.x) - 1)), polynomial.c])[::-1]
+        piece = np.clip(np.searchsorted(polynomial.x, middle) - 1, 0, len(polynomial.x) - 2)
         # Outside its own knots a signal keeps its value there; inside, its piece is expanded about the shared knot.
-        since = np.clip(start, each.x[0], each.x[-1]) - each.x[piece]
-        inside = (middle > each.x[0]) & (middle < each.x[-1])
+        since = np.clip(start, polynomial.x[0], polynomial.x[-1]) - polynomial.x[piece]
+        inside = (middle > polynomial.x[0]) & (middle < polynomial.x[-1])
         for power in range(ORDER):
             terms = [math.comb(h, power) * powers[h, piece] * since ** (h - power) for h in range(power, ORDER)]
             coefficients[ORDER - 1 - power, :, column] = sum(terms) * (inside | (power == 0))

@@ -82,14 +82,14 @@ class SignalReference:
         coupling = scenario.coupling(routing)
         free = coupling.free
         names = [routing.joints[index] for index in free]
-        given = Signal.from_samples("reference", samples, names, scenario.simulation.rtol)
+        free_signal = Signal.from_samples("reference", samples, names, scenario.simulation.rtol)
         largest = float(np.max(np.abs(np.asarray(samples[1], dtype=float))))
         if largest > MOST_ANGLE:
             raise InputError("reference", f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}", largest)
-        given = given.later(scenario.simulation.start_time)
-        coefficients = np.zeros((*given.coefficients.shape[:2], len(routing.joints)))
-        coefficients[..., free] = given.coefficients
-        return cls(Signal(np.zeros((len(routing.joints), 4)), given.knots, coefficients), coupling)
+        free_signal = free_signal.later(scenario.simulation.start_time)
+        coefficients = np.zeros((*free_signal.coefficients.shape[:2], len(routing.joints)))
+        coefficients[..., free] = free_signal.coefficients
+        return cls(Signal(np.zeros((len(routing.joints), 4)), free_signal.knots, coefficients), coupling)
 
     def at(self, time: Array | float) -> ReferenceSignals:
         """Return theta^d and its rate at one time, or at times of shape (m,)."""

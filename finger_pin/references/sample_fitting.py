@@ -79,9 +79,11 @@ def thinned(times: Array, values: Array, tolerance: float) -> tuple[Array, Array
         joined[first + side] += (values[0] + ends[side] * size) / count[first + side, None]
     # Of slopes next to nothing it takes the inverse.
     with np.errstate(over="ignore"):
-        found = PchipInterpolator(knots, joined).c if len(first) < len(knots) - 1 else np.zeros((4, 0, values.shape[1]))
+        cubics = (
+            PchipInterpolator(knots, joined).c if len(first) < len(knots) - 1 else np.zeros((4, 0, values.shape[1]))
+        )
     coefficients = np.zeros((6, len(knots) - 1, values.shape[1]))
-    coefficients[6 - len(found) :, : found.shape[1]] = found
+    coefficients[6 - len(cubics) :, : cubics.shape[1]] = cubics
     length, change = np.diff(knots)[first, None], np.diff(joined, axis=0)[first]
     start, stop = _smooth(first, length, missed, slopes) * size
     coefficients[2, first] = (start + stop - 2.0 * change / length) / length**2
@@ -142,13 +144,13 @@ def _fitted(times: Array, values: Array, length: int, tried: Flags, within: Arra
 def _longest(levels: list[_Stretches]) -> tuple[Indices, Indices, Array, Array, Array]:
     """Return the stretches within no longer one: first and last samples, misses, values and slopes."""
     kept = [np.zeros_like(levels[0].fits), *(level.fits.copy() for level in levels[1:])]
-    for own, longer in zip(kept[1:], levels[2:], strict=False):
-        own[: 2 * len(longer.fits)] &= ~np.repeat(longer.fits, 2)
-    begin = np.concatenate([level.length * np.flatnonzero(own) for level, own in zip(levels, kept, strict=True)])
-    length = np.repeat([level.length for level in levels], [np.count_nonzero(own) for own in kept])
+    for mask, longer in zip(kept[1:], levels[2:], strict=False):
+        mask[: 2 * len(longer.fits)] &= ~np.repeat(longer.fits, 2)
+    begin = np.concatenate([level.length * np.flatnonzero(mask) for level, mask in zip(levels, kept, strict=True)])
+    length = np.repeat([level.length for level in levels], [np.count_nonzero(mask) for mask in kept])
     order = np.argsort(begin)
     missed, value, slope = (
-        np.concatenate([getattr(level, name)[..., own, :] for level, own in zip(levels, kept, strict=True)], axis=-2)
+        np.concatenate([getattr(level, name)[..., mask, :] for level, mask in zip(levels, kept, strict=True)], axis=-2)
         for name in ("missed", "value", "slope")
     )
     begin, length = begin[order], length[order]
@@ -166,11 +168,11 @@ def _smooth(first: Indices, length: Array, missed: Array, slopes: Array) -> Arra
     """
     if len(first) < 2:
         return slopes
-    found, near = slopes.copy(), (np.diff(first) == 1)[:, None]
+    shared, near = slopes.copy(), (np.diff(first) == 1)[:, None]
     weights = length[:-1], length[1:]
     off = np.abs(slopes[1, :-1] - slopes[0, 1:]) * np.minimum(*weights)
     near = near & (off <= _KINK * np.maximum(missed[:-1], missed[1:]))
     both = (weights[0] * slopes[1, :-1] + weights[1] * slopes[0, 1:]) / (weights[0] + weights[1])
-    found[1, :-1] = np.where(near, both, slopes[1, :-1])
-    found[0, 1:] = np.where(near, both, slopes[0, 1:])
-    return found
+    shared[1, :-1] = np.where(near, both, slopes[1, :-1])
+    shared[0, 1:] = np.where(near, both, slopes[0, 1:])
+    return shared

@@ -94,14 +94,14 @@ class Signal:
         return cls(np.zeros((len(columns), 4)), *thinned(times, values, tolerance))
 
     @classmethod
-    def held(cls, knots: Array, values: Array) -> Signal:
+    def from_held_values(cls, knots: Array, values: Array) -> Signal:
         """Return signals that are held between knots, shape (m + 1,), s, at values of shape (m, k)."""
         coefficients = np.zeros((ORDER, *values.shape))
         coefficients[-1] = values
         return cls(np.zeros((values.shape[1], 4)), knots, coefficients)
 
     @classmethod
-    def joined(cls, signals: Sequence[Signal]) -> Signal:
+    def from_signals(cls, signals: Sequence[Signal]) -> Signal:
         """Return the functions of several signals one after the other."""
         from scipy.interpolate import PPoly
 
@@ -171,14 +171,14 @@ class Signal:
         kinks = np.abs(rates) * np.minimum(beside, np.concatenate([length[:1], length]))
         jumps = np.zeros_like(kinks)
         jumps[1:-1] = np.abs(begin[1:] - end[:-1])
-        found = np.maximum(jumps, kinks) > tolerance * size
+        stops = np.maximum(jumps, kinks) > tolerance * size
         # A value that deviates by the tolerance, and its neighbours by as much to the other side.
-        bent = self._bent(np.concatenate([begin, end[-1:]]), found, 2.0 * tolerance * size)
+        bent = self._bent(np.concatenate([begin, end[-1:]]), stops, 2.0 * tolerance * size)
         turns = np.floor(np.cumsum(bent, axis=0) / np.sqrt(2.0 * size * math.sqrt(tolerance)))
-        found[1:] |= np.diff(turns, axis=0, prepend=0.0) > 0.0
-        return np.asarray(self.knots[np.any(found, axis=1)])
+        stops[1:] |= np.diff(turns, axis=0, prepend=0.0) > 0.0
+        return np.asarray(self.knots[np.any(stops, axis=1)])
 
-    def _bent(self, values: Array, seen: Flags, least: Array) -> Array:
+    def _bent(self, values: Array, covered: Flags, least: Array) -> Array:
         """Return the integral of the root of |u''| over each piece, shape (m - 1, k), of bends above a least size.
 
         A bend is seen that displaces u from a chord by more than a least distance: first within each piece, then at
@@ -187,7 +187,7 @@ class Signal:
 
         Args:
             values: At the knots, shape (m, k).
-            seen: Whether a knot ends a step anyway, shape (m, k).
+            covered: Whether a knot ends a step anyway, shape (m, k).
             least: Distance from a chord, shape (k,), in the unit of each signal.
         """
         length = np.diff(self.knots)[:, None]
@@ -200,19 +200,19 @@ class Signal:
         for node, weight in ((0.11270166537925831, 5.0), (0.5, 8.0), (0.8872983346207417, 5.0)):
             bent[rows] += weight / 18.0 * span * np.sqrt(np.abs(quintic_curvature(node * span, *factors)))
         bent[~pieces] = 0.0
-        seen = seen.copy()
-        seen[:-1] |= pieces
-        seen[1:] |= pieces
+        covered = covered.copy()
+        covered[:-1] |= pieces
+        covered[1:] |= pieces
         times, stride = self.knots[:, None], 1
         while len(times) > 2:
             before, after = times[1:-1] - times[:-2], times[2:] - times[1:-1]
             off = np.abs(values[1:-1] - (after * values[:-2] + before * values[2:]) / (before + after))
-            new = _widened(off > least) & ~_widened(seen)[1:-1]
+            new = _widened(off > least) & ~_widened(covered)[1:-1]
             rows, columns = np.nonzero(new)
             width = (0.5 * (before + after) / np.sqrt(before * after))[rows, 0]
             bent[stride * (rows + 1) - 1, columns] += width * np.sqrt(2.0 * off[rows, columns])
-            seen[1:-1] |= new
-            times, values, seen, stride = times[::2], values[::2], _widened(seen)[::2], 2 * stride
+            covered[1:-1] |= new
+            times, values, covered, stride = times[::2], values[::2], _widened(covered)[::2], 2 * stride
         return bent
 
     def later(self, start: float) -> Signal:

@@ -55,7 +55,7 @@ class Account:
 
 
 def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: LoopSignals, motion: Motion) -> Account:
-    """Keep the energy account of a trajectory.
+    """Compute the energy account of a trajectory.
 
     Args:
         loop: The system.
@@ -76,11 +76,11 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
     allowed = max(_CLOSED * float(np.sum(np.max(np.abs(done), axis=0, initial=0.0))), _NOTHING)
     if allowed < float(np.max(np.abs(residual))) < np.inf:
         opened = np.abs(np.diff(residual))
-        seen = [np.zeros(0, dtype=np.int64) for _ in parts]
+        refined = [np.zeros(0, dtype=np.int64) for _ in parts]
         for spans in _worst(opened, allowed):
             for index, (ends, power) in enumerate(parts):
-                steps = np.setdiff1d(_steps(ends, times, spans), seen[index])
-                seen[index] = np.union1d(seen[index], steps)
+                steps = np.setdiff1d(_steps(ends, times, spans), refined[index])
+                refined[index] = np.union1d(refined[index], steps)
                 coarse, fine = _halved(power, ends[steps], np.diff(ends)[steps], _SMALL * allowed)
                 if len(coarse[0]):
                     done += _works(power, *fine, times, done.shape[1]) - _works(power, *coarse, times, done.shape[1])
@@ -150,15 +150,15 @@ def _quadrature_error(power: Callable[[Array], Array], begin: Array, length: Arr
 def _parts(loop: ClosedLoop, trajectory: Trajectory) -> list[_Part]:
     """Return breakpoints and powers of islands, or of the whole."""
     reached = trajectory.breakpoints[-1]
-    found: list[_Part] = []
+    parts: list[_Part] = []
     for island in trajectory.islands:
         ends = island.times
-        found.append((np.append(ends[ends < reached], reached), island.powers))
+        parts.append((np.append(ends[ends < reached], reached), island.powers))
 
     def powers(times: Array) -> Array:
         return loop.powers(times, trajectory.interpolate(times))
 
-    return found or [(trajectory.breakpoints, powers)]
+    return parts or [(trajectory.breakpoints, powers)]
 
 
 def _works(power: Callable[[Array], Array], begin: Array, length: Array, times: Array, count: int) -> Array:
@@ -185,6 +185,6 @@ def _works(power: Callable[[Array], Array], begin: Array, length: Array, times: 
 def _over(power: Callable[[Array], Array], begin: Array, length: Array, nodes: Array) -> Array:
     """Return the powers at nodes of steps, times the steps' lengths, shape (steps, nodes, count)."""
     times = (begin[:, None] + length[:, None] * nodes).ravel()
-    found = power(times).reshape(len(begin), len(nodes), -1)
-    found *= length[:, None, None]
-    return found
+    weighted = power(times).reshape(len(begin), len(nodes), -1)
+    weighted *= length[:, None, None]
+    return weighted

@@ -68,18 +68,18 @@ def contact_value(name: str, finger: Finger, of: SampledTrajectory) -> Array:
         return _split(of.state.contact_bend, 2)
     around, evaluation = finger.scene, of.finger.mechanism
     assert around is not None
-    found, arms = evaluation.rows[around.contacts.group], CONTACT.arms
+    contacts, arms = evaluation.rows[around.contacts.group], CONTACT.arms
     if name in ("contact_force", "contact_point", "contact_normal"):
         return np.asarray(getattr(of.touching, name.removeprefix("contact_")))
     if name == "contact_normal_force":
-        return found.force[:, ::arms]
+        return contacts.force[:, ::arms]
     if name == "contact_level":
-        return found["level"]
+        return contacts["level"]
     if name == "contact_gap":
-        assert isinstance(found.row, Touch)
-        return np.asarray(found.row.gap)
-    friction = np.hypot(found.force[:, 1::arms], found.force[:, 2::arms])
-    return friction if name == "contact_friction" else found["sliding_speed"] * (friction > 0.0)
+        assert isinstance(contacts.row, Touch)
+        return np.asarray(contacts.row.gap)
+    friction = np.hypot(contacts.force[:, 1::arms], contacts.force[:, 2::arms])
+    return friction if name == "contact_friction" else contacts["sliding_speed"] * (friction > 0.0)
 
 
 def _of_object(name: str, state: State) -> Array:
@@ -97,14 +97,14 @@ def contact_coordinates(finger: Finger) -> dict[str, Any]:
     around = finger.scene
     if around is None:
         return {}
-    found = {
+    coordinates = {
         "contact": ("contact", list(around.contacts.names), {"long_name": "contact"}),
         "tangent": ("tangent", ["1", "2"], {"long_name": "tangent of a contact"}),
     }
     if around.free:
-        found["object"] = ("object", list(around.free), {"long_name": "free object"})
-        found["quaternion"] = ("quaternion", ["x", "y", "z", "w"], {"long_name": "component of a quaternion"})
-    return found
+        coordinates["object"] = ("object", list(around.free), {"long_name": "free object"})
+        coordinates["quaternion"] = ("quaternion", ["x", "y", "z", "w"], {"long_name": "component of a quaternion"})
+    return coordinates
 
 
 def last_touching(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
@@ -118,9 +118,11 @@ def last_touching(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
         return {}
     parts = {"contact_bend": ("contact_bend",)} | (_OBJECTS if around.free else {})
     for dimension, expected in (("contact", around.contacts.names), ("object", tuple(around.free))):
-        found = tuple(map(str, last[dimension].values)) if dimension in last.coords else ()
+        recorded_names = tuple(map(str, last[dimension].values)) if dimension in last.coords else ()
         left_out = last.attrs.get(LEFT_OUT, 0) if dimension == "contact" else 0
-        if found != expected and not (left_out and left_out + len(found) == len(expected) and {*found} < {*expected}):
+        if recorded_names != expected and not (
+            left_out and left_out + len(recorded_names) == len(expected) and {*recorded_names} < {*expected}
+        ):
             raise InputError("initial", f"is a result with other {dimension}s: they must be {', '.join(expected)}")
     # Bristles of pairs that never came near are not bent.
     last = last[[name for names in parts.values() for name in names]]

@@ -109,10 +109,10 @@ def tightened(scenario: Scenario, factor: float = FACTOR) -> Scenario:
         raise InputError("factor", "must be above 1 and finite", factor)
     tighter = with_tighter(scenario, factor)
     for name, least in TOLERANCES.items():
-        given = getattr(scenario.simulation, name)
-        if not getattr(tighter.simulation, name) < given:
+        tolerance = getattr(scenario.simulation, name)
+        if not getattr(tighter.simulation, name) < tolerance:
             allowed = f"must be above {least:g}, so that the run can be repeated at a tighter tolerance"
-            raise InputError(f"simulation.{name}", allowed, given)
+            raise InputError(f"simulation.{name}", allowed, tolerance)
     return tighter
 
 

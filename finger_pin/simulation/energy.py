@@ -40,7 +40,7 @@ class Flows:
     energy_terms: tuple[Energy, ...]
 
     @classmethod
-    def of(cls, energies: Energies, rows: Array, fingertip: Array) -> Flows:
+    def from_rows(cls, energies: Energies, rows: Array, fingertip: Array) -> Flows:
         """Join the powers of the rows, shape (..., powers), and that of the fingertip force, shape (...,)."""
         values = np.concatenate([rows, np.asarray(fingertip)[..., None]], axis=-1)
         return cls(values, flows(energies))
@@ -60,13 +60,13 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
     """Return the stored energies at the given signals by name, shape (...,), J."""
     state, (stored, _) = signals.state, signals.mechanism.account()
     lumps = 0.5 * np.sum(finger.tendons.mass * state.passive_velocity**2, axis=-1)
-    found = {_KINETIC.name: motion.kinetic_energy + lumps, _GRAVITY.name: motion.potential_energy, **stored}
+    energy_by_name = {_KINETIC.name: motion.kinetic_energy + lumps, _GRAVITY.name: motion.potential_energy, **stored}
     if finger.actuators.names and state.motor_velocity is not None:
         turning = np.concatenate([state.spool_velocity, state.motor_velocity], axis=-1)
-        found[_ROTORS.name] = 0.5 * np.sum(finger.actuators.inertias * turning**2, axis=-1)
+        energy_by_name[_ROTORS.name] = 0.5 * np.sum(finger.actuators.inertias * turning**2, axis=-1)
     if isinstance(motion, Motion) and motion.objects is not None:
-        found |= dict(zip((each.name for each in _OBJECTS), motion.objects, strict=True))
-    return found
+        energy_by_name |= dict(zip((each.name for each in _OBJECTS), motion.objects, strict=True))
+    return energy_by_name
 
 
 def flows(energies: Energies) -> tuple[Energy, ...]:
@@ -83,12 +83,12 @@ def stores(finger: Finger) -> tuple[Energy, ...]:
 
 def powers(signals: FingerSignals) -> Flows:
     """Return the powers supplied and lost at the given signals."""
-    found = signals.mechanism
-    if found.energy_terms is not None:
-        rows = found.energy_terms[..., len(found.energies.stored) :]
+    evaluation = signals.mechanism
+    if evaluation.energy_terms is not None:
+        rows = evaluation.energy_terms[..., len(evaluation.energies.stored) :]
     else:
-        rows = np.stack(list(found.account()[1].values()), axis=-1)
-    return Flows.of(found.energies, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))
+        rows = np.stack(list(evaluation.account()[1].values()), axis=-1)
+    return Flows.from_rows(evaluation.energies, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))
 
 
 def entries(result: xr.Dataset, *kinds: str) -> dict[str, xr.Variable]:

@@ -24,14 +24,14 @@ def in_world(result: xr.Dataset) -> xr.Dataset:
     Raises:
         InputError: If it is a result of a palm that moves, and lacks one of these.
     """
-    found = result.copy()
+    turned = result.copy()
     moves = _Palm(result) if any(str(name).startswith("palm_") for name in result) else None
     for name, variable in result.data_vars.items():
         if variable.attrs.get("frame") == BASE_FRAME:
-            seen = variable.values if moves is None else moves.seen(str(name), variable)
-            found[name] = (variable.dims, seen, variable.attrs | {"frame": WORLD_FRAME})
-    found.attrs["frame"] = WORLD_FRAME
-    return found
+            values = variable.values if moves is None else moves.to_world(str(name), variable)
+            turned[name] = (variable.dims, values, variable.attrs | {"frame": WORLD_FRAME})
+    turned.attrs["frame"] = WORLD_FRAME
+    return turned
 
 
 class _Palm:
@@ -47,15 +47,17 @@ class _Palm:
         )
         self.attitude = Rotation.from_quat(result.palm_orientation.values)
 
-    def seen(self, name: str, variable: xr.DataArray) -> Array:
-        """Return the values of a variable as the world sees them."""
+    def to_world(self, name: str, variable: xr.DataArray) -> Array:
+        """Return the values of a variable in the world frame."""
         values = np.array(variable.values)
         if "quaternion" in variable.dims:
-            return self._each(values, lambda own: (self.attitude * Rotation.from_quat(own)).as_quat())
-        turned = self._each(values, self.attitude.apply)
+            return self._map_items(
+                values, lambda quaternion: (self.attitude * Rotation.from_quat(quaternion)).as_quat()
+            )
+        turned = self._map_items(values, self.attitude.apply)
         lead = (slice(None), *[None] * (values.ndim - 2))
         if name == "object_velocity":
-            places = self._each(np.array(self.result.object_position.values), self.attitude.apply)
+            places = self._map_items(np.array(self.result.object_position.values), self.attitude.apply)
             return np.asarray(turned + self.velocity[lead] + np.cross(self.turning[lead], places))
         if name == "object_angular_velocity":
             return np.asarray(turned + self.turning[lead])
@@ -65,7 +67,7 @@ class _Palm:
         return np.asarray(turned + self.place[lead] if variable.attrs["units"] == "m" else turned)
 
     @staticmethod
-    def _each(values: Array, change: Callable[[Array], Array]) -> Array:
+    def _map_items(values: Array, change: Callable[[Array], Array]) -> Array:
         """Change vectors or quaternions, shape (m, ..., k), at all samples, for each of several items."""
         flat = values.reshape(len(values), -1, values.shape[-1])
         return np.stack([change(flat[:, k]) for k in range(flat.shape[1])], axis=1).reshape(values.shape)

@@ -32,14 +32,14 @@ def custom_parts(
         initial: As for `simulate`.
         finger: As for `simulate`.
     """
-    given = {
+    arguments = {
         "controller": controller,
         "reference": reference,
         "force": fingertip_force,
         "initial state": initial,
         "finger": finger,
     }
-    return ", ".join(name for name, each in given.items() if each is not None)
+    return ", ".join(name for name, each in arguments.items() if each is not None)
 
 
 def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
@@ -128,15 +128,15 @@ def as_finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Arra
         InputError: If it is anything else; ``name`` names the argument.
     """
     try:
-        found = np.array(value, dtype=float)
+        array = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise InputError(name, _wanted(shape), value) from None
-    if found.shape != shape:
-        raise InputError(name, f"{_wanted(shape)}, not an array of shape {found.shape}")
+    if array.shape != shape:
+        raise InputError(name, f"{_wanted(shape)}, not an array of shape {array.shape}")
     # Of a few numbers Python asks sooner than NumPy.
-    if not all(map(math.isfinite, found.ravel().tolist())):
-        raise InputError(name, "must be finite", found.tolist())
-    return found
+    if not all(map(math.isfinite, array.ravel().tolist())):
+        raise InputError(name, "must be finite", array.tolist())
+    return array
 
 
 def _wanted(shape: tuple[int, ...]) -> str:
@@ -161,7 +161,7 @@ def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:
     speed, actuators = finger.layout.unpack(x).motor_velocity, finger.actuators
     constant, resistance, supply, limit = actuators.motor[:4]
     most = (supply + resistance * limit) / constant
-    for motor, own, greatest in zip(actuators.names, speed, most, strict=True):
-        if abs(own) > greatest:
+    for motor, rate, greatest in zip(actuators.names, speed, most, strict=True):
+        if abs(rate) > greatest:
             allowed = f"motor {motor} must turn by at most {greatest:.4g} rad/s at its spool, which its supply can hold"
-            raise InputError(name, allowed, float(own))
+            raise InputError(name, allowed, float(rate))

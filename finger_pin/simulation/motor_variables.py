@@ -1,4 +1,4 @@
-"""Variables of motors: their motion, what they exert, and the samples of their position loops."""
+"""Variables of motors: their motion, torques and currents, and the samples of their position loops."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def _of_loops() -> dict[str, Quantity]:
 
     def sampled(of: SampledTrajectory, name: str) -> Array:
         assert of.loop.drives is not None and of.loop.drives.compiled is not None
-        drives, found = of.loop.drives.compiled, np.zeros((len(of.times), len(of.loop.finger.actuators.names)))
-        found[:, of.loop.finger.actuators.holds] = drives.held(getattr(drives, name), of.times)
-        return found
+        drives, values = of.loop.drives.compiled, np.zeros((len(of.times), len(of.loop.finger.actuators.names)))
+        values[:, of.loop.finger.actuators.holds] = drives.held(getattr(drives, name), of.times)
+        return values
 
     texts = (
         ("errors", "rad", "commanded less measured angle at the last sample of a position loop, else 0"),

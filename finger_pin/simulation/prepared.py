@@ -60,8 +60,10 @@ def prepare(
         InputError: If there is no such key or variable.
     """
     described = load_scenario(scenario)
-    own = resolve_finger(finger, described)
-    return Prepared(ParametrisedScenario(with_finger(described, own), tuple(parameters)), tuple(record), own)
+    custom_finger = resolve_finger(finger, described)
+    return Prepared(
+        ParametrisedScenario(with_finger(described, custom_finger), tuple(parameters)), tuple(record), custom_finger
+    )
 
 
 class Prepared:
@@ -75,7 +77,7 @@ class Prepared:
 
     def __init__(self, family: ParametrisedScenario, record: tuple[str, ...], finger: Finger | None = None) -> None:
         """Build the parts that the runs share; use `prepare`."""
-        self.family, self.record, self._given = family, record, finger
+        self.family, self.record, self._custom_finger = family, record, finger
         loop = ClosedLoop.from_scenario(family.scenario, finger=finger)
         refuse_unknown("record", record, variables(loop))
         self._finger = loop.finger
@@ -84,8 +86,8 @@ class Prepared:
 
     def __repr__(self) -> str:
         """Return the scenario, the keys that may be changed, and the variables recorded."""
-        given = [f"{key}={value!r}" for key, value in zip(self.parameters, self.values, strict=True)]
-        return f"Prepared({', '.join([self.family.scenario.name, *given])}; records {', '.join(self.record)})"
+        entries = [f"{key}={value!r}" for key, value in zip(self.parameters, self.values, strict=True)]
+        return f"Prepared({', '.join([self.family.scenario.name, *entries])}; records {', '.join(self.record)})"
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -137,16 +139,16 @@ class Prepared:
         self, values: Sequence[Any] | None, initial: ArrayLike | xr.Dataset | None, stop: Stop, sensitivities: bool
     ) -> RunArrays:
         scenario = self.scenario(values)
-        setup, _, found = self._made(scenario, initial, stop)
+        setup, _, arrays = self._made(scenario, initial, stop)
         if not sensitivities:
-            return found
-        given = self.values if values is None else values
-        for key, value in zip(self.parameters, given, strict=True):
+            return arrays
+        chosen_values = self.values if values is None else values
+        for key, value in zip(self.parameters, chosen_values, strict=True):
             if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
                 raise InputError(key, "sensitivities are those to single numbers", value)
         if setup.method not in TABLEAUS:
             raise InputError("simulation.method", f"sensitivities are for {', '.join(TABLEAUS)}", setup.method)
-        numbers = [float(value) for value in given]
+        numbers = [float(value) for value in chosen_values]
         sizes = [abs(value) or 1.0 for value in numbers]
         others, changes = changed(
             numbers, sizes, lambda moved: self._setup(with_exact_encoders(self.scenario(moved)), initial)
@@ -157,10 +159,10 @@ class Prepared:
         setups = [self._setup(scenario, initial), *others]
         repeated = list(zip(setups, nearby(chosen, setups), strict=True))
         base, *runs = in_threads(lambda pair: self._recorded(*pair), repeated)
-        return add_slopes(found, base, numbers, runs, changes)
+        return add_slopes(arrays, base, numbers, runs, changes)
 
     def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
-        return Setup.of(scenario, self._loop(scenario, initial))
+        return Setup.from_scenario(scenario, self._loop(scenario, initial))
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
         motions = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
@@ -199,11 +201,11 @@ class Prepared:
             stop: Asked now and then; when it returns true the run ends there.
         """
         scenario = self.scenario(values)
-        custom, loop = custom_parts(None, None, None, initial, self._given), self._loop(scenario, initial)
+        custom, loop = custom_parts(None, None, None, initial, self._custom_finger), self._loop(scenario, initial)
         return interruptible(lambda asked: run(scenario, loop, custom, progress=progress, stop=asked), stop)
 
     def _loop(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None = None) -> ClosedLoop:
-        """Return the loop of one of the family."""
+        """Return the loop of one scenario of the family."""
         # Where nothing of it changes in a run all share it, also in threads.
         finger = with_parameters_of(self._finger, self.family.scenario, scenario)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)

@@ -23,7 +23,7 @@ def notebook_bar(unit: str, total: float | None = None) -> ProgressBar | None:
 
 
 class ProgressBar:
-    """Bar on standard error or in a notebook's cell, called with how much is done."""
+    """Bar on standard error or in a notebook's cell, called with the finished part."""
 
     def __init__(self, unit: str, total: float | None = None) -> None:
         """Show a bar.
@@ -42,7 +42,7 @@ class ProgressBar:
         self._bar = tqdm(total=total, delay=patience, leave=in_notebook(), dynamic_ncols=True, **look)
 
     def __call__(self, done: float, *further: float, text: str = "", note: str = "") -> None:
-        """Show how much is done, with a text before the bar and a note after it."""
+        """Show the finished part, with a text before the bar and a note after it."""
         bar = self._bar
         if further:
             if bar.total is None:

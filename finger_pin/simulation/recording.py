@@ -85,10 +85,10 @@ def record(
         names: Of the variables; by default all.
         text: The scenario's TOML; written anew unless it is given.
     """
-    found = recorded(motions, names)
+    data_variables = recorded(motions, names)
     texts = {"scenario": to_toml(scenario) if text is None else text, **scene_metadata(scenario)}
     attributes = {**attributes_of(scenario, motions.trajectory, method), **texts}
-    return xr.Dataset(found, coordinates(scenario, motions.loop, motions.times), attributes)
+    return xr.Dataset(data_variables, coordinates(scenario, motions.loop, motions.times), attributes)
 
 
 def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
@@ -114,8 +114,8 @@ def custom_of(result: xr.Dataset) -> str:
 
 def is_tracking(result: xr.Dataset) -> bool:
     """Return whether joints were to follow a reference; under given tensions only one that moves counts."""
-    given = result.attrs.get("controller") == "tensions" and not custom_of(result)
-    return not given or bool(np.ptp(result["joint_reference"].values, axis=0).any())
+    open_loop = result.attrs.get("controller") == "tensions" and not custom_of(result)
+    return not open_loop or bool(np.ptp(result["joint_reference"].values, axis=0).any())
 
 
 @cache

@@ -111,14 +111,14 @@ class ResultFolder:
 
     def _refuse_foreign(self) -> None:
         """Refuse to replace files that no run wrote."""
-        given = str(self.path)
+        path_text = str(self.path)
         for folder in (self.path, self.path / _FIGURES):
             if folder.exists() and not folder.is_dir():
-                raise InputError("output", f"{folder} is a file; name a folder", given)
+                raise InputError("output", f"{folder} is a file; name a folder", path_text)
         present = _artifacts(self.path)
         if present and not _is_marked(self.path):
             raise InputError(
-                "output", f"holds a {Path(present[0]).name} that is not from a run; name another folder", given
+                "output", f"holds a {Path(present[0]).name} that is not from a run; name another folder", path_text
             )
 
 

@@ -20,9 +20,9 @@ RESIDUAL = "energy_residual"
 def extra_row_variables(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
     """Return the signals of the rows of some tables, by name."""
 
-    def seen(of: SampledTrajectory, group: str, name: str) -> Array:
-        found = of.finger.mechanism.rows[group]
-        return np.asarray(getattr(found.row, name))
+    def row_signal(of: SampledTrajectory, group: str, name: str) -> Array:
+        rows = of.finger.mechanism.rows[group]
+        return np.asarray(getattr(rows.row, name))
 
     def force(of: SampledTrajectory, group: str) -> Array:
         return of.finger.mechanism.rows[group].force
@@ -30,21 +30,21 @@ def extra_row_variables(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
     def shown(of: SampledTrajectory, group: str, index: int) -> Array:
         return of.finger.mechanism.rows[group].signals[index]
 
-    found: dict[str, Quantity] = {}
+    quantities: dict[str, Quantity] = {}
     for table in tables:
         group = table.group
         units = {"length": table.unit, "speed": f"{table.unit}/s", "force": "N m" if table.unit == "rad" else "N"}
         values: dict[str, Callable[[SampledTrajectory], Array]] = {"force": partial(force, group=group)}
-        values |= {name: partial(seen, group=group, name=name) for name in ("length", "speed")}
+        values |= {name: partial(row_signal, group=group, name=name) for name in ("length", "speed")}
         values |= {name: partial(shown, group=group, index=i) for i, name in enumerate(table.law.signals)}
         if np.any(table.channels >= 0):
-            values["input"] = partial(seen, group=group, name="command")
+            values["input"] = partial(row_signal, group=group, name="command")
         if table.law.scale is not None:
-            values["state"] = partial(seen, group=group, name="state")
+            values["state"] = partial(row_signal, group=group, name="state")
         for name, value in values.items():
             unit = units.get(name, "SI") if table.unit else "SI"
-            found[f"{group}_{name}"] = Quantity(("time", group), value, unit, f"{name} of {table.law.name}")
-    return found
+            quantities[f"{group}_{name}"] = Quantity(("time", group), value, unit, f"{name} of {table.law.name}")
+    return quantities
 
 
 def account_variables(finger: Finger) -> dict[str, Quantity]:
@@ -60,16 +60,16 @@ def account_variables(finger: Finger) -> dict[str, Quantity]:
         return of.account.works[name]
 
     table = {}
-    for each in stores(finger):
-        table[f"energy_{each.name}"] = Quantity(
-            _TIME, partial(stored, name=each.name), "J", f"energy stored: {each.label}", energy_term=each
+    for term in stores(finger):
+        table[f"energy_{term.name}"] = Quantity(
+            _TIME, partial(stored, name=term.name), "J", f"energy stored: {term.label}", energy_term=term
         )
     # What comes in before what is lost.
-    for each in sorted(flows(finger.mechanism.energies), key=lambda each: each.kind == LOST):
-        name, text = each.name, f"{each.kind}: {each.label}"
-        table[f"power_{name}"] = Quantity(_TIME, partial(power, name=name), "W", f"power {text}", energy_term=each)
+    for term in sorted(flows(finger.mechanism.energies), key=lambda term: term.kind == LOST):
+        name, text = term.name, f"{term.kind}: {term.label}"
+        table[f"power_{name}"] = Quantity(_TIME, partial(power, name=name), "W", f"power {text}", energy_term=term)
         table[f"energy_exchanged_{name}"] = Quantity(
-            _TIME, partial(work, name=name), "J", f"energy {text}", energy_term=each
+            _TIME, partial(work, name=name), "J", f"energy {text}", energy_term=term
         )
     text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
     table[RESIDUAL] = Quantity(_TIME, lambda of: of.account.residual, "J", text)

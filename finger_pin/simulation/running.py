@@ -43,7 +43,7 @@ def run(
     stop: Stop | None = None,
     names: Sequence[str] | None = None,
 ) -> xr.Dataset:
-    """Simulate as `simulate` does, given the loop; Ctrl-C is left to the caller.
+    """Simulate a given loop as `simulate` does; Ctrl-C is left to the caller.
 
     Args:
         scenario: The scenario to simulate.
@@ -61,7 +61,7 @@ def run(
     driving = micro_damping_advice(scenario.finger)
     if driving:
         warnings.warn(driving, MicroDampingWarning, stacklevel=5)
-    setup = Setup.of(scenario, loop, custom, control_period)
+    setup = Setup.from_scenario(scenario, loop, custom, control_period)
     loop = setup.loop
 
     def watch(time: float, x: Array) -> None:
@@ -94,7 +94,7 @@ def run(
 
 
 def _judged(loop: ClosedLoop, names: Sequence[str]) -> list[str]:
-    """Return the further variables by which a run is judged: its energy account, and how close contacts came.
+    """Return the variables by which a run is judged: its energy account, and the gaps of contacts.
 
     Raises:
         InputError: If a result has none of some name.
@@ -141,9 +141,9 @@ def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
         Interrupted: After Ctrl-C or such a stop, with what the run has computed.
     """
     with CancelToken(stop) as token:
-        found = run(token)
+        outcome = run(token)
     if token.cancelled:
         # It came after the last step.
-        whole = found.dataset() if isinstance(found, RunArrays) else found
-        raise Interrupted(float(found.attrs["end_time"]), whole)
-    return found
+        whole = outcome.dataset() if isinstance(outcome, RunArrays) else outcome
+        raise Interrupted(float(outcome.attrs["end_time"]), whole)
+    return outcome

@@ -38,7 +38,7 @@ _OF_FORCES = frozenset(
 
 
 class SampledTrajectory:
-    """A trajectory at times, and all that follows from it, computed when it is first asked for.
+    """A trajectory at times, with signals that are computed on first use.
 
     The signals are recomputed from the states by the evaluation that the dynamics use.
 
@@ -51,7 +51,7 @@ class SampledTrajectory:
     def __init__(
         self, loop: ClosedLoop, trajectory: Trajectory, times: Array, names: Sequence[str] | None = None
     ) -> None:
-        """Compute nothing yet.
+        """Store the trajectory; signals are computed on first use.
 
         Args:
             loop: The system.
@@ -98,9 +98,9 @@ class SampledTrajectory:
     @cached_property
     def touching(self) -> ContactPoints:
         """Contacts in space."""
-        around, found = self.loop.finger.scene, self.finger.mechanism
+        around, mechanism = self.loop.finger.scene, self.finger.mechanism
         assert around is not None
-        return found.touching or around.touching(self.state, found.rows[around.contacts.group].force)
+        return mechanism.touching or around.touching(self.state, mechanism.rows[around.contacts.group].force)
 
     @cached_property
     def motion(self) -> Motion:
@@ -147,10 +147,10 @@ class Quantity(NamedTuple):
     @property
     def attributes(self) -> dict[str, str]:
         """Unit, name, frame and equation, and its part in the account."""
-        found = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
+        metadata = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
         if self.energy_term is not None:
-            found |= {"account": self.energy_term.kind, "label": self.energy_term.label}
-        return found | {"equation": f"({self.equation})"} if self.equation else found
+            metadata |= {"account": self.energy_term.kind, "label": self.energy_term.label}
+        return metadata | {"equation": f"({self.equation})"} if self.equation else metadata
 
 
 def of_state(block: str, single: bool = False) -> Quantity:
@@ -158,7 +158,7 @@ def of_state(block: str, single: bool = False) -> Quantity:
     of = BLOCKS[block]
 
     def value(motion: SampledTrajectory) -> Array:
-        found: Array = getattr(motion.state, block)
-        return found[:, 0] if single else found
+        values: Array = getattr(motion.state, block)
+        return values[:, 0] if single else values
 
     return Quantity(("time",) if single else ("time", of.dimension), value, of.unit, of.long_name, of.equation)

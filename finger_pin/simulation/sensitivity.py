@@ -32,7 +32,7 @@ _Made = TypeVar("_Made")
 def changed(
     values: Sequence[float], sizes: Sequence[float], make: Callable[[list[float]], _Made]
 ) -> tuple[list[_Made], Array]:
-    """Return the things made of values with one of them changed each, and the changes.
+    """Return variations, made of the values with one of them changed, and the changes.
 
     At the edge of what is allowed a number is changed the other way.
 
@@ -44,7 +44,7 @@ def changed(
     Raises:
         InputError: If neither way is allowed.
     """
-    found, changes = [], []
+    variations, changes = [], []
     for k, (value, size) in enumerate(zip(values, sizes, strict=True)):
         other = list(values)
         try:
@@ -53,9 +53,9 @@ def changed(
         except InputError:
             other[k] = value - CHANGE * size
             made = make(other)
-        found.append(made)
+        variations.append(made)
         changes.append(other[k] - value)
-    return found, np.array(changes)
+    return variations, np.array(changes)
 
 
 def with_exact_encoders(scenario: Scenario) -> Scenario:
@@ -98,7 +98,7 @@ def add_slopes(
 
 
 def _lost(run: RunArrays, sizes: Array) -> float:
-    """Return the time from which on some number sways the motion beyond all measure, s; infinite if none does."""
+    """Return the time at which the motion becomes too sensitive to a parameter, s; infinite if it never does."""
     first = np.inf
     for name, slope in run.slopes.items():
         scale = float(np.max(np.abs(run[name]), initial=0.0)) or 1.0

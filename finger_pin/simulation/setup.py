@@ -38,7 +38,7 @@ CHUNK_OBSERVED = 4
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """A scenario with everything that moves it, once.
+    """A scenario with its loop, stepper and inputs, built once.
 
     Attributes:
         scenario: The scenario.
@@ -57,10 +57,10 @@ class Setup:
     control: InputTable | None = None
 
     @classmethod
-    def of(
+    def from_scenario(
         cls, scenario: Scenario, loop: ClosedLoop | None = None, custom: str = "", control_period: float | None = None
     ) -> Setup:
-        """Make a scenario ready.
+        """Build the setup of a scenario.
 
         Args:
             scenario: The scenario to simulate.
@@ -177,15 +177,15 @@ class Setup:
 
     def stepper(self, settings: SimulationSettings | None = None) -> Stepper:
         """Return the compiled stepper, at the start, by default at the scenario's tolerances."""
-        given, loop = settings or self.scenario.simulation, self.loop
+        tolerances, loop = settings or self.scenario.simulation, self.loop
         return Stepper.of(
             loop.finger,
             self.control or sampled_control(loop),
             loop.initial_state(),
             loop.fingertip_force,
             method=self.method,
-            rtol=given.rtol,
-            atol_scale=given.atol_scale,
+            rtol=tolerances.rtol,
+            atol_scale=tolerances.atol_scale,
         )
 
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:

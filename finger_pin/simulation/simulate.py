@@ -78,13 +78,13 @@ def simulate(
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
     scenario, controls = with_columns(load_scenario(scenario), controller)
-    given = resolve_finger(finger, scenario)
-    loop = ClosedLoop.from_scenario(scenario, controls, reference, fingertip_force, given)
+    custom_finger = resolve_finger(finger, scenario)
+    loop = ClosedLoop.from_scenario(scenario, controls, reference, fingertip_force, custom_finger)
     loop = started(loop, initial)
     if isinstance(initial, xr.Dataset) and sampling_settings(scenario, control_period) is not None:
         text = "the sampled controller starts anew: its sensors, delays and memory are not part of a result"
         warnings.warn(text, ScenarioWarning, stacklevel=2)
-    custom = custom_parts(controls, reference, fingertip_force, initial, given)
+    custom = custom_parts(controls, reference, fingertip_force, initial, custom_finger)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
     return interruptible(
         lambda asked: run(scenario, loop, custom, control_period, progress, observe, asked, variables), stop

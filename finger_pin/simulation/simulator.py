@@ -247,7 +247,7 @@ class Simulator:
         )
 
     def clone(self) -> Simulator:
-        """Return an independent copy in the same state; both continue bit for bit alike."""
+        """Return an independent copy in the same state; both continue bit for bit the same."""
         twin = object.__new__(type(self))
         twin.__dict__ |= self.__dict__
         twin._compiled, twin._stepper = CompiledFinger(self.finger), self._stepper.copy()
@@ -281,14 +281,14 @@ def step_many(
     """
     count = len(simulators)
     forces: Sequence[ArrayLike | None] = [None] * count if fingertip_forces is None else fingertip_forces
-    for name, given in (("tensions", tensions), ("fingertip_forces", forces)):
-        if len(given) != count:
-            raise InputError(name, f"must be {count}, one per simulator", len(given))
+    for name, values in (("tensions", tensions), ("fingertip_forces", forces)):
+        if len(values) != count:
+            raise InputError(name, f"must be {count}, one per simulator", len(values))
     if not count:
         return []
     if len({id(each) for each in simulators}) < count:
         raise InputError("simulators", "must differ: one stands there twice; use clone")
-    acting = [one._checked(inputs, dt, own) for one, inputs, own in zip(simulators, tensions, forces, strict=True)]
+    acting = [one._checked(inputs, dt, force) for one, inputs, force in zip(simulators, tensions, forces, strict=True)]
     for simulator, (command, force) in zip(simulators, acting, strict=True):
         simulator._hold(command, force)
     statuses = BatchStepper([each._stepper for each in simulators]).advance([each.time + dt for each in simulators])

@@ -93,16 +93,18 @@ class StepLog:
         check_memory(scenario.simulation, finger)
         if reference is None:
             posture = finger.layout.unpack(stepper.x).position
-            resting = Signal.held(knots[[0, -1]], posture[None])
+            resting = Signal.from_held_values(knots[[0, -1]], posture[None])
             reference = SignalReference(resting, PassiveCoupling(np.eye(joints), np.zeros(joints), ()))
         loop = replace(
             ClosedLoop.from_scenario(scenario, reference=reference, finger=finger),
-            controller=OpenLoopTensions(Signal.held(knots, tension), finger.routing),
+            controller=OpenLoopTensions(Signal.from_held_values(knots, tension), finger.routing),
             fingertip_force=np.zeros(3 if len(tips) == 1 else (len(tips), 3)),
-            varying_force=Signal.held(knots, force),
+            varying_force=Signal.from_held_values(knots, force),
             dynamics=CompiledFinger(finger),
             palm=palm,
-            drives=GivenVoltages(channels, Signal.held(knots, inputs[:, channels])) if len(channels) else None,
+            drives=GivenVoltages(channels, Signal.from_held_values(knots, inputs[:, channels]))
+            if len(channels)
+            else None,
         )
         again = _Repeated(stepper, knots, inputs, force)
         trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, held=again)

@@ -64,9 +64,9 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         | _measured(loop)
         | _more(loop)
     )
-    for name, each in table.items():
-        if frame := _frame(name, each):
-            table[name] = each._replace(frame=frame)
+    for name, quantity in table.items():
+        if frame := _frame(name, quantity):
+            table[name] = quantity._replace(frame=frame)
     return table
 
 
@@ -102,22 +102,22 @@ def _tension(of: SampledTrajectory) -> Array:
 
 
 def _of_windings(loop: ClosedLoop) -> dict[str, Quantity]:
-    """Return what is commanded to spools in position drive and to winches; zero elsewhere."""
+    """Return the commands to spools in position drive and to winches; zero elsewhere."""
     routing, actuators = loop.finger.routing, loop.finger.actuators
 
     def angle(of: SampledTrajectory) -> Array:
-        found = np.zeros((len(of.times), len(actuators.names)))
+        angles = np.zeros((len(of.times), len(actuators.names)))
         goals = of.loop.spool_goals(of.times)
         if goals is not None:
-            found[:, actuators.holds] = goals
-        return found
+            angles[:, actuators.holds] = goals
+        return angles
 
     def length(of: SampledTrajectory) -> Array:
-        found = np.zeros((len(of.times), len(routing.tendons)))
+        lengths = np.zeros((len(of.times), len(routing.tendons)))
         winched = np.flatnonzero(routing.winched)
-        found[:, winched] = of.control.tension[:, winched]
-        found[:, actuators.tendons] = of.loop.wound(angle(of))
-        return found
+        lengths[:, winched] = of.control.tension[:, winched]
+        lengths[:, actuators.tendons] = of.loop.wound(angle(of))
+        return lengths
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
     table = {}
@@ -228,13 +228,13 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
 def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return the readings of a sampled controller's sensors, each held until the next sample."""
 
-    def held(of: SampledTrajectory, name: str) -> Array:
+    def reading(of: SampledTrajectory, name: str) -> Array:
         return of.loop.controller.measured(name, of.times)
 
     return {
         f"measured_{each.name}": Quantity(
             ("time", each.dimension) if each.dimension else _TIME,
-            partial(held, name=each.name),
+            partial(reading, name=each.name),
             each.units,
             f"{each.name.replace('_', ' ')} as the controller measures it",
         )
@@ -245,24 +245,28 @@ def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
 def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str, Any]:
     """Return the coordinates of a result."""
     routing, finger = loop.finger.routing, loop.finger
-    found: dict[str, Any] = {
+    labels: dict[str, Any] = {
         "time": ("time", times, {"units": "s", "long_name": "time"}),
         "joint": ("joint", list(routing.joints), {"long_name": "joint"}),
         "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
         "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
     }
-    found |= {table.group: list(table.names) for table in finger.extra_rows} | contact_coordinates(finger)
-    found |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
+    labels |= {table.group: list(table.names) for table in finger.extra_rows} | contact_coordinates(finger)
+    labels |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
-        found["finger"] = list(scenario.hand.fingers)
+        labels["finger"] = list(scenario.hand.fingers)
     if finger.wraps:
-        found["wrap"] = ("wrap", list(finger.wrap_names), {"long_name": "bend of a tendon"})
+        labels["wrap"] = ("wrap", list(finger.wrap_names), {"long_name": "bend of a tendon"})
     if routing.passive > 1:
-        found["passive_tendon"] = list(routing.passive_names)
-    if held := finger.layout.names_of("elastic_stiction"):
-        found["elastic_tendon"] = ("elastic_tendon", list(held), {"long_name": "tendon or half of one, that stretches"})
+        labels["passive_tendon"] = list(routing.passive_names)
+    if elastic_names := finger.layout.names_of("elastic_stiction"):
+        labels["elastic_tendon"] = (
+            "elastic_tendon",
+            list(elastic_names),
+            {"long_name": "tendon or half of one, that stretches"},
+        )
     if finger.actuators.names:
-        found["motor"] = ("motor", list(finger.actuators.names), {"long_name": "motor"})
+        labels["motor"] = ("motor", list(finger.actuators.names), {"long_name": "motor"})
     if finger.actuators.loose_names:
-        found["spool"] = ("spool", list(finger.actuators.loose_names), {"long_name": "motor of the spool"})
-    return found
+        labels["spool"] = ("spool", list(finger.actuators.loose_names), {"long_name": "motor of the spool"})
+    return labels

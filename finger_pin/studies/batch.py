@@ -67,7 +67,7 @@ def simulate_many(
     """
     runs = _sharing([load_scenario(each) for each in scenarios])
     finger = resolve_finger(finger, runs[0])
-    _check_alike(runs)
+    _check_same_axes(runs)
     _check_kept(runs, variables or (), finger)
     run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
@@ -141,7 +141,7 @@ def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:
     ]
 
 
-def _check_alike(runs: Sequence[Scenario]) -> None:
+def _check_same_axes(runs: Sequence[Scenario]) -> None:
     first = runs[0]
     for index, run in enumerate(runs):
         for entry, value, expected in (

@@ -1,4 +1,4 @@
-"""Runs of a study: a line of JSON each, written as soon as they end, and found again by all that they depend on."""
+"""Runs of a study: a line of JSON each, written as soon as they end, and recognised by a digest of their inputs."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Run:
     """Scenario and its lazily computed simulation.
 
     Attributes:
-        scenario: The scenario; of a finger of one's own it has the description.
+        scenario: The scenario; of a custom finger it has the description.
     """
 
     def __init__(self, scenario: ScenarioLike, stop: Stop | None = None, finger: Finger | None = None) -> None:
@@ -111,7 +111,7 @@ def has_reference(scenario: Scenario) -> bool:
 
 
 def _commands(result: xr.Dataset, prefix: str) -> Array:
-    """Return all commands of a finger in parts of their ranges, shape (m, k), less those that stand still."""
+    """Return the moving commands of a finger, each over its range, shape (m, k)."""
     commands = [np.zeros((result.sizes["time"], 0))]
     for name, variable in result.data_vars.items():
         if name in _COMMANDS or str(name).endswith("_input"):

@@ -73,7 +73,7 @@ class Search:
         return np.array([[trial.params[name] for name in self._range] for trial in self._asked])
 
     def tell(self, values: Array, excesses: Array) -> None:
-        """Take objectives and excesses of designs.
+        """Record the objectives and excesses of designs.
 
         Args:
             values: Objectives, to be made small, shape (population, objectives).

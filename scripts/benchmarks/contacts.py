@@ -36,7 +36,7 @@ def _crowded(name: str, quick: bool) -> dict[str, float]:
     scenario = fp.load_scenario(name)
     if quick:
         scenario = settled(scenario, duration=0.05)
-    ready = Setup.of(scenario)
+    ready = Setup.from_scenario(scenario)
     with warnings.catch_warnings():
         # Where ten balls go is not determined, which is said.
         warnings.simplefilter("ignore", AccuracyWarning)

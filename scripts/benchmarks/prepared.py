@@ -45,7 +45,7 @@ def _runs(name: str, rounds: int, quick: bool) -> dict[str, float]:
         {
             "simulate": lambda: fp.simulate(scenario),
             "run": lambda: prepared.run(),
-            "integration": lambda: Setup.of(scenario).integrate(),
+            "integration": lambda: Setup.from_scenario(scenario).integrate(),
             "load": lambda: fp.load_scenario(name),
         },
         rounds,
@@ -55,7 +55,7 @@ def _runs(name: str, rounds: int, quick: bool) -> dict[str, float]:
         {
             "short run": lambda: prepared.run([_SHORT, own]),
             "short changed": lambda: prepared.run([_SHORT, next(numbers)]),
-            "short steps": _Steps(Setup.of(brief)),
+            "short steps": _Steps(Setup.from_scenario(brief)),
         },
         4 * rounds,
     )

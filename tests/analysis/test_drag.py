@@ -80,7 +80,7 @@ def test_slow_motion_needs_what_drag_takes_besides(drag):
     """Slowly moving, tensions l k fill the kernel of H_c^T - M s |H_c|^T, of every direction that occurs."""
     pins, least, worst = 3e-4, 1.0, 0.0
     finger = planar(drag, pins)
-    loop, at = FrictionLoop.of(finger.tendons, None), np.full((1, 2), 0.5 * np.pi)
+    loop, at = FrictionLoop.from_tendons(finger.tendons, None), np.full((1, 2), 0.5 * np.pi)
     wound = 0.11 * np.array([0.3, 0.4 + 0.5 * np.pi, 0.4 + 0.5 * np.pi])
     for angle in np.linspace(0.01, 6.29, 200):
         speed = np.array([np.cos(angle), np.sin(angle)])

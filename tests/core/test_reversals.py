@@ -14,7 +14,7 @@ def test_steps_that_end_at_reversals_move_in_between_as_exactly_as_at_their_ends
 
     def motion(tolerance):
         settings = {"rtol": tolerance, "atol_scale": tolerance}
-        return Setup.of(scenario.updated(simulation=settings)).integrate()
+        return Setup.from_scenario(scenario.updated(simulation=settings)).integrate()
 
     loose, tight = motion(TOLERANCE), motion(1e-10)
     ends = np.concatenate([[0.0], loose.steps[0].ends])
@@ -26,7 +26,7 @@ def test_steps_that_end_at_reversals_move_in_between_as_exactly_as_at_their_ends
 def test_no_step_over_a_reversal_of_friction_errs_by_more_than_three_tolerances():
     """Each is compared with a run from its start at tight tolerances; unseen, reversals make ten of them."""
     scenario = fp.load_scenario("reversals", {"simulation.duration": 0.4})
-    setup = Setup.of(scenario)
+    setup = Setup.from_scenario(scenario)
 
     def part(tolerance):
         settings = scenario.simulation.updated(rtol=tolerance, atol_scale=tolerance)
@@ -50,7 +50,7 @@ def test_friction_above_what_it_can_bear_does_not_grow_at_a_loose_tolerance_eith
     settings = {"simulation.duration": 5.2, "simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
     # Gears without losses by load and little damping let it ring.
     scenario = fp.load_scenario("servo", settings | light | {"controller.damping": 0.1})
-    setup = Setup.of(scenario)
+    setup = Setup.from_scenario(scenario)
     exact = scenario.updated(simulation={"rtol": 1e-9, "atol_scale": 1e-9})
     loose, tight = setup.integrate(), setup.integrate(scenario=exact)
     ends = loose.breakpoints

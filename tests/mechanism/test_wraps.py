@@ -277,7 +277,7 @@ def test_tensions_that_push_against_friction_give_the_torque_that_every_joint_ge
 def test_the_critical_friction_is_that_of_the_tensions_at_every_joint():
     """Where the tensions that reach each joint turn it as much as they press its pin times kappa."""
     finger, theta = antagonists("bends"), np.array([0.4, 0.6])
-    loop, sliding = FrictionLoop.of(finger.tendons, None), np.ones((1, 3))
+    loop, sliding = FrictionLoop.from_tendons(finger.tendons, None), np.ones((1, 3))
     kappa, _, command = loop.critical(theta[None], np.array([[1.0, 1.0]]), sliding)
     at = np.exp(-MU * np.cumsum(0.3 + theta))
     tension = at * command[0][:, None]

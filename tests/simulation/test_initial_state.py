@@ -91,7 +91,7 @@ def test_every_number_of_the_state_is_read_from_a_result(name, overrides, block)
         fp.load_scenario(name, {"simulation.duration": 0.02, "simulation.start_time": start} | overrides)
         for start in (first, first + 0.02)
     )
-    setup = Setup.of(begin)
+    setup = Setup.from_scenario(begin)
     x = setup.integrate().interpolate(begin.sample_times()[-1:])[0]
     assert np.any(getattr(setup.loop.finger.layout.unpack(x), block))
     found = started(ClosedLoop.from_scenario(middle), fp.simulate(begin)).initial_state()

@@ -74,9 +74,9 @@ def test_differences_on_the_same_steps_and_branches_do_not_depend_on_the_change(
         fp.load_scenario("press", {"simulation.duration": 0.7}), ["finger.tendon_friction.coulomb[2,3,4]"]
     )
     (value,) = prepared.values
-    trajectory = Setup.of(prepared.scenario()).integrate()
+    trajectory = Setup.from_scenario(prepared.scenario()).integrate()
     changes = value * np.array([0.0, -1e-6, -1e-7, 1e-7])
-    setups = [Setup.of(prepared.scenario([value + change])) for change in changes]
+    setups = [Setup.from_scenario(prepared.scenario([value + change])) for change in changes]
     times = np.linspace(0.0, 0.7, 701)
     same, *moved = (each.interpolate(times)[:, :4] for each in nearby(trajectory, setups))
     np.testing.assert_allclose(same, trajectory.interpolate(times)[:, :4], atol=1e-12)
