@@ -160,6 +160,6 @@ def _closure(finger: Finger, position: Array) -> tuple[ForceClosure, float]:
     closure = ForceClosure.of(finger.coupling_at(position), finger.routing.tendons)
     balances = closure.null_space
     if balances.shape[1] != 1:
-        return closure, float(closure.tension.min(initial=0.0)) if balances.shape[1] else -1.0
+        return closure, float(closure.tension.min()) if balances.shape[1] else -1.0
     balance = balances[:, 0] / np.abs(balances).max()
     return closure, float(max(balance.min(), (-balance).min()))

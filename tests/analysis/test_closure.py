@@ -186,3 +186,11 @@ def test_servos_in_position_drive_turn_a_hinge_by_the_lengths_of_its_paths():
     length = np.hypot(REACH, HEIGHT) * np.sqrt(2.0 - 2.0 * np.cos(opening))
     stretched = end.spool_tension.values * 0.2 / 5e3
     np.testing.assert_allclose(end.motor_position, (length[0] - length[1:] + stretched) / 0.005, atol=2e-3)
+
+
+def test_the_margin_of_a_hand_is_that_of_its_weakest_finger_alone():
+    hand = fp.load_hand("ub_hand")
+    alone = [fp.analysis.closure_over_range(finger, 8).tension.min() for finger in hand.hand.built().values()]
+    together = fp.analysis.closure_over_range(hand, 8)
+    assert together.holds
+    np.testing.assert_allclose(together.margin, min(alone), rtol=1e-9)
