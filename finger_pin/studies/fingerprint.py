@@ -10,7 +10,6 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import joblib
-from numba.core.dispatcher import Dispatcher
 from pydantic import BaseModel
 
 from finger_pin.mechanism.finger import Finger
@@ -95,7 +94,10 @@ def _parts(thing: Any, names: frozenset[str]) -> list[Any]:
         case type():
             written = {each: value for each, value in vars(thing).items() if callable(value) or each[:2] != "__"}
             return [thing.__bases__, written]
-        case property() | staticmethod() | classmethod() | _lru_cache_wrapper() | Dispatcher():
+        case property() | staticmethod() | classmethod() | _lru_cache_wrapper():
+            return [getattr(thing, each, None) for each in _WRAPPED]
+        # A function that numba compiles; the type of it is not public.
+        case _ if type(thing).__module__.startswith("numba.") and hasattr(thing, "py_func"):
             return [getattr(thing, each, None) for each in _WRAPPED]
         case Finger():
             return [thing.description, thing.constructor_args]
