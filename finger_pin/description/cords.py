@@ -87,11 +87,6 @@ class Cord(NamedTuple):
         """Elements before its first pulley."""
         return self.parts[0].elements
 
-    @property
-    def crossed(self) -> frozenset[str]:
-        """The joints that any part of it crosses."""
-        return frozenset[str]().union(*(part.crossed for part in self.parts))
-
     def shares(self, joints: Sequence[str], first: int = 0, last: int | None = None) -> Iterator[float]:
         """Yield for every joint the share of the tension that loads its pin (17): of each part over its divisor.
 

@@ -53,8 +53,7 @@ def demo_motion(description: FingerDescription, duration: float = 4.0) -> dict[s
 
 def idle_inputs(description: FingerDescription) -> list[str]:
     """Return the names of the actuators that the motion holds at zero, as their input has no range."""
-    actuators = description.tree.actuators if description.tree else {}
-    return [name for name, each in actuators.items() if _reach(description, each) is None]
+    return [name for name, each in description.tree.actuators.items() if _reach(description, each) is None]
 
 
 def _reach(description: FingerDescription, actuator: TreeActuator) -> tuple[float, float] | None:

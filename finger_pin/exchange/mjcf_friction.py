@@ -64,12 +64,7 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
 def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool) -> list[PluginFriction]:
     found = []
     for index, (name, tendon) in enumerate(description.tendons.items()):
-        law = Coefficients(
-            **{key: float(getattr(tendons, name)[index]) for key, name in _TENDON.items()},
-            **{key: float(getattr(tendons, key)[index]) for key in _ALIKE},
-            micro_damping=float(tendons.lag[index] * tendons.stiffness[index]),
-            curvature_offset=float(tendons.routing.curvature_offset[index]),
-        )
+        law = _coefficients(tendons, _TENDON, index, float(tendons.routing.curvature_offset[index]))
         crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
         if tendon.kind == "actuated":
             found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
@@ -90,15 +85,21 @@ _TENDON, _JOINT = {"coulomb": "surface", "stiction": "stiction_ratio"}, {"coulom
 _ALIKE = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "drag", "hardening")
 
 
+def _coefficients(
+    friction: Tendons | JointFriction, names: dict[str, str], index: int, curvature_offset: float
+) -> Coefficients:
+    """Return the coefficients of one tendon or joint, of which some have other names."""
+    return Coefficients(
+        **{key: float(getattr(friction, name)[index]) for key, name in names.items()},
+        **{key: float(getattr(friction, key)[index]) for key in _ALIKE},
+        micro_damping=float(friction.lag[index] * friction.stiffness[index]),
+        curvature_offset=curvature_offset,
+    )
+
+
 def _of_joints(description: FingerDescription, tendons: Tendons) -> list[PluginFriction]:
     friction = JointFriction.from_description(description, tendons.routing.loads)
     found = []
     for index, name in enumerate(description.joints):
-        law = Coefficients(
-            **{key: float(getattr(friction, name)[index]) for key, name in _JOINT.items()},
-            **{key: float(getattr(friction, key)[index]) for key in _ALIKE},
-            micro_damping=float(friction.lag[index] * friction.stiffness[index]),
-            curvature_offset=0.0,
-        )
-        found.append(PluginFriction(PIN, name, name, True, 1.0, law))
+        found.append(PluginFriction(PIN, name, name, True, 1.0, _coefficients(friction, _JOINT, index, 0.0)))
     return found

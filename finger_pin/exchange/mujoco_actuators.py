@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from finger_pin.description.caching import cached_property
 from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.description.tree_actuators import Muscle
-from finger_pin.exchange.mujoco_names import Table, free_name
+from finger_pin.exchange.mujoco_names import Table, free_name, model_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
 from finger_pin.typing import Array
 
@@ -79,7 +79,7 @@ class ActuatorReader(ElementReader):
         return found
 
     def _leave_out(self, i: int, why: str) -> None:
-        self.rest.add(f"actuator {self.model.actuator(i).name or f'actuator_{i}'}: {why}")
+        self.rest.add(f"actuator {model_name(self.model, 'actuator', i)}: {why}")
 
     def pulled(self) -> Table:
         """Return the tendons that motors pull, by the names of these."""
@@ -119,7 +119,7 @@ class ActuatorReader(ElementReader):
         model = self.model
         for what, limited in (("joint", model.jnt_actfrclimited), ("tendon", model.tendon_actfrclimited)):
             for at in (int(each) for each in np.flatnonzero(limited)):
-                drivers, name = self._drivers(what, at), getattr(model, what)(at).name or f"{what}_{at}"
+                drivers, name = self._drivers(what, at), model_name(model, what, at)
                 if len(drivers) > 1 or any(self._drives(i) != (what, at) for i in drivers):
                     self.rest.add(f"{what} {name}: a limit on what actuators exert on it together")
                 if what == "joint" and model.jnt_actgravcomp[at] and model.body_gravcomp.any():

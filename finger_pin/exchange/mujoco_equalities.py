@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from finger_pin.exchange.mujoco_compliance import soft_spring
-from finger_pin.exchange.mujoco_names import Table, distinct
+from finger_pin.exchange.mujoco_names import Table, distinct, model_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 
 # Of the points that a weld holds, the least distance from their middle, m.
@@ -40,7 +40,7 @@ def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
     loops: Table = {}
     tendons: Table = {}
     for i in (int(each) for each in np.flatnonzero(model.eq_active0)):
-        name = model.equality(i).name or f"equality_{i}"
+        name = model_name(model, "equality", i)
         kind = mujoco.mjtEq(int(model.eq_type[i])).name.removeprefix("mjEQ_").lower()
         if kind in ("connect", "weld"):
             found = _points(read, i)
@@ -132,7 +132,7 @@ def _spatial(mujoco: Any, model: Any, tendon: int) -> bool:
 
 def _held(read: ElementReader, i: int, mobility: float) -> Table:
     model = read.model
-    what = f"equality {model.equality(i).name or f'equality_{i}'}"
+    what = f"equality {model_name(read.model, 'equality', i)}"
     stiffness, damping = soft_spring(read, what, model.eq_solref[i], model.eq_solimp[i], mobility)
     return {"stiffness": stiffness, "damping": damping}
 
@@ -165,7 +165,7 @@ def _list_turns(read: ElementReader, i: int, joint: int) -> None:
     hinge = model.jnt_type[joint] == read.mujoco.mjtJoint.mjJNT_HINGE
     half = 0.5 * float(np.ptp(model.jnt_range[joint])) if model.jnt_limited[joint] else math.inf
     if hinge and half > math.pi:
-        name, what = model.equality(i).name or f"equality_{i}", model.joint(joint).name or f"joint_{joint}"
+        name, what = model_name(model, "equality", i), model_name(model, "joint", joint)
         read.rest.add(f"equality {name}: powers of the angle of {what} repeat beyond half a turn")
 
 

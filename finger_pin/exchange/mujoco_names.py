@@ -58,6 +58,11 @@ def entry_name(text: str) -> str:
     return name if re.match(r"[A-Za-z]", name) else f"n{name}"
 
 
+def model_name(model: Any, what: str, i: int) -> str:
+    """Return the name that a model has for an element, such as a ``geom``, or what it is and its number."""
+    return str(getattr(model, what)(i).name or f"{what}_{i}")
+
+
 def distinct(what: str, given: list[str]) -> list[str]:
     """Return names for elements, all different; those without one are numbered."""
     found: list[str] = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.description.surface import Surface
 from finger_pin.exchange.mujoco_compliance import contact_stiffness
-from finger_pin.exchange.mujoco_names import Table
+from finger_pin.exchange.mujoco_names import Table, model_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.typing import Array
 
@@ -115,7 +115,7 @@ class Pairs(ElementReader):
         return shares @ solref if both_timed else solref.min(axis=0), shares @ solimp
 
     def _pair(self, pair: Pair) -> str:
-        return " and ".join(self.model.geom(i).name or f"geom_{i}" for i in pair)
+        return " and ".join(model_name(self.model, "geom", i) for i in pair)
 
 
 def _kept(dim: int, friction: Array) -> Array:

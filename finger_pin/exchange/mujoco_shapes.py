@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.objects import Object
-from finger_pin.exchange.mujoco_names import Table, free_name, quaternion
+from finger_pin.exchange.mujoco_names import Table, free_name, model_name, quaternion
 from finger_pin.exchange.mujoco_pairs import Pairs
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.mechanism.tendon_paths import rotation
@@ -40,20 +40,20 @@ class Shapes:
         ]
         for i in self._colliding:
             kind = kinds(int(model.geom_type[i])).name.removeprefix("mjGEOM_").lower()
-            if not self._solid(i) and not (kind == "plane" and not model.body_weldid[model.geom_bodyid[i]]):
+            if not self._solid(i) and not self._is_plane(i):
                 moves = bool(model.body_weldid[model.geom_bodyid[i]])
                 self.rest.add(f"geom {self._name(i)}: a {kind} touches nothing here", moves)
-        self._pairs, self._placed_at = Pairs(*vars(read).values()), dict[int, str]()
+        pairs, self._placed_at = Pairs(*vars(read).values()), dict[int, str]()
         # Ellipsoids, meshes and planes that move were listed.
         carried = [i for i in self._colliding if self._solid(i) or self._is_plane(i)]
-        self._met = self._pairs.met(carried) if touching else {}
-        self._surfaces = self._pairs.surfaces(self._met)
+        self._met = pairs.met(carried) if touching else {}
+        self._surfaces = pairs.surfaces(self._met)
         self._read = read
         self._list_margins()
         self._overlapping = self._overlaps()
 
     def _name(self, i: int) -> str:
-        return self.model.geom(i).name or f"geom_{i}"
+        return model_name(self.model, "geom", i)
 
     def _solid(self, i: int) -> bool:
         return int(self.model.geom_type[i]) in self._kinds

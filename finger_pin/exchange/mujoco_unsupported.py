@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.exchange.mujoco_names import Names
+from finger_pin.exchange.mujoco_names import Names, model_name
 
 # What each flag takes out: the arrays that it makes zero; older versions lack some.
 _ZEROED = {
@@ -110,7 +110,7 @@ class Rest:
             self.add(f"{self._name(what, owner[i])}: solreffriction, by which its dry friction creeps", moves=False)
 
     def _name(self, what: str, i: Any) -> str:
-        return f"{what} {getattr(self.model, what)(i).name or f'{what}_{i}'}"
+        return f"{what} {model_name(self.model, what, i)}"
 
 
 @dataclass(frozen=True, eq=False)

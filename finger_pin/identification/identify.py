@@ -26,7 +26,7 @@ from finger_pin.identification.problem import Problem, Stopped
 from finger_pin.identification.recordings import read_recording
 from finger_pin.identification.results import results, write_results
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
-from finger_pin.studies.fingerprint import finger_digest
+from finger_pin.studies.fingerprint import digest as content_digest
 from finger_pin.typing import Array
 
 Data = Mapping[str, Mapping[str, Any]]
@@ -113,7 +113,7 @@ def identify(
         scenario,
         settings,
         recorded,
-        (starts, seed, loss, *([] if custom_finger is None else [finger_digest(custom_finger)])),
+        (starts, seed, loss, *([] if custom_finger is None else [content_digest(custom_finger)])),
     )
     with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
         work = FitPipeline(problem, ledger, loss, progress)

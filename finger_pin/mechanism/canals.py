@@ -187,7 +187,7 @@ class Canals:
         turns = {element.name: element.turn for element in cord.elements}
         bends = np.array([turns.get(joint, 0.0) for joint in self._joints])
         index = len(self._tendons.routing.tendons) + tree.rubbing.index(name)
-        crossed, wraps = cord.parts[0].crossed, find_wraps(self._description, name)
+        crossed, wraps = cord.parts[0].crossed, self._tendons.wraps[index]
         route = routes.routes[name]
         return _Canal(name, index, route, one_way, crossed, sources, 0.0, bends, tendon.friction, wraps)
 

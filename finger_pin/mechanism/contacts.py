@@ -76,7 +76,6 @@ def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> P
     )
 
 
-# Many runs start alike.
 def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     """Refuse a configuration of shape (nq,) in which bodies are deep in each other.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copyreg
 import sys
-from functools import _lru_cache_wrapper, cache
+from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -44,9 +44,13 @@ def digest(thing: Any) -> str:
     return _digest(thing, frozenset(), {})
 
 
-def finger_digest(finger: Finger) -> str:
-    """Return a digest of a custom finger: description, rigid body, rows and their laws, objects, replaced tables."""
-    return digest(finger)
+#: What holds a function of a user's: descriptors, and that of `functools.cache`.
+_WRAPPERS = (property, staticmethod, classmethod, type(source_digest))
+
+
+def _is_compiled(thing: Any) -> bool:
+    """Return whether numba compiles a function; its type is not public."""
+    return type(thing).__module__.startswith("numba.") and hasattr(thing, "py_func")
 
 
 def _digest(thing: Any, names: frozenset[str], known: dict[Any, tuple[Any, str]]) -> str:
@@ -94,10 +98,7 @@ def _parts(thing: Any, names: frozenset[str]) -> list[Any]:
         case type():
             written = {each: value for each, value in vars(thing).items() if callable(value) or each[:2] != "__"}
             return [thing.__bases__, written]
-        case property() | staticmethod() | classmethod() | _lru_cache_wrapper():
-            return [getattr(thing, each, None) for each in _WRAPPED]
-        # A function that numba compiles; the type of it is not public.
-        case _ if type(thing).__module__.startswith("numba.") and hasattr(thing, "py_func"):
+        case _ if isinstance(thing, _WRAPPERS) or _is_compiled(thing):
             return [getattr(thing, each, None) for each in _WRAPPED]
         case Finger():
             return [thing.description, thing.constructor_args]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.fingerprint import UnknownDependency, digest, finger_digest, source_digest
+from finger_pin.studies.fingerprint import UnknownDependency, digest, source_digest
 from finger_pin.studies.metrics import METRICS
 
 
@@ -115,8 +115,8 @@ def test_runs_with_a_law_of_ones_own_are_kept_under_a_digest_of_it():
         fp.Finger("ub_stand_in", rows=[fp.Rows("none", law, ("a",), [[number]], np.zeros((1, 5)))])
         for number in (1.0, 2.0, 1.0)
     ]
-    first, other, again = map(finger_digest, fingers)
-    assert first == again != other and first != finger_digest(fp.Finger("ub_stand_in"))
+    first, other, again = map(digest, fingers)
+    assert first == again != other and first != digest(fp.Finger("ub_stand_in"))
 
 
 ALIKE = """

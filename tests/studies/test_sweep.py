@@ -255,8 +255,7 @@ def test_failed_runs_are_repeated_when_asked_for(tmp_path):
 
 
 def test_a_stop_leaves_the_rest_missing_and_the_next_time_does_only_that(tmp_path):
-    gains = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
-    done = []
+    gains, done = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], []
 
     def run(stop=None):
         return fp.sweep(

@@ -32,15 +32,20 @@ from finger_pin.core.model import MODEL, Model
 from finger_pin.core.tables import Tables
 
 
+@njit_always_inline
+def _add_scaled(out: Vector, factor: float, source: Vector, size: int) -> None:
+    """Add a multiple of the first numbers of an array."""
+    for c in range(size):
+        out[c] += factor * source[c]
+
+
 @njit_inline
 def _terms(tables: Tables, begin: int, end: int, slope: float, gain: Matrix, wide: int, out: Vector) -> None:
     """Fill the change of a weighted sum of earlier forces, times a slope."""
     for c in range(wide):
         out[c] = 0.0
     for e in range(begin, end):
-        weight, source = slope * tables.weights[e], gain[tables.terms[e]]
-        for c in range(wide):
-            out[c] += weight * source[c]
+        _add_scaled(out, slope * tables.weights[e], gain[tables.terms[e]], wide)
 
 
 @njit_always_inline
@@ -107,9 +112,7 @@ def _add_motion(
 def _push(tables: Tables, linear: Linear, k: int, full: int, row: Vector) -> None:
     """Add A^T d phi of a row."""
     for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-        arm, target = linear.arm[e], linear.force[linear.blocks.place[tables.arm_at[e]]]
-        for c in range(full):
-            target[c] += arm * row[c]
+        _add_scaled(linear.force[linear.blocks.place[tables.arm_at[e]]], linear.arm[e], row, full)
 
 
 @njit_inline
@@ -123,11 +126,8 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
     for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
         k = blocks.rows[index]
         row, state = linear.gain[k], tables.state[k]
-        of_length, of_speed, of_curvature = (
-            slopes[SLOPE.force_by_length, k],
-            slopes[SLOPE.force_by_speed, k],
-            slopes[SLOPE.force_by_curvature, k],
-        )
+        of_length, of_speed = slopes[SLOPE.force_by_length, k], slopes[SLOPE.force_by_speed, k]
+        of_curvature = slopes[SLOPE.force_by_curvature, k]
         of_load, of_command = slopes[SLOPE.force_by_load, k], slopes[SLOPE.force_by_command, k]
         by_load = by_command = 0.0
         factor = total = 0.0
@@ -145,27 +145,22 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
         pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.contact_rows and tables.joint_pin[k] >= 0)
         if pressed and (of_load != 0.0 or by_load != 0.0):
             _load(model, address, k, own_places, width, wide)
-            for c in range(full):
-                row[c] = of_load * load[c]
+            _add_scaled(row, of_load, load, full)
             if by_load != 0.0:
-                for c in range(full):
-                    own[c] = by_load * load[c]
+                _add_scaled(own, by_load, load, full)
         fed = tables.channel[k] >= 0 or tables.input_start[k + 1] > tables.input_start[k]
         if fed and (of_command != 0.0 or by_command != 0.0):
             _command(model, k, own_places, width, wide)
-            for c in range(full):
-                row[c] += of_command * command[c]
+            _add_scaled(row, of_command, command, full)
             if by_command != 0.0:
-                for c in range(full):
-                    own[c] += by_command * command[c]
+                _add_scaled(own, by_command, command, full)
         reads = tables.read_start[k + 1] > tables.read_start[k]
         if state >= 0:
             by_length, by_speed = factor * slopes[SLOPE.rate_by_length, k], factor * slopes[SLOPE.rate_by_speed, k]
             _add_motion(model, k, width, by_length, by_speed, factor * slopes[SLOPE.rate_by_curvature, k], own)
             if reads:
                 add_readings(tables, k, factor * slopes[SLOPE.rate_by_reading, k], wide, own)
-            for c in range(full):
-                row[c] += total * own[c]
+            _add_scaled(row, total, own, full)
             # The column of r_z itself, without the difference g dz - r_z.
             itself = 2 * width + blocks.state_place[state]
             own[itself] += factor
