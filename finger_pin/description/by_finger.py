@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.validation import Description, problem
+from finger_pin.description.validation import Description, nested, problem
 
 _Settings = TypeVar("_Settings", bound=Description)
 
@@ -24,16 +24,7 @@ def flat_numbers(table: Any) -> Any:
 
 def unflatten(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> Any:
     """Serialise ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it."""
-    if table is None:
-        return None
-    found: dict[str, Any] = {}
-    for name, value in handler(table).items():
-        finger, dot, own = name.partition(".")
-        if dot:
-            found.setdefault(finger, {})[own] = value
-        else:
-            found[name] = value
-    return found
+    return None if table is None else nested(handler(table))
 
 
 def dump_set_fields(table: Mapping[str, Description] | None) -> Any:

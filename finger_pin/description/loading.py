@@ -143,7 +143,7 @@ def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None
         InputError: Naming the entry that is wrong.
     """
     if isinstance(name, Scenario):
-        return read_scenario(name.model_dump(mode="python", exclude_unset=True), overrides) if overrides else name
+        return _overridden(name.set_entries(), overrides) if overrides else name
     if not overrides and not is_path(str(name)):
         return _shipped_scenario(str(name))
     overrides = normalise_overrides(overrides or {}, set(Scenario.model_fields))
@@ -206,11 +206,17 @@ def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None 
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    checked, whole = normalise_overrides(overrides or {}, set(Scenario.model_fields)), copy.deepcopy(dict(table))
     with _depth_limited("scenario"):
-        override(checked, whole, Path())
-        resolve_signals(whole, Path())
-        return validate(Scenario, whole, ())
+        return _overridden(copy.deepcopy(dict(table)), overrides or {})
+
+
+def _overridden(table: Table, overrides: Mapping[str, Any]) -> Scenario:
+    """Return the scenario of a table, which changes; descriptions in it that no key touches stay the same ones."""
+    checked = normalise_overrides(overrides, set(Scenario.model_fields))
+    with _depth_limited("scenario"):
+        override(checked, table, Path())
+        resolve_signals(table, Path())
+        return validate(Scenario, table, ())
 
 
 def to_toml(description: Description) -> str:

@@ -1,14 +1,15 @@
-"""Overrides: values by dotted key, put into the tables that files have given."""
+"""Overrides: values by dotted key, put into the tables of files or of a description that is there."""
 
 from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_origin
 
 from finger_pin.description.effects import without_unread
+from finger_pin.description.fields import find_field
 from finger_pin.description.reading import (
     NONE,
     Table,
@@ -20,7 +21,7 @@ from finger_pin.description.reading import (
     with_motors,
 )
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import find_field, nearest, suggestion
+from finger_pin.description.validation import Description, nearest, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand
 
@@ -56,30 +57,34 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
         raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
     else:
         table["finger"] = resolve_finger(table["finger"], folder)
-    spelt_out = _expand_wildcards(overrides, table)
+    entries = _expand_wildcards(overrides, table)
     # A choice comes before what belongs to it, and a motor before its entries.
     first = (".kind", ".motor", ".law", ".drive")
     for early in (True, False):
-        _apply({key: value for key, value in spelt_out.items() if key.endswith(first) == early}, table)
-        for finger in [as_table(each).get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
+        _apply({key: value for key, value in entries.items() if key.endswith(first) == early}, table)
+        for finger in [as_table(placed).get("finger") for placed in _fingers(table).values()] or [table.get("finger")]:
             with_motors(as_table(finger), Path())
 
 
 def _expand_wildcards(overrides: Table, table: Table) -> Table:
-    return {each: value for key, value in overrides.items() for each in _each(key, table)}
+    return {".".join(path): value for key, value in overrides.items() for path in matching_paths(key.split("."), table)}
 
 
-def _each(key: str, table: Table) -> list[str]:
-    """Return the keys matched by a key with stars."""
-    head, star, tail = key.partition("*")
-    if not star:
-        return [key]
-    inner = table
-    for part in head.split(".")[:-1]:
-        inner = as_table(inner.get(part))
-    if not inner:
-        raise InputError(key, "there is nothing that the star could stand for")
-    return [found for name in inner for found in _each(f"{head}{name}{tail}", table)]
+def matching_paths(pattern: Sequence[str], table: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Yield the paths of a key's pattern: a star stands for every name there is, ``{T1,T2}`` for these.
+
+    Raises:
+        InputError: If there is nothing that a star could stand for.
+    """
+    if not pattern:
+        yield above
+        return
+    part, *rest = pattern
+    names = [*as_table(table)] if part == "*" else part.strip("{}").split(",") if part.startswith("{") else [part]
+    if not names:
+        raise InputError(".".join((*above, *pattern)), "there is nothing that the star could stand for")
+    for name in names:
+        yield from matching_paths(rest, as_table(table).get(name), (*above, name))
 
 
 def refuse_other(key: str, *, hand: bool, finger: bool) -> None:
@@ -96,12 +101,13 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
         inner = table
         for depth, part in enumerate(path):
             _refuse_new([*path[:depth], part], inner, table)
-            below = inner.setdefault(part, {})
+            below = inner.get(part)
             if isinstance(below, str) and part in ("finger", "hand"):
-                below = inner[part] = {"base": below}
-            if not isinstance(below, dict):
+                below = {"base": below}
+            if not isinstance(below, dict | Description | None):
                 raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
-            inner = below
+            # Of a description what lies on the way becomes a table; all else stays, checked.
+            inner[part] = inner = as_table(below)
         if last == "kind" and isinstance(value, str) and is_other_kind(inner, {"kind": value}):
             inner.clear()
         _refuse_new([*path, last], inner, table)
@@ -117,6 +123,8 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
 def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
     """Refuse an override that would bring a joint, a tendon or the like into being: only a file does."""
     *owner, name = path
+    if name in siblings:
+        return
     finger = as_table(table.get("finger"))
     hand = {key: as_table(each).get("finger") for key, each in _fingers(table).items()}
     # A signal for a joint or a tendon that is there may have no entry of its own yet.

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import copy
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from functools import reduce
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from finger_pin.description.fields import find_field
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.overriding import normalise_overrides, override, refuse_other
-from finger_pin.description.reading import Table, resolve_signals
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.overriding import matching_paths, normalise_overrides, override, refuse_other
 from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import Description, find_field, validate
+from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
 
 _INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6}(,\d{1,6})*)\]")
@@ -25,9 +24,7 @@ _INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6}(,\d{1,6})*)\]")
 class ParametrisedScenario:
     """A scenario, and those that other values at some of its keys make of it.
 
-    A scenario with other numbers is what `load_scenario` returns with the same overrides: what a file leaves to its
-    default follows the numbers. Only the tables on the way to a key are read and checked anew; all others are shared
-    with the scenario, which tells what has to be built anew and what has not.
+    A scenario with other numbers is what `load_scenario` returns with the same overrides.
 
     Attributes:
         scenario: The scenario itself.
@@ -47,26 +44,23 @@ class ParametrisedScenario:
         for name, _ in self._names:
             if name not in ("finger.base", "hand.base"):
                 refuse_other(name, hand=scenario.hand is not None, finger=scenario.hand is None)
-        spelled = _spelled(scenario)
-        self._places = [list(_places(name.split("."), scenario, spelled)) for name, _ in self._names]
-        self._spelled = spelled
+        self._paths = [list(matching_paths(name.split("."), scenario)) for name, _ in self._names]
         self.values: tuple[Any, ...] = tuple(self._value(key) for key in range(len(self.keys)))
-        for (name, index), places, value in zip(self._names, self._places, self.values, strict=True):
-            if index is not None and value is not None:
-                for *path, last in places:
-                    _at(spelled, path).setdefault(last, _found(scenario, [*path, last]))
-            if value is not None:
-                continue
-            if index is not None:
-                raise InputError(name, "has no numbers of which one could be given; give all of them")
-            # Without a value there is nothing wrong with but its name.
-            probe = 0.0
-            override(normalise_overrides({name: probe}, set(Scenario.model_fields)), self._table(), Path())
-            if "*" not in name and find_field(Scenario, name.split(".")) is None:
-                self._anew({name: probe})
+        for (name, index), value in zip(self._names, self.values, strict=True):
+            if value is None:
+                self._refuse_unknown(name, index)
+
+    def _refuse_unknown(self, name: str, index: tuple[int, ...] | None) -> None:
+        """Refuse a key without a value whose name is wrong, or that has no numbers."""
+        if index is not None:
+            raise InputError(name, "has no numbers of which one could be given; give all of them")
+        probe = {name: 0.0}
+        override(normalise_overrides(probe, set(Scenario.model_fields)), self.scenario.set_entries(), Path())
+        if "*" not in name and find_field(Scenario, name.split(".")) is None:
+            load_scenario(self.scenario, probe)
 
     @classmethod
-    def of_finger(cls, description: FingerDescription, keys: Sequence[str]) -> ParametrisedScenario:
+    def from_finger(cls, description: FingerDescription, keys: Sequence[str]) -> ParametrisedScenario:
         """Return the family of a scenario in which nothing but a finger or a hand is of account.
 
         Raises:
@@ -88,40 +82,20 @@ class ParametrisedScenario:
             raise InputError("values", f"must be {len(self.keys)}, one per key ({', '.join(self.keys)})", len(values))
         if not self.keys:
             return self.scenario
-        given = [_plain(value, own) for value, own in zip(values, self.values, strict=True)]
-        if not all(map(_is_number, given)):
-            return self._anew(self._overrides(given))
-        table = _copied(self._spelled)
-        for places, (_, index), value in zip(self._places, self._names, given, strict=True):
-            for *path, last in places:
-                inner = _at(table, path)
-                inner[last] = value if index is None else _with_numbers(inner[last], index, value)
-        return validate(Scenario, table, ())
-
-    def _overrides(self, values: Sequence[Any]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        for (name, index), places, value in zip(self._names, self._places, values, strict=True):
+        overrides: dict[str, Any] = {}
+        for (name, index), paths, value, old in zip(self._names, self._paths, values, self.values, strict=True):
+            number = _plain(value, old)
             if index is None:
-                found[name] = value
-            else:
-                for path in places:
-                    whole = found.get(".".join(path), _found(self.scenario, path))
-                    found[".".join(path)] = _with_numbers(whole, index, value)
-        return found
-
-    def _anew(self, overrides: Mapping[str, Any]) -> Scenario:
-        """Return the scenario with overrides of any kind, read from its whole table."""
-        table = self._table()
-        override(normalise_overrides(overrides, set(Scenario.model_fields)), table, Path())
-        resolve_signals(table, Path())
-        return validate(Scenario, table, ())
-
-    def _table(self) -> Table:
-        return copy.deepcopy(self.scenario.model_dump(mode="python", exclude_unset=True))
+                overrides[name] = number
+                continue
+            for path in paths:
+                numbers = overrides.get(".".join(path), _entry(self.scenario, path))
+                overrides[".".join(path)] = [number if k in index else other for k, other in enumerate(numbers)]
+        return load_scenario(self.scenario, overrides)
 
     def _value(self, key: int) -> Any:
-        (name, index), places = self._names[key], self._places[key]
-        value = _found(self.scenario, places[0]) if places else None
+        (name, index), paths = self._names[key], self._paths[key]
+        value = _entry(self.scenario, paths[0])
         if index is None or value is None:
             return value
         if isinstance(value, tuple | Series) and max(index) < len(value):
@@ -140,82 +114,32 @@ def split(key: str) -> tuple[str, tuple[int, ...] | None]:
     Raises:
         InputError: If it has brackets elsewhere than at its end.
     """
-    found = _INDEXED.fullmatch(key)
-    if found:
-        return found["name"], tuple(map(int, found["index"].split(",")))
+    indexed = _INDEXED.fullmatch(key)
+    if indexed:
+        return indexed["name"], tuple(map(int, indexed["index"].split(",")))
     if "[" in key or "]" in key:
         raise InputError(key, "an index is whole numbers in brackets at the end, such as controller.gain[2] or [0,1]")
     return key, None
 
 
-def _places(path: Sequence[str], owner: Any, table: Table, above: tuple[str, ...] = ()) -> Iterator[list[str]]:
-    """Spell out the tables on the way to a key, and return all entries that it stands for."""
-    part, *rest = path
-    names = [*table] if part == "*" else part.strip("{}").split(",") if part.startswith("{") else [part]
-    for name in names:
-        if not rest:
-            yield [name]
-            continue
-        inner = table.get(name)
-        if not isinstance(inner, dict):
-            if inner is not None and not isinstance(inner, Description):
-                raise InputError(".".join((*above, *path)), f"{'.'.join((*above, name))} has no entries of its own")
-            inner = table[name] = {} if inner is None else _spelled(inner)
-        for found in _places(rest, owner, inner, (*above, name)):
-            yield [name, *found]
-
-
-def _spelled(value: Description | Mapping[str, Any]) -> Table:
-    """Return the entries that a description was given, by name; those by finger and joint in tables of tables."""
-    given = value if isinstance(value, Mapping) else {key: getattr(value, key) for key in value.model_fields_set}
-    table: Table = {}
-    for key, each in given.items():
-        finger, dot, own = key.partition(".")
-        if dot:
-            table.setdefault(finger, {})[own] = each
-        else:
-            table[key] = _spelled(each) if isinstance(each, dict) else each
-    return table
-
-
-def _with_numbers(numbers: Sequence[Any], index: Sequence[int], value: Any) -> list[Any]:
-    """Return a list of numbers with a value at some indices."""
-    return [value if k in index else number for k, number in enumerate(numbers)]
-
-
-def _at(table: Table, path: Sequence[str]) -> Table:
-    return reduce(lambda inner, part: inner[part], path, table)
-
-
-def _copied(table: Table) -> Table:
-    """Return a copy of nested tables with shared entries."""
-    return {key: _copied(each) if isinstance(each, dict) else each for key, each in table.items()}
-
-
-def _found(owner: Any, path: Sequence[str]) -> Any:
+def _entry(owner: Any, path: Sequence[str]) -> Any:
     """Return the value of an entry, defaults among them; None for nothing."""
     for at, part in enumerate(path):
         if isinstance(owner, Mapping):
             # Tables of a hand have dotted names inside.
             dotted = ".".join(path[at : at + 2])
             if dotted in owner:
-                return _found(owner[dotted], path[at + 2 :])
+                return _entry(owner[dotted], path[at + 2 :])
             owner = owner.get(part)
         else:
             owner = getattr(owner, part, None) if part in getattr(type(owner), "model_fields", {}) else None
     return owner
 
 
-def _plain(value: Any, own: Any) -> Any:
+def _plain(value: Any, old: Any) -> Any:
     """Return a value as TOML has it: arrays as lists, whole numbers as such."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
-    if type(own) is int and isinstance(value, float) and value.is_integer():
+    if type(old) is int and isinstance(value, float) and value.is_integer():
         return int(value)
     return value
-
-
-def _is_number(value: Any) -> bool:
-    if isinstance(value, list | tuple):
-        return all(map(_is_number, value))
-    return isinstance(value, int | float) and not isinstance(value, bool)

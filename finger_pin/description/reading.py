@@ -15,7 +15,7 @@ from typing import Any
 from finger_pin.description.effects import without_unread
 from finger_pin.description.recordings.columns import read_signals
 from finger_pin.description.recordings.series import PACKED
-from finger_pin.description.validation import suggestion
+from finger_pin.description.validation import Description, suggestion
 from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand, read_text
@@ -143,6 +143,8 @@ def resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> An
     """Return the table of a finger given by name, by path, or as a table that may start from a base."""
     if isinstance(finger, str):
         return resolve_finger(*_opened("finger", finger, folder, seen))
+    if isinstance(finger, Description):
+        return finger
     if isinstance(finger, dict) and "base" in finger:
         rest = dict(finger)
         base = rest.pop("base")
@@ -180,6 +182,8 @@ def resolve_hand(hand: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
     """Return the table of a hand given by name, by path, or as a table that may start from a base."""
     if isinstance(hand, str):
         return resolve_hand(*_opened("hand", hand, folder, seen))
+    if isinstance(hand, Description):
+        return hand
     if not isinstance(hand, dict):
         raise InputError("hand", "must be the name of a hand, the path of a .toml file, or a table", hand)
     rest = dict(hand)
@@ -278,7 +282,9 @@ def merge(base: Table, top: Table) -> Table:
 
 
 def as_table(value: Any) -> Table:
-    """Return a value that is a table, an empty one for any other: validation refuses that by name."""
+    """Return a table, the entries of a description, or nothing for any other value: validation refuses that by name."""
+    if isinstance(value, Description):
+        return value.set_entries()
     return value if isinstance(value, dict) else {}
 
 

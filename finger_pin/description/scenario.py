@@ -14,7 +14,7 @@ from finger_pin.description.controller import ControllerSettings, check_controll
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.effects import CLOSED_LOOP, OF_SCENARIO, idle, shown
 from finger_pin.description.finger import FingerDescription, HandSettings
-from finger_pin.description.objects import EnvironmentSettings
+from finger_pin.description.objects import EnvironmentSettings, Object
 from finger_pin.description.routing import Routing
 from finger_pin.description.signals import ReferenceSettings
 from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
@@ -132,17 +132,26 @@ class Scenario(Description):
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         table: dict[str, Any] = handler(self)
-        of_tree = self.finger.tree.objects_at(self.keyframe)
         around = table.get("environment", {}).get("objects") or {}
-        for name in {*of_tree} & {*around}:
-            # It stands in the tree, where it can be changed.
-            if of_tree[name] == (self.environment.objects or {})[name]:
-                del around[name]
-                if not around:
-                    del table["environment"]["objects"]
+        for name in [name for name in around if name not in self._objects_beside_tree()]:
+            del around[name]
+        if not around and self.environment.objects:
+            table.get("environment", {}).pop("objects", None)
         if self.hand is not None:
             table.pop("finger", None)
         return table
+
+    def _objects_beside_tree(self) -> dict[str, Object]:
+        """Return the objects of the environment less those of the tree, where they can be changed."""
+        of_tree = self.finger.tree.objects_at(self.keyframe)
+        return {name: body for name, body in (self.environment.objects or {}).items() if body != of_tree.get(name)}
+
+    def set_entries(self) -> dict[str, Any]:
+        """Return the entries that it was given; objects that stand in the tree stay there."""
+        entries = super().set_entries()
+        if "environment" in entries and self.finger.tree.objects:
+            entries["environment"] = self.environment.updated(objects=self._objects_beside_tree() or None)
+        return entries
 
     def parts(self) -> dict[str, Scenario]:
         """Return the scenarios of the fingers of a hand, each alone on the palm, by name.

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Any, ClassVar, NoReturn, Self, TypeVar, get_args
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, NoReturn, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
+from finger_pin.description.fields import document, field_names
 from finger_pin.exceptions import InputError
 
 Name = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
@@ -48,6 +48,23 @@ class Description(BaseModel):
             if isinstance(entry, dict) and isinstance(part := getattr(self, name), Description):
                 entries[name] = part.updated(**entry)
         return self.model_copy(update=entries)
+
+    def set_entries(self) -> dict[str, Any]:
+        """Return the entries that it was given, as tables have them; descriptions in them stay such."""
+        return nested({key: getattr(self, key) for key in self.model_fields_set})
+
+
+def nested(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it; tables in it are copies."""
+    outer: dict[str, Any] = {}
+    for name, value in table.items():
+        finger, dot, inner = name.partition(".")
+        value = nested(value) if isinstance(value, dict) else value
+        if dot:
+            outer.setdefault(finger, {})[inner] = value
+        else:
+            outer[name] = value
+    return outer
 
 
 def problem(entry: str, allowed: str, value: Any = None) -> PydanticCustomError:
@@ -205,12 +222,12 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
         entry = f"{entry}{'' if below.startswith('[') or not below or not entry else '.'}{below}"
         raise InputError(entry, context["allowed"], context["value"].content) from None
     if found["type"] == "extra_forbidden":
-        names = sorted(_fields(model, location[:-1]))
+        names = sorted(field_names(model, location[:-1]))
         near = _MEANT.get(location[-1], "") if _MEANT.get(location[-1]) in names else nearest(location[-1], names)
         hint = f"; did you mean {'.'.join([*prefix, *location[:-1], near])}?" if near else ""
         raise InputError(entry, f"unknown key; allowed here: {', '.join(names)}{hint}") from None
     if found["type"] == "missing":
-        raise InputError(entry, f"is missing: {_document(model, location)}") from None
+        raise InputError(entry, f"is missing: {document(model, location)}") from None
     message = found["msg"]
     cause = found.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
@@ -233,46 +250,6 @@ _MESSAGES = {
     "too_short": "must have at least one entry",
     "greater_than_equal": "must be at least 0",
 }
-
-
-def _fields(model: type[BaseModel], location: Iterable[str]) -> list[str]:
-    """Return the field names of the model found by following a location through nested models and tables."""
-    current: Any = model
-    for part in location:
-        if isinstance(current, type) and issubclass(current, BaseModel):
-            current = _inner(current.model_fields[part].annotation)
-        elif isinstance(current, dict):
-            current = current["values"]
-    if isinstance(current, type) and issubclass(current, Description):
-        return [*current.model_fields, *current.file_keys]
-    return []
-
-
-def _inner(annotation: Any) -> Any:
-    """Return the model behind an annotation; for a table of models, a dictionary that says so."""
-    arguments = get_args(annotation)
-    tables = [each for each in (annotation, *arguments) if getattr(each, "__origin__", None) is dict]
-    if tables:
-        return {"values": _inner(get_args(tables[0])[1])}
-    models = [each for each in (annotation, *arguments) if isinstance(each, type) and issubclass(each, BaseModel)]
-    return models[0] if models else annotation
-
-
-def find_field(model: type[BaseModel], location: Sequence[str]) -> FieldInfo | None:
-    """Return the field at a location through nested models and tables, or None if there is none."""
-    owner: Any = model
-    for part in location[:-1]:
-        fields = getattr(owner, "model_fields", {})
-        owner = (
-            owner["values"] if isinstance(owner, dict) else _inner(fields[part].annotation if part in fields else None)
-        )
-    field: FieldInfo | None = getattr(owner, "model_fields", {}).get(location[-1])
-    return field
-
-
-def _document(model: type[BaseModel], location: list[str]) -> str:
-    field = find_field(model, location)
-    return str(field.description if field and field.description else "a table")
 
 
 def checker(low: float, high: float, above: bool, hint: str, whole: bool = False) -> Callable[[Any, str], float]:

@@ -149,7 +149,7 @@ class Simulator:
             InputError: Naming the entry that is wrong, or if the finger had another state; nothing has changed then.
         """
         if self._family is None or self._family.keys != tuple(values):
-            self._family = ParametrisedScenario.of_finger(self.finger.description, tuple(values))
+            self._family = ParametrisedScenario.from_finger(self.finger.description, tuple(values))
         described = self._family.with_values([*values.values()]).finger
         changed = self.finger.changed(described, self.finger.constructor_args.objects)
         if changed.layout.names != self.finger.layout.names:

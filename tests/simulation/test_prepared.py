@@ -10,6 +10,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.tables import build_tables
+from finger_pin.description.loading import read_scenario
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.exceptions import InputError, Interrupted
 
@@ -199,3 +200,26 @@ def test_what_is_prepared_and_what_is_stepped_print_in_one_line_what_they_are():
     assert repr(prepared) == "Prepared(reversals, controller.gain=1.0; records joint_position)"
     simulator = fp.Simulator("ub_stand_in", position=[0.0, 0.3, 0.25, 0.2])
     assert repr(simulator) == "Simulator(ub_stand_in at t = 0 s, theta = [0, 0.3, 0.25, 0.2] rad)"
+
+
+ARM_AND_BALL = """<mujoco><worldbody>
+  <body name="arm"><joint name="turn" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 0.1" size="0.01" mass="0.1"/></body>
+  <body name="ball" pos="1 0 0"><freejoint/><geom size="0.02" mass="0.06"/></body>
+</worldbody></mujoco>"""
+
+
+def test_keys_of_an_imported_object_act_beside_objects_of_the_scenario():
+    mujoco = pytest.importorskip("mujoco")
+    finger = fp.from_mujoco(mujoco.MjModel.from_xml_string(ARM_AND_BALL)).model_dump(exclude_none=True)
+    other = {"shape": "sphere", "radius": 0.01, "mass": 0.1, "position": [2.0, 0.0, 0.0]}
+    scenario = read_scenario({"name": "arm", "finger": finger, "environment": {"objects": {"other": other}}})
+    key = "finger.tree.objects.ball.mass"
+    for changed_mass in (
+        ParametrisedScenario(scenario, [key]).with_values([0.5]),
+        fp.load_scenario(scenario, {key: 0.5}),
+    ):
+        assert {name: each.mass for name, each in changed_mass.environment.objects.items()} == {
+            "ball": 0.5,
+            "other": 0.1,
+        }

@@ -1,0 +1,48 @@
+"""Fields of descriptions, found by a location through nested models and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+
+def field_names(model: type[BaseModel], location: Iterable[str]) -> list[str]:
+    """Return the field names of the model found by following a location through nested models and tables."""
+    current: Any = model
+    for part in location:
+        if isinstance(current, type) and issubclass(current, BaseModel):
+            current = _inner(current.model_fields[part].annotation)
+        elif isinstance(current, dict):
+            current = current["values"]
+    return [*getattr(current, "model_fields", ()), *getattr(current, "file_keys", ())]
+
+
+def _inner(annotation: Any) -> Any:
+    """Return the model behind an annotation; for a table of models, a dictionary that says so."""
+    arguments = get_args(annotation)
+    tables = [each for each in (annotation, *arguments) if getattr(each, "__origin__", None) is dict]
+    if tables:
+        return {"values": _inner(get_args(tables[0])[1])}
+    models = [each for each in (annotation, *arguments) if isinstance(each, type) and issubclass(each, BaseModel)]
+    return models[0] if models else annotation
+
+
+def find_field(model: type[BaseModel], location: Sequence[str]) -> FieldInfo | None:
+    """Return the field at a location through nested models and tables, or None if there is none."""
+    owner: Any = model
+    for part in location[:-1]:
+        fields = getattr(owner, "model_fields", {})
+        owner = (
+            owner["values"] if isinstance(owner, dict) else _inner(fields[part].annotation if part in fields else None)
+        )
+    field: FieldInfo | None = getattr(owner, "model_fields", {}).get(location[-1])
+    return field
+
+
+def document(model: type[BaseModel], location: Sequence[str]) -> str:
+    """Return what the field at a location is, in words."""
+    field = find_field(model, location)
+    return str(field.description if field and field.description else "a table")
