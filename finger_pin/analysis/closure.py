@@ -157,7 +157,7 @@ def locking_over_range(finger: FingerLike, samples: int = 64) -> tuple[CriticalF
 
 def _closure(finger: Finger, position: Array) -> tuple[ForceClosure, float]:
     """Return the internal tensions at a posture, and their margin, signed if there is one balance alone."""
-    closure = ForceClosure.of(finger.coupling_at(position), finger.routing.tendons)
+    closure = ForceClosure.from_coupling(finger.coupling_at(position), finger.routing.tendons)
     balances = closure.null_space
     if balances.shape[1] != 1:
         return closure, float(closure.tension.min()) if balances.shape[1] else -1.0

@@ -148,7 +148,7 @@ class RoutedController(LoopController):
     def _planned(self, torque: Array, position: Array) -> Array:
         coupling = self.finger.coupling_at(position)
         minimal = np.linalg.pinv(coupling.T) @ torque
-        closure = ForceClosure.of(coupling, self.finger.routing.tendons)
+        closure = ForceClosure.from_coupling(coupling, self.finger.routing.tendons)
         if not closure.holds:
             return np.maximum(minimal, self.minimum)
         level = np.max(internal_level(self.minimum, minimal, closure.tension))

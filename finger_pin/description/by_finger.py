@@ -40,24 +40,29 @@ def of_finger(settings: _Settings, name: str) -> _Settings:
     A table of another ``kind`` replaces, rather than completes.
     """
     whole = settings.updated(fingers=None)
-    own: _Settings | None = (getattr(settings, "fingers") or {}).get(name)  # noqa: B009
-    if own is None:
+    settings_of_finger: _Settings | None = (getattr(settings, "fingers") or {}).get(name)  # noqa: B009
+    if settings_of_finger is None:
         return whole
-    if getattr(own, "kind", None) != getattr(whole, "kind", None) and "kind" in own.model_fields_set:
-        return own
-    return whole.model_copy(update={entry: getattr(own, entry) for entry in own.model_fields_set})
+    if (
+        getattr(settings_of_finger, "kind", None) != getattr(whole, "kind", None)
+        and "kind" in settings_of_finger.model_fields_set
+    ):
+        return settings_of_finger
+    return whole.model_copy(
+        update={entry: getattr(settings_of_finger, entry) for entry in settings_of_finger.model_fields_set}
+    )
 
 
 def _flat(table: Any, holds_tables: Callable[[dict[str, Any]], bool]) -> Any:
     if not isinstance(table, dict):
         return table
-    found = {}
+    flat = {}
     for name, value in table.items():
         if isinstance(value, dict) and value and holds_tables(value):
-            found.update({f"{name}.{own}": each for own, each in value.items()})
+            flat.update({f"{name}.{own}": each for own, each in value.items()})
         else:
-            found[name] = value
-    return found
+            flat[name] = value
+    return flat
 
 
 def error_of_finger(finger: str, error: PydanticCustomError) -> PydanticCustomError:

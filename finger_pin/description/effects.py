@@ -41,11 +41,11 @@ _OPEN = 'has no effect with controller.kind = "tensions"'
 def wound_tendons(scenario: Any, controller: Any) -> set[str]:
     """Return the names of the tendons that are wound: by a length, or by the angle or the voltage of a motor."""
     angles = {*(controller.spool_angle or ()), *(controller.motor_voltage or ())}
-    given = {*(controller.tendon_winding or {})}
-    for name, each in scenario.finger.actuators.items():
-        if name in angles or given.intersection(each.tendons):
-            given.update(each.tendons)
-    return given | {name for name, each in scenario.finger.tendons.items() if each.winch}
+    wound = {*(controller.tendon_winding or {})}
+    for name, actuator in scenario.finger.actuators.items():
+        if name in angles or wound.intersection(actuator.tendons):
+            wound.update(actuator.tendons)
+    return wound | {name for name, actuator in scenario.finger.tendons.items() if actuator.winch}
 
 
 def _paths(finger: Any) -> tuple[str, ...]:
@@ -232,20 +232,20 @@ def shown(value: Any) -> Any:
 
 def _tables(described: Any, name: str) -> Iterator[tuple[str, Description]]:
     """Yield the tables that a name stands for, with what comes before their entries' names."""
-    found: list[tuple[str, Any]] = [("", described)]
+    tables: list[tuple[str, Any]] = [("", described)]
     for part in name.split(".") if name else ():
         if part == "*":
-            found = [(f"{before}{key}.", each) for before, table in found for key, each in table.items()]
+            tables = [(f"{before}{key}.", each) for before, table in tables for key, each in table.items()]
         else:
-            inner = [(f"{before}{part}.", getattr(table, part)) for before, table in found]
-            found = [(before, each) for before, each in inner if each]
-    yield from found
+            inner = [(f"{before}{part}.", getattr(table, part)) for before, table in tables]
+            tables = [(before, each) for before, each in inner if each]
+    yield from tables
 
 
 def _differs(table: Description, entry: str, value: Any) -> bool:
     """Return whether a value is another than the default, once for all or for each, and asks for anything."""
     default = type(table).model_fields[entry].default
-    alike = isinstance(value, tuple) and all(each == default for each in value)
+    uniform = isinstance(value, tuple) and all(each == default for each in value)
     # Zero asks for none of what there is not.
     none = not isinstance(value, bool) and value == 0
-    return value is not None and value != default and not alike and not none
+    return value is not None and value != default and not uniform and not none

@@ -109,8 +109,8 @@ class FingerDescription(Description):
                     allowed = f"no such actuator or tendon; there are {', '.join(driven)}"
                     raise problem(f"tree.keyframes.{key}.inputs.{name}", allowed)
         check_actuators(self.actuators, self.actuated_names, self.passive_names)
-        for key, each in self.actuators.items():
-            for name in each.tendons:
+        for key, actuator in self.actuators.items():
+            for name in actuator.tendons:
                 if self.tendons[name].maximum_tension is not None:
                     allowed = f"is for ideal sources: actuators.{key} pulls it"
                     raise problem(f"tendons.{name}.maximum_tension", allowed, self.tendons[name].maximum_tension)
@@ -295,6 +295,6 @@ class HandSettings(Description):
 
 @memoised(lambda name, placed, gravity: (name, placed, gravity))
 def _placed_finger(name: str, placed: PlacedFinger, gravity: tuple[float, float, float]) -> FingerDescription:
-    own = placed.rotation.T @ np.array(gravity)
+    gravity_of_finger = placed.rotation.T @ np.array(gravity)
     finger = scaled(placed.finger, placed.scale)
-    return finger.updated(name=name, gravity=tuple(own.tolist()))
+    return finger.updated(name=name, gravity=tuple(gravity_of_finger.tolist()))

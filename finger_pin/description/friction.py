@@ -146,12 +146,12 @@ def bristles(law: JointFrictionSettings | TendonFrictionSettings, size: int, mor
         more: Level without load besides the drag and the floor of ``law``, of the same unit.
     """
     names = ("viscous", "stribeck_velocity", "floor", "stribeck_exponent")
-    found: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}
+    numbers: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}
     softest, give = _TENDON_BRISTLES if isinstance(law, TendonFrictionSettings) else _JOINT_BRISTLES
-    level = np.maximum(np.maximum(expand(law.drag, size), found["floor"]), more)
+    level = np.maximum(np.maximum(expand(law.drag, size), numbers["floor"]), more)
     # In a hand some fingers may give it.
     stated = law.stiffness if isinstance(law.stiffness, tuple) else (law.stiffness,) * size
     free = np.array([each is None for each in stated])
-    own = np.array([0.0 if each is None else each for each in stated])
-    found["stiffness"] = np.where(free, np.maximum(softest, level / give), own)
-    return found | {"hardening": _PARTS * free / give, "lag": expand(law.micro_damping, size) / found["stiffness"]}
+    stiffness = np.array([0.0 if each is None else each for each in stated])
+    numbers["stiffness"] = np.where(free, np.maximum(softest, level / give), stiffness)
+    return numbers | {"hardening": _PARTS * free / give, "lag": expand(law.micro_damping, size) / numbers["stiffness"]}

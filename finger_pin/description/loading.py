@@ -263,15 +263,15 @@ def _plain(value: Any, long: list[str]) -> Any:
     Times that a neighbour has already are that neighbour's name.
     """
     if isinstance(value, dict):
-        found, timed = {}, dict[str, Any]()
+        plain, timed = {}, dict[str, Any]()
         for key, item in value.items():
             times = item.get("times") if isinstance(item, dict) else None
             if times is not None and len(times) > _MANY:
                 same = next((name for name, other in timed.items() if other == times), None)
                 item = item if same is None else item | {"times": same}
                 timed[key] = times
-            found[key] = _plain(item, long)
-        return found
+            plain[key] = _plain(item, long)
+        return plain
     if not isinstance(value, tuple | Series):
         return value
     if len(value) > _MANY:

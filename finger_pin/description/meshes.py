@@ -48,9 +48,9 @@ def _pack(values: Any, kind: str) -> str:
 
 def _unpack(entry: str, text: str, kind: str) -> NDArray[Any]:
     try:
-        found = np.frombuffer(zlib.decompress(base64.b64decode(text, validate=True)), dtype=kind).reshape(-1, 3)
+        triples = np.frombuffer(zlib.decompress(base64.b64decode(text, validate=True)), dtype=kind).reshape(-1, 3)
     except (binascii.Error, zlib.error, ValueError) as error:
         raise problem(entry, f"must be numbers in threes, compressed by zlib, in base64 ({error})") from None
-    if not len(found):
+    if not len(triples):
         raise problem(entry, "must not be empty")
-    return found
+    return triples

@@ -98,9 +98,9 @@ class Object(ObjectState, Shaped):
 
     @property
     def quaternion(self) -> Array:
-        """Its orientation as a unit quaternion, shape (4,)."""
-        found = np.array(self.orientation)
-        return np.asarray(found / np.linalg.norm(found))
+        """The orientation as a unit quaternion, shape (4,)."""
+        quaternion = np.array(self.orientation)
+        return np.asarray(quaternion / np.linalg.norm(quaternion))
 
     @property
     def pose(self) -> Array:

@@ -43,10 +43,10 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
     for key in whole:
         del overrides[key]
     for kind, other in (("hand", "finger"), ("finger", "hand")):
-        given = {key: whole.pop(key) for key in (kind, f"{kind}.base") if key in whole}
-        if given:
+        chosen = {key: whole.pop(key) for key in (kind, f"{kind}.base") if key in whole}
+        if chosen:
             table.pop(other, None)
-        _apply(given, table)
+        _apply(chosen, table)
     for key in (*whole, *overrides):
         refuse_other(key, hand="hand" in table, finger="finger" in table)
     if "hand" in table:
@@ -131,8 +131,8 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
     present: dict[tuple[str, ...], tuple[str, Iterable[str]]] = {}
     for place, what in _BY_NAME.items():
         present[place] = ("finger", hand) if hand else (what, as_table(finger.get(f"{what}s")))
-        for key, each in hand.items():
-            present[*place, key] = what, as_table(as_table(each).get(f"{what}s"))
+        for key, table_of_finger in hand.items():
+            present[*place, key] = what, as_table(as_table(table_of_finger).get(f"{what}s"))
     if hand:
         present |= {("controller", "fingers"): ("finger", hand), ("environment", "fingers"): ("finger", hand)}
     present["environment", "objects"] = "object", siblings

@@ -33,7 +33,7 @@ _MOST_TENSION = 1e6
 
 
 def check_density(mass: float, inertia: float) -> None:
-    """Raise the error of a mass that nothing has which is no larger than its inertia says.
+    """Refuse a mass that is too large for its moments of inertia: denser than any material.
 
     Of all bodies that are nowhere denser than a material the ball of it has the least sum of moments of inertia.
 

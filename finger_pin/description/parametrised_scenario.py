@@ -22,7 +22,7 @@ _INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6}(,\d{1,6})*)\]")
 
 
 class ParametrisedScenario:
-    """A scenario, and those that other values at some of its keys make of it.
+    """Scenario of which some keys take other values.
 
     A scenario with other numbers is what `load_scenario` returns with the same overrides.
 
@@ -34,7 +34,7 @@ class ParametrisedScenario:
     """
 
     def __init__(self, scenario: Scenario, keys: Sequence[str]) -> None:
-        """Find the keys.
+        """Read the keys and their present values.
 
         Raises:
             InputError: If there is no such key.

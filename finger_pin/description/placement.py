@@ -116,18 +116,20 @@ def _kinds(part: Any, group: str) -> tuple[str, ...]:
 
 
 def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dict[str, Any]:
-    of_all = [kind for each in kinds for kind in each]
+    of_all = [kind for of_table in kinds for kind in of_table]
     order = sorted(range(len(of_all)), key=of_all.__getitem__)
-    found: dict[str, Any] = {}
+    lists: dict[str, Any] = {}
     for entry in type(tables[0]).model_fields:
         if entry in ("law", "place"):
             group = "joint_friction" if entry == "law" else "tendon_friction"
-            found[entry] = _one(f"{group}.{entry}", [getattr(table, entry) for table in tables])
+            lists[entry] = _one(f"{group}.{entry}", [getattr(table, entry) for table in tables])
             continue
         pairs = zip(tables, kinds, strict=True)
-        numbers = [number for table, own in pairs for number in _each(getattr(table, entry), len(own))]
-        found[entry] = tuple([numbers[place] for place in order])
-    return found
+        numbers = [
+            number for table, kinds_of_table in pairs for number in _numbers(getattr(table, entry), len(kinds_of_table))
+        ]
+        lists[entry] = tuple([numbers[place] for place in order])
+    return lists
 
 
 def _one(key: str, values: Sequence[str]) -> str:
@@ -141,7 +143,7 @@ def _one(key: str, values: Sequence[str]) -> str:
     return values[0]
 
 
-def _each(value: Numbers | None, size: int) -> Sequence[float | None]:
+def _numbers(value: Numbers | None, size: int) -> Sequence[float | None]:
     return value if isinstance(value, tuple) else [None if value is None else float(value)] * size
 
 

@@ -94,7 +94,7 @@ def bench_file(name: str) -> str:
     return str(resources.files("finger_pin.description").joinpath(f"benches/{name}.toml")) if shipping else name
 
 
-def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tuple[Table, Path]:
+def read_scenario_file(name: str, folder: Path, opened: tuple[Path, ...] = ()) -> tuple[Table, Path]:
     """Return the table of a scenario on top of the ones that it extends, and the folder that it lies in.
 
     A bench is a scenario too; where a scenario has the same name, that one is meant.
@@ -103,7 +103,7 @@ def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> 
         name = bench_file(name)
     table, path = _read("scenario", name, folder)
     identity = path.resolve()
-    if identity in seen:
+    if identity in opened:
         raise InputError("extends", "a scenario cannot start from itself", name)
     folder = path.parent
     resolve_signals(table, folder)
@@ -113,7 +113,7 @@ def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> 
     base = table.pop("extends")
     if not isinstance(base, str):
         raise InputError("extends", "must be the name or path of another scenario", base)
-    parent, parent_folder = read_scenario_file(base, folder, (*seen, identity))
+    parent, parent_folder = read_scenario_file(base, folder, (*opened, identity))
     parent.pop("name", None)
     if "finger" in parent:
         parent["finger"] = resolve_finger(parent["finger"], parent_folder)
@@ -129,20 +129,20 @@ def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> 
     return merge(parent, table), folder
 
 
-def _opened(kind: str, name: str, folder: Path, seen: tuple[Path, ...]) -> tuple[Table, Path, tuple[Path, ...]]:
+def _opened(kind: str, name: str, folder: Path, opened: tuple[Path, ...]) -> tuple[Table, Path, tuple[Path, ...]]:
     """Return the table of a named finger or hand, the folder that its paths start from, and the files seen so far."""
     table, path = _read(kind, name, folder)
     identity = path.resolve()
-    if identity in seen:
+    if identity in opened:
         raise InputError(f"{kind}.base", f"a {kind} cannot start from itself", name)
     table.setdefault("name", as_name(Path(name).stem))
-    return table, path.parent, (*seen, identity)
+    return table, path.parent, (*opened, identity)
 
 
-def resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
+def resolve_finger(finger: Any, folder: Path, opened: tuple[Path, ...] = ()) -> Any:
     """Return the table of a finger given by name, by path, or as a table that may start from a base."""
     if isinstance(finger, str):
-        return resolve_finger(*_opened("finger", finger, folder, seen))
+        return resolve_finger(*_opened("finger", finger, folder, opened))
     if isinstance(finger, Description):
         return finger
     if isinstance(finger, dict) and "base" in finger:
@@ -150,7 +150,7 @@ def resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> An
         base = rest.pop("base")
         if not isinstance(base, str):
             raise InputError("finger.base", "must be the name or path of a finger", base)
-        return with_motors(merge(resolve_finger(base, folder, seen), rest), folder)
+        return with_motors(merge(resolve_finger(base, folder, opened), rest), folder)
     if not isinstance(finger, dict):
         raise InputError("finger", "must be the name of a finger, the path of a .toml file, or a table", finger)
     return with_motors(finger, folder)
@@ -164,24 +164,24 @@ def with_motors(finger: Table, folder: Path) -> Table:
     return finger
 
 
-def _resolve_motor(motor: Any, folder: Path, entry: str, seen: tuple[Path, ...] = ()) -> Any:
+def _resolve_motor(motor: Any, folder: Path, entry: str, opened: tuple[Path, ...] = ()) -> Any:
     """Return the table of a motor given by name, by path, or as a table that may start from a base."""
     if isinstance(motor, str):
         table, path = _read("motor", motor, folder, entry)
         identity = path.resolve()
-        if identity in seen:
+        if identity in opened:
             raise InputError(entry, "a motor cannot start from itself", motor)
-        return _resolve_motor(table, path.parent, entry, (*seen, identity))
+        return _resolve_motor(table, path.parent, entry, (*opened, identity))
     if isinstance(motor, dict) and "base" in motor:
         rest = dict(motor)
-        return merge(as_table(_resolve_motor(rest.pop("base"), folder, entry, seen)), rest)
+        return merge(as_table(_resolve_motor(rest.pop("base"), folder, entry, opened)), rest)
     return motor
 
 
-def resolve_hand(hand: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
+def resolve_hand(hand: Any, folder: Path, opened: tuple[Path, ...] = ()) -> Any:
     """Return the table of a hand given by name, by path, or as a table that may start from a base."""
     if isinstance(hand, str):
-        return resolve_hand(*_opened("hand", hand, folder, seen))
+        return resolve_hand(*_opened("hand", hand, folder, opened))
     if isinstance(hand, Description):
         return hand
     if not isinstance(hand, dict):
@@ -190,7 +190,7 @@ def resolve_hand(hand: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
     base = rest.pop("base", {})
     if not isinstance(base, str | dict):
         raise InputError("hand.base", "must be the name or path of a hand", base)
-    return _on_top(resolve_hand(base, folder, seen) if base else {}, rest, folder)
+    return _on_top(resolve_hand(base, folder, opened) if base else {}, rest, folder)
 
 
 def _on_top(base: Table, hand: Table, folder: Path) -> Table:
@@ -226,12 +226,12 @@ def resolve_signals(table: Table, folder: Path) -> None:
         if isinstance(settings, dict) and key in settings:
             apart = WINDINGS if section == "controller" else {}
             samples = read_signals(f"{section}.{key}", settings.pop(key), folder, unit, apart)
-            for name, each in samples.items():
-                before, _, own = name.partition(".")
-                chosen, known = (before, own) if own and before in apart else (target, name)
+            for name, signal in samples.items():
+                before, _, inner = name.partition(".")
+                chosen, known = (before, inner) if inner and before in apart else (target, name)
                 if not isinstance(settings.get(chosen, {}), dict):
                     raise InputError(f"{section}.{chosen}", f"must be a table beside {section}.{key}", settings[chosen])
-                settings[chosen] = {**as_table(settings.get(chosen)), known: each}
+                settings[chosen] = {**as_table(settings.get(chosen)), known: signal}
     _share_times(table)
 
 
@@ -241,17 +241,17 @@ def _share_times(table: Table) -> None:
     # Tables may be nested more deeply than calls.
     while inner:
         place, around = inner.pop()
-        for name, each in around.items():
-            if not isinstance(each, dict):
+        for name, entry in around.items():
+            if not isinstance(entry, dict):
                 continue
-            inner.append((f"{place}{name}.", each))
-            times = each.get("times")
+            inner.append((f"{place}{name}.", entry))
+            times = entry.get("times")
             if isinstance(times, str) and not times.startswith(PACKED):
                 shared = as_table(around.get(times)).get("times")
                 if not shared or (isinstance(shared, str) and not shared.startswith(PACKED)):
                     allowed = "must be a list of numbers, or the name of another signal here that has one"
                     raise InputError(f"{place}{name}.times", allowed, times)
-                each["times"] = shared
+                entry["times"] = shared
 
 
 def _resolve_recordings(table: Table, folder: Path) -> None:

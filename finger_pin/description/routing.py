@@ -157,17 +157,17 @@ class Routing:
             return ForceClosure(
                 np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons, posed=False
             )
-        found = [
-            ForceClosure.of(self.coupling[np.ix_(own, joints)], tuple(self.tendons[index] for index in own))
-            for joints, own in self.fingers
+        closures = [
+            ForceClosure.from_coupling(self.coupling[np.ix_(rows, joints)], tuple(self.tendons[row] for row in rows))
+            for joints, rows in self.fingers
         ]
-        if len(found) == 1:
-            return found[0]
+        if len(closures) == 1:
+            return closures[0]
         tension, basis = np.zeros(len(self.tendons)), []
-        for (_, own), each in zip(self.fingers, found, strict=True):
-            tension[own] = each.tension
-            basis.append(np.zeros((len(self.tendons), each.null_space.shape[1])))
-            basis[-1][own] = each.null_space
+        for (_, rows), closure in zip(self.fingers, closures, strict=True):
+            tension[rows] = closure.tension
+            basis.append(np.zeros((len(self.tendons), closure.null_space.shape[1])))
+            basis[-1][rows] = closure.null_space
         return ForceClosure(np.hstack(basis), tension, self.tendons)
 
     def curvature(self, position: Array) -> Array:
@@ -204,7 +204,7 @@ class ForceClosure:
     posed: bool = True
 
     @classmethod
-    def of(cls, coupling: Array, tendons: tuple[str, ...]) -> ForceClosure:
+    def from_coupling(cls, coupling: Array, tendons: tuple[str, ...]) -> ForceClosure:
         """Find the internal tensions of a coupling matrix H_c, shape (t, n)."""
         # The radii differ by less than a few orders of magnitude, so a relative rank tolerance is safe.
         _, sizes, directions = np.linalg.svd(coupling.T)

@@ -60,9 +60,9 @@ class Scenario(Description):
         if self.hand is not None:
             if self.finger is not None:
                 raise problem("finger", "leave it out: the hand has fingers of its own")
-            own, wound = self.controller.fingers or {}, self.controller.tendon_winding or {}
+            settings, wound = self.controller.fingers or {}, self.controller.tendon_winding or {}
             by_finger = {
-                name: [*wound, *((own[name].tendon_winding if name in own else None) or ())]
+                name: [*wound, *((settings[name].tendon_winding if name in settings else None) or ())]
                 for name in self.hand.fingers
             }
             object.__setattr__(self, "hand", hand_with_winches(self.hand, by_finger))
@@ -85,8 +85,8 @@ class Scenario(Description):
         alone, chosen = {} if self.hand is None else self.hand.parts(), {}
         for name in alone or ("",):
             settings, prefix = of_finger(self.controller, name), f"{name}." if name else ""
-            told = settings.model_fields_set & {"kind", *CLOSED_LOOP}
-            if told or any(key.startswith(prefix) for key in self.reference.joints):
+            chosen_loop = settings.model_fields_set & {"kind", *CLOSED_LOOP}
+            if chosen_loop or any(key.startswith(prefix) for key in self.reference.joints):
                 continue
             if (self._part(name, alone[name]) if alone else self)._is_open():
                 kept = {key: getattr(settings, key) for key in settings.model_fields_set - {"sampling", "fingers"}}
@@ -100,8 +100,8 @@ class Scenario(Description):
     def _is_open(self) -> bool:
         """Return whether a finger is given tensions, or can be driven by them in open loop alone."""
         finger = self.finger
-        given = any(getattr(self.controller, table) for table in BY_SOURCE)
-        wound = given or any(tendon.winch for tendon in finger.tendons.values())
+        commanded = any(getattr(self.controller, table) for table in BY_SOURCE)
+        wound = commanded or any(tendon.winch for tendon in finger.tendons.values())
         if wound or finger.tree.actuators or not finger.tendons:
             return True
         routing, springs = Routing.from_description(finger), any(joint.spring for joint in finger.joints.values())
@@ -111,14 +111,16 @@ class Scenario(Description):
 
     def _check_effects(self) -> None:
         """Refuse what has no effect: on no finger of a hand, or, in a finger's own table, on that one."""
-        found = {name: {entry: rest for entry, *rest in idle(part, OF_SCENARIO)} for name, part in self.parts().items()}
-        for name, entries in found.items():
-            own = (self.controller.fingers or {}).get(name)
+        ineffective = {
+            name: {entry: rest for entry, *rest in idle(part, OF_SCENARIO)} for name, part in self.parts().items()
+        }
+        for name, entries in ineffective.items():
+            settings = (self.controller.fingers or {}).get(name)
             for entry, (value, says) in entries.items():
                 table, key = entry.split(".", 1)
-                if own is not None and key in own.model_fields_set:
+                if settings is not None and key in settings.model_fields_set:
                     raise problem(f"{table}.fingers.{name}.{key}", says, shown(value))
-                if all(entry in each for each in found.values()):
+                if all(entry in each for each in ineffective.values()):
                     raise problem(entry, says, shown(value))
 
     def _check_parts(self) -> None:
@@ -166,31 +168,33 @@ class Scenario(Description):
 
     def environments(self) -> dict[str, EnvironmentSettings]:
         """Return the environments of the fingers of a hand, by name; of a finger its own, under no name."""
-        own = self.environment
+        shared = self.environment
         if self.hand is None:
-            return {"": own}
-        return {name: of_finger(own, name) if own.fingers else own for name in self.hand.fingers}
+            return {"": shared}
+        return {name: of_finger(shared, name) if shared.fingers else shared for name in self.hand.fingers}
 
     def _part(self, name: str, alone: HandSettings) -> Scenario:
-        def own(table: Mapping[str, _Item]) -> dict[str, _Item]:
+        def entries_of_finger(table: Mapping[str, _Item]) -> dict[str, _Item]:
             return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
 
-        controller, given = of_finger(self.controller, name), (self.controller.fingers or {}).get(name)
+        controller, settings = of_finger(self.controller, name), (self.controller.fingers or {}).get(name)
         for table in BY_SOURCE:
             if getattr(controller, table) is not None:
                 # In a finger's own table its name may be left out.
-                signals = (getattr(given, table) if given else None) or {}
+                signals = (getattr(settings, table) if settings else None) or {}
                 named = {f"{name}.{key.removeprefix(f'{name}.')}": each for key, each in signals.items()}
-                controller = controller.updated(**{table: own(getattr(self.controller, table) or {}) | named})
+                controller = controller.updated(
+                    **{table: entries_of_finger(getattr(self.controller, table) or {}) | named}
+                )
         simulation, initial = self.simulation, self.simulation.initial
         if initial is not None:
-            start = {"position": own(initial.position), "velocity": own(initial.velocity)}
+            start = {"position": entries_of_finger(initial.position), "velocity": entries_of_finger(initial.velocity)}
             simulation = simulation.updated(initial=start)
         return self.updated(
             finger=alone.joined(),
             hand=alone,
             controller=controller,
-            reference={"joints": own(self.reference.joints)},
+            reference={"joints": entries_of_finger(self.reference.joints)},
             environment=of_finger(self.environment, name),
             simulation=simulation,
         )
@@ -267,7 +271,7 @@ class Scenario(Description):
 
     def _tautness(self, routing: Routing) -> Tautness:
         minimum = expand(self.controller.minimum_tension, len(routing.tendons))
-        return Tautness.of(self.finger, routing, self.coupling(routing), minimum)
+        return Tautness.from_finger(self.finger, routing, self.coupling(routing), minimum)
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
         """Return the constraint of the passive tendons on the references (20)."""

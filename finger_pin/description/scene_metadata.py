@@ -28,10 +28,10 @@ class Embedded(NamedTuple):
 
 def scene_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the attributes of a result of a scenario from which `read_scene` reads."""
-    own, around = scenario.hand or scenario.finger, scenario.environment
-    kind = "hand" if isinstance(own, HandSettings) else "finger"
+    moved, around = scenario.hand or scenario.finger, scenario.environment
+    kind = "hand" if isinstance(moved, HandSettings) else "finger"
     objects = {name: _plain(each) for name, each in (around.objects or {}).items()}
-    return {kind: json.dumps(_plain(own)), "objects": json.dumps(objects)}
+    return {kind: json.dumps(_plain(moved)), "objects": json.dumps(objects)}
 
 
 def read_scene(attributes: Mapping[Any, Any]) -> Embedded:
@@ -48,16 +48,16 @@ def read_scene(attributes: Mapping[Any, Any]) -> Embedded:
 
 # What reads a result asks for it more than once.
 @lru_cache(maxsize=4)
-def _read(kind: str, own: str, objects: str) -> Embedded:
+def _read(kind: str, text: str, objects: str) -> Embedded:
     entry = f"result.attrs.{kind}"
     try:
-        table, around = json.loads(own), json.loads(objects)
+        table, around = json.loads(text), json.loads(objects)
     except ValueError as error:
         raise InputError(entry, "must be a description in JSON") from error
-    found = {name: validate(Object, each, ("result.attrs.objects", name)) for name, each in around.items()}
+    bodies = {name: validate(Object, each, ("result.attrs.objects", name)) for name, each in around.items()}
     if kind == "hand":
-        return Embedded(validate(HandSettings, table, (entry,)).joined(), found)
-    return Embedded(validate(FingerDescription, table, (entry,)), found)
+        return Embedded(validate(HandSettings, table, (entry,)).joined(), bodies)
+    return Embedded(validate(FingerDescription, table, (entry,)), bodies)
 
 
 def _plain(description: Description) -> Any:

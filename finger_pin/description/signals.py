@@ -79,12 +79,12 @@ class SignalSettings(Description):
     def _complete(self) -> Self:
         needed = _NEEDED[self.kind]
         for entry in ("time", "duration", "height", "times", "values"):
-            given = getattr(self, entry)
-            if given is None and entry in needed:
+            value = getattr(self, entry)
+            if value is None and entry in needed:
                 raise problem(entry, f'is missing: kind = "{self.kind}" needs {", ".join(needed)}')
-            if given is not None and entry not in needed:
+            if value is not None and entry not in needed:
                 kinds = " or ".join(f'"{kind}"' for kind, entries in _NEEDED.items() if entry in entries)
-                raise problem(entry, f'is for kind = {kinds}, not "{self.kind}"', given)
+                raise problem(entry, f'is for kind = {kinds}, not "{self.kind}"', value)
         if self.times is not None and self.values is not None:
             if len(self.values) != len(self.times):
                 raise problem("values", f"must be {len(self.times)} numbers, one for each of times", self.values)

@@ -78,12 +78,12 @@ class Shaped(Description):
     @model_validator(mode="after")
     def _sized(self) -> Self:
         for entry in ("radius", "length", "sides"):
-            given, needed = getattr(self, entry), entry in SIZES[self.shape]
-            if given is None and needed:
+            size, needed = getattr(self, entry), entry in SIZES[self.shape]
+            if size is None and needed:
                 raise problem(entry, f'is missing: shape = "{self.shape}" needs {", ".join(SIZES[self.shape])}')
-            if given is not None and not needed:
+            if size is not None and not needed:
                 shapes = ", ".join(each for each, entries in SIZES.items() if entry in entries)
-                raise problem(entry, f'is for {shapes}, not for shape = "{self.shape}"', given)
+                raise problem(entry, f'is for {shapes}, not for shape = "{self.shape}"', size)
         return self
 
     @property

@@ -38,7 +38,9 @@ class Tautness:
     joints: tuple[str, ...]
 
     @classmethod
-    def of(cls, finger: FingerDescription, routing: Routing, coupling: PassiveCoupling, minimum: Array) -> Tautness:
+    def from_finger(
+        cls, finger: FingerDescription, routing: Routing, coupling: PassiveCoupling, minimum: Array
+    ) -> Tautness:
         """Solve the programmes of all corners of a finger without force closure."""
         # Importing it takes a while, which only who needs it shall wait for.
         from scipy.optimize import linprog
@@ -55,7 +57,7 @@ class Tautness:
             base[free] = corner
             posture = coupling.matrix @ base + coupling.offset
             torque = stiffness * (posture - rest) - routing.coupling.T @ minimum
-            found = linprog(
+            programme = linprog(
                 np.append(np.zeros(tendons), -1.0),
                 A_eq=np.hstack([routing.coupling.T / scale, np.zeros((len(joints), 1))]),
                 b_eq=torque / scale,
@@ -63,7 +65,7 @@ class Tautness:
                 b_ub=np.zeros(tendons),
                 bounds=(None, None),
             )
-            spare = float(found.x[-1]) if found.status == 0 else -np.inf
+            spare = float(programme.x[-1]) if programme.status == 0 else -np.inf
             if spare < worst[0]:
                 worst = (spare, posture)
         return cls(*worst, minimum, tuple(finger.joints))

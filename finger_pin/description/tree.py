@@ -169,9 +169,9 @@ class Tree(Description):
         if len(around) != 1 or driven or tendon.stiffness > 0.0:
             return {}
         ((joint, radius),) = around.items()
-        alike = sum(other * radius > 0.0 for other in self._radii_about(joint))
+        sharing = sum(other * radius > 0.0 for other in self._radii_about(joint))
         drives = {key: each.gear for key, each in self.actuators.items() if each.joint == joint}
-        return {key: -gear / (radius * alike) for key, gear in drives.items()}
+        return {key: -gear / (radius * sharing) for key, gear in drives.items()}
 
     def opposed(self, name: str) -> bool:
         """Return whether another cord pulls the other way about the only joint of a cord."""
@@ -185,11 +185,11 @@ class Tree(Description):
 
     def _movers(self, body: str | None) -> set[str]:
         """Return the joints that move a body."""
-        found = set[str]()
+        movers = set[str]()
         while body is not None:
-            found |= {name for name, joint in self.joints.items() if joint.body == body}
+            movers |= {name for name, joint in self.joints.items() if joint.body == body}
             body = self.bodies[body].parent
-        return found
+        return movers
 
 
 #: What a finger of links has beside its own joints and tendons: nothing.

@@ -127,9 +127,9 @@ class TreeActuator(Description):
         if self.state_range is not None and not self.has_state:
             raise problem("state_range", "is for time_constant, integrates or integral", list(self.state_range))
         for entry in ("input_range", "force_range", "state_range"):
-            given = getattr(self, entry)
-            if given is not None and given[0] > given[1]:
-                raise problem(entry, "the lower limit must not be above the upper one", list(given))
+            limits = getattr(self, entry)
+            if limits is not None and limits[0] > limits[1]:
+                raise problem(entry, "the lower limit must not be above the upper one", list(limits))
         return self
 
     def reach(self, joint: Pair | None) -> Pair | None:

@@ -146,8 +146,8 @@ def choice(*allowed: str) -> BeforeValidator:
 def nearest(name: Any, names: Iterable[str]) -> str | None:
     """Return the name that a misspelt one most likely means, or None."""
     folded = {candidate.casefold(): candidate for candidate in names}
-    found = difflib.get_close_matches(str(name).casefold(), folded, n=1, cutoff=0.6)
-    return folded[found[0]] if found else None
+    near = difflib.get_close_matches(str(name).casefold(), folded, n=1, cutoff=0.6)
+    return folded[near[0]] if near else None
 
 
 def suggestion(name: Any, names: Iterable[str]) -> str:
@@ -179,10 +179,10 @@ def finite_vector(name: str, value: Sequence[float] | NDArray[np.float64], size:
     Raises:
         InputError: If it has another shape or a number is not finite; ``name`` names the argument.
     """
-    found = np.asarray(value, dtype=float)
-    if found.shape != (size,) or not np.isfinite(found).all():
-        raise InputError(name, f"must be {size} finite {'number' if size == 1 else 'numbers'}", found.tolist())
-    return found
+    numbers = np.asarray(value, dtype=float)
+    if numbers.shape != (size,) or not np.isfinite(numbers).all():
+        raise InputError(name, f"must be {size} finite {'number' if size == 1 else 'numbers'}", numbers.tolist())
+    return numbers
 
 
 def check_size(value: Numbers, names: Sequence[str], entry: str, what: str) -> None:
@@ -211,28 +211,27 @@ def validate(model: type[_Model], table: Any, prefix: tuple[str, ...]) -> _Model
 
 def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str, ...]) -> NoReturn:
     # A misspelt key also makes the right one missing: the cause comes first.
-    found = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
-    location = [str(part) for part in found["loc"] if part != "[key]"]
+    failure = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+    location = [str(part) for part in failure["loc"] if part != "[key]"]
     entry = ".".join([*prefix, *location])
-    given = found["input"]
-    value = None if isinstance(given, dict) else given
-    if found["type"] == "entry":
-        context = found["ctx"]
+    value = None if isinstance(failure["input"], dict) else failure["input"]
+    if failure["type"] == "entry":
+        context = failure["ctx"]
         below = str(context["entry"])
         entry = f"{entry}{'' if below.startswith('[') or not below or not entry else '.'}{below}"
         raise InputError(entry, context["allowed"], context["value"].content) from None
-    if found["type"] == "extra_forbidden":
+    if failure["type"] == "extra_forbidden":
         names = sorted(field_names(model, location[:-1]))
         near = _MEANT.get(location[-1], "") if _MEANT.get(location[-1]) in names else nearest(location[-1], names)
         hint = f"; did you mean {'.'.join([*prefix, *location[:-1], near])}?" if near else ""
         raise InputError(entry, f"unknown key; allowed here: {', '.join(names)}{hint}") from None
-    if found["type"] == "missing":
+    if failure["type"] == "missing":
         raise InputError(entry, f"is missing: {document(model, location)}") from None
-    message = found["msg"]
-    cause = found.get("ctx", {}).get("error")
+    message = failure["msg"]
+    cause = failure.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
         raise cause from None
-    raise InputError(entry, _MESSAGES.get(found["type"], message[:1].lower() + message[1:]), value) from None
+    raise InputError(entry, _MESSAGES.get(failure["type"], message[:1].lower() + message[1:]), value) from None
 
 
 # What people call keys whose names are not near.

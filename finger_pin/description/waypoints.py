@@ -63,22 +63,22 @@ class Waypoint(Description):
         x, y, z, w = self.orientation
         axis, away = np.array([x, y, z]), np.subtract(point.position, self.position)
         # Turned back into the frame of the wrap.
-        seen = away - 2.0 * w * np.cross(axis, away) + 2.0 * np.cross(axis, np.cross(axis, away))
-        return bool(np.linalg.norm(seen[: 2 if self.kind == "cylinder" else 3]) < self.radius)
+        local = away - 2.0 * w * np.cross(axis, away) + 2.0 * np.cross(axis, np.cross(axis, away))
+        return bool(np.linalg.norm(local[: 2 if self.kind == "cylinder" else 3]) < self.radius)
 
 
 def check_path(path: dict[str, Waypoint]) -> None:
     """Refuse a path that does not begin, end and go on with points, pulleys apart."""
     before: str | None = None
-    for name, each in path.items():
-        wraps = each.kind in ("cylinder", "sphere")
+    for name, waypoint in path.items():
+        wraps = waypoint.kind in ("cylinder", "sphere")
         if wraps and before != "point":
             raise problem(f"path.{name}", "a wrap stands between two points")
-        if each.kind == "pulley" and before not in (None, "point"):
+        if waypoint.kind == "pulley" and before not in (None, "point"):
             raise problem(f"path.{name}", "a pulley follows a point")
-        if wraps and each.radius <= 0.0:
-            raise problem(f"path.{name}.radius", "must be above 0", each.radius)
-        before = each.kind
+        if wraps and waypoint.radius <= 0.0:
+            raise problem(f"path.{name}.radius", "must be above 0", waypoint.radius)
+        before = waypoint.kind
     if path and before != "point":
         raise problem("path", "must end with a point")
     for point, wrap in points_inside_wraps(path):

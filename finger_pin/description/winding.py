@@ -20,9 +20,9 @@ def with_winches(finger: FingerDescription, tendons: Sequence[str]) -> FingerDes
     Tendons of a tree that nothing drives are among them.
     """
     driven = {tendon for each in finger.actuators.values() for tendon in each.tendons}
-    tree, taken = finger.tree, {*finger.tendons, *(each.along for each in finger.tendons.values())}
-    taken |= {each.tendon for each in tree.actuators.values()}
-    added = {name: Tendon(along=name, winch=Winch()) for name in tree.tendons if name in tendons and name not in taken}
+    tree, pulled = finger.tree, {*finger.tendons, *(each.along for each in finger.tendons.values())}
+    pulled |= {each.tendon for each in tree.actuators.values()}
+    added = {name: Tendon(along=name, winch=Winch()) for name in tree.tendons if name in tendons and name not in pulled}
     added |= {
         name: tendon.updated(winch=Winch())
         for name, tendon in finger.tendons.items()
@@ -53,8 +53,8 @@ def check_winding(
     motors, names = finger.actuators, finger.actuated_names
     winder = {tendon: motor for motor, each in motors.items() for tendon in each.tendons}
     wound: dict[str, str] = {}
-    for table, given in (("spool_angle", angles), ("motor_voltage", voltages)):
-        for name in given:
+    for table, commanded in (("spool_angle", angles), ("motor_voltage", voltages)):
+        for name in commanded:
             entry = f"controller.{table}.{name}"
             instead = f"controller.tendon_winding.{name}" if name in names else ""
             _check_name(entry, name, "motor", tuple(motors), instead)
@@ -70,8 +70,8 @@ def check_winding(
     for name in lengths:
         entry = f"controller.tendon_winding.{name}"
         instead = f"controller.spool_angle.{name}" if name in motors else ""
-        for servo, each in finger.tree.actuators.items():
-            if each.tendon == name:
+        for servo, actuator in finger.tree.actuators.items():
+            if actuator.tendon == name:
                 instead = f"the input of its actuator, controller.inputs.{servo}"
         _check_name(entry, name, "actuated tendon", names, instead)
         if name in winder:
@@ -101,8 +101,8 @@ def check_sources(finger: FingerDescription, tensions: Iterable[str]) -> None:
     winched = {name: ("a winch holds its length", "") for name, each in finger.tendons.items() if each.winch}
     for tendon in tensions:
         if tendon in (by := holding | winched):
-            held, angle = by[tendon]
-            allowed = f"has two sources: {held}; wind it by {angle}controller.tendon_winding.{tendon} (m)"
+            reason, angle = by[tendon]
+            allowed = f"has two sources: {reason}; wind it by {angle}controller.tendon_winding.{tendon} (m)"
             raise problem(f"controller.tensions.{tendon}", allowed)
 
 

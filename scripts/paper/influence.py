@@ -221,7 +221,7 @@ def _tendons_lock(swing: Scenario) -> float:
         motion = SignalReference.from_scenario(swing, tendons.routing).at(0.5 * swing.simulation.duration)
         for way in (1.0, -1.0):
             coupling = coupling_in_motion(tendons, motion.position, way * motion.velocity)
-            if not ForceClosure.of(coupling, tendons.routing.tendons).holds:
+            if not ForceClosure.from_coupling(coupling, tendons.routing.tendons).holds:
                 return float(factor)
     return float("inf")
 

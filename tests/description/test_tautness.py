@@ -29,7 +29,7 @@ def tautness(description, minimum, coupling=None):
     coupling = coupling or PassiveCoupling.from_routing(
         routing, np.ones(routing.passive), np.full(routing.passive, 1e4)
     )
-    return Tautness.of(description, routing, coupling, np.broadcast_to(minimum, len(routing.tendons)))
+    return Tautness.from_finger(description, routing, coupling, np.broadcast_to(minimum, len(routing.tendons)))
 
 
 def test_one_flexor_against_one_spring_has_the_least_tension_where_the_spring_is_relaxed_most(described):

@@ -116,4 +116,4 @@ def test_tendon_friction_scales_the_rows_of_the_coupling_and_leaves_force_closur
     np.testing.assert_allclose(found[2], [0, 0, 6.3e-3 * np.exp(-0.11 * phi[2]), 0], atol=1e-15)
     np.testing.assert_allclose(found[3], np.array([0, -1, -1, -1]) * 5.3e-3 * np.exp(0.11 * phi[3]), atol=1e-15)
     np.testing.assert_allclose(found[4], [0, 0, -3.5e-3 * (1 + mu), 5e-3 * (1 - mu)], atol=1e-15)
-    assert ForceClosure.of(found, finger.routing.tendons).holds
+    assert ForceClosure.from_coupling(found, finger.routing.tendons).holds

@@ -139,12 +139,12 @@ class IdentifySettings(Description):
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:
         """The bounds of all that is found, by key; what is of one recording begins with its name."""
-        own = {
+        of_recordings = {
             f"{OF_RECORDINGS}{name}.{key}": each
             for name, recording in self.recordings.items()
             for key, each in recording.parameters.items()
         }
-        return self.parameters | own
+        return self.parameters | of_recordings
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -58,12 +58,12 @@ class Table:
         self._headers = {short: (name, unit) for name, short, unit in split if bare.count(short) == 1}
         self._headers |= {name: (name, unit) for name, _, unit in split}
 
-    def column(self, key: str, given: Column, si: str, *, missing: bool = False) -> NDArray[np.float64]:
+    def column(self, key: str, column: Column, si: str, *, missing: bool = False) -> NDArray[np.float64]:
         """Return a column in SI, shape (m,).
 
         Args:
             key: Where it is asked for, below the table's entry.
-            given: Its name, unit, scale and offset; without a unit that of the header counts, else SI.
+            column: Its name, unit, scale and offset; without a unit that of the header counts, else SI.
             si: Unit of the result; empty for that of its own unit.
             missing: Whether cells may be empty; they are not a number.
 
@@ -71,54 +71,54 @@ class Table:
             InputError: If there is no such column, a cell is no number, or the unit does not fit.
         """
         entry = f"{self.entry}.{key}"
-        if given.column not in self._headers:
-            allowed = f"no such column; there are {', '.join(self._columns)}{suggestion(given.column, self._columns)}"
-            raise InputError(entry, allowed, given.column)
-        name, header_unit = self._headers[given.column]
+        if column.column not in self._headers:
+            allowed = f"no such column; there are {', '.join(self._columns)}{suggestion(column.column, self._columns)}"
+            raise InputError(entry, allowed, column.column)
+        name, header_unit = self._headers[column.column]
         cells = self._columns[name]
         if cells.dtype == object:
             row = next(k for k, cell in enumerate(cells) if isinstance(cell, str))
             raise InputError(entry, f"column {name} has no number in row {row + 1}", cells[row])
-        unit = given.unit or header_unit
-        if given.unit is None:
-            check_header(entry, name, header_unit, si, asked=given.scale == 1.0)
-        factor = 1.0 if unit is None else in_si(f"{entry}.unit" if given.unit else entry, unit, si)
-        if given.unit is None and factor != 1.0 and given.scale != 1.0:
-            raise InputError(entry, f"has a scale, and its header a unit; write unit too, such as {unit}", given.scale)
+        unit = column.unit or header_unit
+        if column.unit is None:
+            check_header(entry, name, header_unit, si, asked=column.scale == 1.0)
+        factor = 1.0 if unit is None else in_si(f"{entry}.unit" if column.unit else entry, unit, si)
+        if column.unit is None and factor != 1.0 and column.scale != 1.0:
+            raise InputError(entry, f"has a scale, and its header a unit; write unit too, such as {unit}", column.scale)
         wrong = np.flatnonzero(np.isinf(cells) if missing else ~np.isfinite(cells))
         if len(wrong):
             raise InputError(entry, f"column {name} has no number in row {wrong[0] + 1}")
-        values: NDArray[np.float64] = given.scale * factor * cells
-        if given.supply is not None:
+        values: NDArray[np.float64] = column.scale * factor * cells
+        if column.supply is not None:
             if si != "V" or unit is not None:
-                raise InputError(f"{entry}.supply", "is for a part of a voltage, without a unit", given.supply)
-            values = values * self.column(f"{key}.supply", Column(column=given.supply), "V")
-        values = values + given.offset
+                raise InputError(f"{entry}.supply", "is for a part of a voltage, without a unit", column.supply)
+            values = values * self.column(f"{key}.supply", Column(column=column.supply), "V")
+        values = values + column.offset
         return values
 
-    def names_unit(self, given: Column) -> bool:
+    def names_unit(self, column: Column) -> bool:
         """Return whether a column that is there has a unit or a scale, in its header or beside its name."""
-        return given.unit is not None or given.scale != 1.0 or self._headers[given.column][1] is not None
+        return column.unit is not None or column.scale != 1.0 or self._headers[column.column][1] is not None
 
-    def times(self, key: str, given: Column) -> NDArray[np.float64]:
+    def times(self, key: str, column: Column) -> NDArray[np.float64]:
         """Return a column of times, s, shape (m,).
 
         Raises:
             InputError: Also if they do not increase, or seem to be milliseconds and no unit says that they are not.
         """
-        entry, times = f"{self.entry}.{key}", self.column(key, given, "s")
-        if given.delay:
-            raise InputError(f"{entry}.delay", "is for signals, not for their times", given.delay)
+        entry, times = f"{self.entry}.{key}", self.column(key, column, "s")
+        if column.delay:
+            raise InputError(f"{entry}.delay", "is for signals, not for their times", column.delay)
         back = np.flatnonzero(np.diff(times) <= 0.0)
         if len(times) < 2 or len(back):
             where = f", and do not from row {back[0] + 1} to the next" if len(back) else ""
             raise InputError(entry, f"times must increase, two rows at least{where}")
-        length, unknown = times[-1] - times[0], (given.unit or self._headers[given.column][1]) is None
-        if unknown and given.scale == 1.0 and length >= max(_FAR_APART * (len(times) - 1), _LONG):
-            told = (
-                f'its {len(times)} rows take {length:g} s (is it in milliseconds?); write {{ column = "{given.column}"'
+        length, unknown = times[-1] - times[0], (column.unit or self._headers[column.column][1]) is None
+        if unknown and column.scale == 1.0 and length >= max(_FAR_APART * (len(times) - 1), _LONG):
+            warning = (
+                f'its {len(times)} rows take {length:g} s (is it in milliseconds?); write {{ column = "{column.column}"'
             )
-            raise InputError(entry, f'{told}, unit = "ms" }}, or unit = "s" if they do', given.column)
+            raise InputError(entry, f'{warning}, unit = "ms" }}, or unit = "s" if they do', column.column)
         return times
 
     def signals(self, file: SignalFile) -> Iterator[tuple[str, Column]]:
@@ -127,8 +127,8 @@ class Table:
         Raises:
             InputError: If no column is named as times are.
         """
-        found = [(name, *split_unit(name, BRACKETED, APPENDED)) for name in self._columns]
-        named = [(short, Column(column=name, unit=unit)) for name, short, unit in found]
+        units = [(name, *split_unit(name, BRACKETED, APPENDED)) for name in self._columns]
+        named = [(short, Column(column=name, unit=unit)) for name, short, unit in units]
         time = file.time or next((column for short, column in named if short.casefold() in _TIMES), None)
         if time is None:
             allowed = (
@@ -140,12 +140,12 @@ class Table:
         yield from file.columns.items() or [each for each in named if each[1].column != apart]
 
 
-def read_signals(entry: str, given: Any, folder: Path, si: str, units: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+def read_signals(entry: str, source: Any, folder: Path, si: str, units: Mapping[str, str]) -> dict[str, dict[str, Any]]:
     """Return the columns of a CSV file as samples of signals, by name.
 
     Args:
         entry: That names the file.
-        given: Its path, or a table of `SignalFile`.
+        source: Its path, or a table of `SignalFile`.
         folder: That a relative path starts from.
         si: Unit of the signals.
         units: Of those whose name begins with one of these and a dot.
@@ -153,23 +153,23 @@ def read_signals(entry: str, given: Any, folder: Path, si: str, units: Mapping[s
     Raises:
         InputError: If the file cannot be read, or a column is not of numbers, or times do not increase.
     """
-    if not isinstance(given, str | dict):
-        raise InputError(entry, "must be the path of a CSV file, or a table with path, time and columns", given)
-    file = validate(SignalFile, given, tuple(entry.split(".")))
+    if not isinstance(source, str | dict):
+        raise InputError(entry, "must be the path of a CSV file, or a table with path, time and columns", source)
+    file = validate(SignalFile, source, tuple(entry.split(".")))
     table = Table(entry, read_columns(f"{entry} {file.path}", folder / expand(file.path)))
     (_, time), *signals = table.signals(file)
     times = table.times("time", time)
     shared = Series(times)
-    found: dict[str, dict[str, Any]] = {}
+    samples: dict[str, dict[str, Any]] = {}
     for name, column in signals:
-        if name in found:
+        if name in samples:
             raise InputError(entry, "two columns are of the same signal", name)
         unit = units.get(name.partition(".")[0], si) if "." in name else si
         values = Series(table.column(f"columns.{name}", column, unit))
         # A column that lags behind its quantity is of earlier times.
         at = Series(times - column.delay) if column.delay else shared
-        found[name] = {"kind": "samples", "times": at, "values": values}
-    return found
+        samples[name] = {"kind": "samples", "times": at, "values": values}
+    return samples
 
 
 def read_columns(what: str, path: Path) -> dict[str, Any]:
@@ -221,8 +221,8 @@ def chosen_rows(entry: str, columns: Mapping[str, Any], rows: Mapping[str, float
             raise InputError(f"{entry}.rows.{name}", allowed)
         here = np.array([cell == value for cell in columns[name]])
         if not here.any():
-            found = list(dict.fromkeys(str(cell) for cell in columns[name]))[:12]
-            raise InputError(f"{entry}.rows.{name}", f"no row has it; there are {', '.join(found)}", value)
+            cells = list(dict.fromkeys(str(cell) for cell in columns[name]))[:12]
+            raise InputError(f"{entry}.rows.{name}", f"no row has it; there are {', '.join(cells)}", value)
         chosen &= here
     if not chosen.any():
         raise InputError(f"{entry}.rows", "no row has all of them")

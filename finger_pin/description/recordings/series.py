@@ -39,8 +39,8 @@ class Series(Sequence[float]):
     def __getitem__(self, index: slice) -> tuple[float, ...]: ...
     def __getitem__(self, index: int | slice) -> float | tuple[float, ...]:
         """Return one number, or a tuple of several."""
-        found = self._values[index].tolist()
-        return tuple(found) if isinstance(index, slice) else found
+        numbers = self._values[index].tolist()
+        return tuple(numbers) if isinstance(index, slice) else numbers
 
     def __iter__(self) -> Iterator[float]:
         """Return the numbers in their order."""

@@ -39,8 +39,8 @@ _NO_UNIT = ("1", "-")
 
 def split_unit(name: str, *patterns: re.Pattern[str]) -> tuple[str, str | None]:
     """Return a name without its unit, and the unit: what is in brackets, known or not."""
-    for found in filter(None, (pattern.fullmatch(name) for pattern in patterns)):
-        return found[1], None if found[2] in _NO_UNIT else found[2]
+    for match in filter(None, (pattern.fullmatch(name) for pattern in patterns)):
+        return match[1], None if match[2] in _NO_UNIT else match[2]
     return name, None
 
 
