@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from finger_pin.description.scenario import Scenario
-    from finger_pin.simulation.results import ResultFolder
+    from finger_pin.simulation.result_folder import ResultFolder
 
 
 class NotDrawn(FingerPinError):
@@ -60,7 +60,7 @@ def simulate(
     from finger_pin.description.loading import load_scenario
     from finger_pin.simulation.convergence import tightened
     from finger_pin.simulation.recording import only
-    from finger_pin.simulation.results import ResultFolder
+    from finger_pin.simulation.result_folder import ResultFolder
 
     loaded = (
         load_scenario("fig6" if scenario is None else scenario, changed)

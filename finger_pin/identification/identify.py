@@ -24,7 +24,7 @@ from finger_pin.identification.pipeline import FitPipeline, Progress, starting_p
 from finger_pin.identification.prediction import check_predictable, predictions
 from finger_pin.identification.problem import Problem, Stopped
 from finger_pin.identification.recordings import read_recording
-from finger_pin.identification.results import results, write_results
+from finger_pin.identification.result_dataset import results, write_results
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.studies.fingerprint import digest as content_digest
 from finger_pin.typing import Array

@@ -9,9 +9,9 @@ From the question to the answer: ``keys`` of a scenario; ``designs`` (and the ``
 from finger_pin.studies.designs import Grid, LatinHypercube, PointList, Range
 from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric
 from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
-from finger_pin.studies.problem import Variable, radii
 from finger_pin.studies.records import ExecutorError
 from finger_pin.studies.response import Run
+from finger_pin.studies.search_problem import Variable, radii
 from finger_pin.studies.sweeping import sweep
 
 __all__ = [

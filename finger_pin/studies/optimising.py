@@ -22,7 +22,9 @@ from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import PointList
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric, metrics_of
-from finger_pin.studies.problem import (
+from finger_pin.studies.records import DONE, Progress, RunRecord, Study, open_study
+from finger_pin.studies.search import HOPELESS, Search, nondominated
+from finger_pin.studies.search_problem import (
     Constraint,
     Goals,
     Variable,
@@ -32,8 +34,6 @@ from finger_pin.studies.problem import (
     radii,
     start_of,
 )
-from finger_pin.studies.records import DONE, Progress, RunRecord, Study, open_study
-from finger_pin.studies.search import HOPELESS, Search, nondominated
 from finger_pin.typing import Array
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]

@@ -166,7 +166,7 @@ def test_a_full_disk_ends_with_one_line_and_earlier_results_stay(run, here, quic
         raise OSError(28, "No space left on device")
 
     if broken == "saving":
-        monkeypatch.setattr("finger_pin.simulation.results.save", fail)
+        monkeypatch.setattr("finger_pin.simulation.result_folder.save", fail)
     else:
         monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", fail)
     code, out, lines = run("s.toml", "--output", "out", "--duration", "0.003")

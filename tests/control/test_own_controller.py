@@ -12,7 +12,7 @@ import finger_pin as fp
 from finger_pin.control.interface import ControlSignals
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.references.reference import ReferenceSignals
-from finger_pin.simulation.results import ResultFolder
+from finger_pin.simulation.result_folder import ResultFolder
 from finger_pin.views.summary import summarize
 
 PULL = np.array([1.0, 1.0, 4.0, 3.0, 3.0])

@@ -15,7 +15,7 @@ import tomli_w
 import finger_pin as fp
 from finger_pin.commands import application
 from finger_pin.references.reference import ReferenceSignals
-from finger_pin.simulation.results import ResultFolder
+from finger_pin.simulation.result_folder import ResultFolder
 from finger_pin.views.plots.saving import draw_all, figures_of
 from finger_pin.views.summary import summarize
 from finger_pin.views.viewer import write_animation, write_video

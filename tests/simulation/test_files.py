@@ -11,7 +11,7 @@ import finger_pin as fp
 from finger_pin.description.loading import load_scenario
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
-from finger_pin.simulation.results import ResultFolder
+from finger_pin.simulation.result_folder import ResultFolder
 from finger_pin.views.summary import summarize
 from finger_pin.views.viewer import write_animation
 

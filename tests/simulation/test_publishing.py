@@ -12,7 +12,7 @@ from test_files import contents, load_text, publish, visible
 
 import finger_pin as fp
 from finger_pin.description.loading import load_scenario
-from finger_pin.simulation.results import ResultFolder
+from finger_pin.simulation.result_folder import ResultFolder
 
 
 def short(duration):
@@ -72,7 +72,7 @@ KILLED = """
 import os, shutil, signal
 from pathlib import Path
 
-from finger_pin.simulation.results import ResultFolder
+from finger_pin.simulation.result_folder import ResultFolder
 
 
 def killing(function):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.simulation.results import ResultFolder
+from finger_pin.simulation.result_folder import ResultFolder
 from finger_pin.views.plots import draw_all
 from finger_pin.views.viewer.animation import write_animation
 
