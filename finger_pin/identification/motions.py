@@ -210,15 +210,17 @@ class RecordedMotion:
         return RunArrays(arrays, coordinates(setup.scenario, setup.loop, times), {})
 
     def _one(self, arrays: RunArrays, name: str) -> Array:
-        """Return one column of a variable, by its labels."""
+        """Return a column of a variable by its labels, or the difference of two, as in ``spool_tension.A-B``."""
         variable, _, label = name.partition(".")
         values, (dims, *_) = arrays[variable], arrays.variables[variable]
         for axis, dim in reversed(list(enumerate(dims))[1:]):
-            labels = [str(each) for each in arrays[dim]]
-            if label not in labels:
-                allowed = f"there is no {label}; there are {', '.join(labels)}"
+            labels, columns = [str(each) for each in arrays[dim]], label.split("-")
+            missing = next((each for each in columns if each not in labels), None)
+            if missing is not None or len(columns) > 2:
+                allowed = f"there is no {missing or label}; there are {', '.join(labels)}, and A-B for a difference"
                 raise InputError(f"{self._entry}.outputs.{name}", allowed)
-            values = np.take(values, labels.index(label), axis=axis)
+            first, *rest = (np.take(values, labels.index(each), axis=axis) for each in columns)
+            values = first - rest[0] if rest else first
         return values
 
     def _put_start(self, table: dict[str, Any], scenario: Scenario, window: int) -> None:

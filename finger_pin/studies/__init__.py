@@ -1,9 +1,9 @@
 """Studies: many runs of a scenario, measured and kept; sweeps over its entries, and searches for better ones.
 
 From the question to the answer: ``keys`` of a scenario; ``designs`` (and the ``parsing`` of a command line) or the
-``problem`` of a ``search``; ``metrics``; ``records`` of runs, and the ``fingerprint`` that they are found by; the
-``executor`` in threads or elsewhere; the ``dataset`` of all. ``sweeping`` and ``optimising`` put these together.
-``batch`` returns whole runs instead of metrics.
+``search_problem`` of a ``search``; ``metrics``; ``records`` of runs, found by their ``fingerprint``; the ``executor``
+in threads or elsewhere; the ``dataset`` of all. ``sweeping`` and ``optimising`` put these together. ``batch`` returns
+whole runs instead of metrics.
 """
 
 from finger_pin.studies.designs import Grid, LatinHypercube, PointList, Range

@@ -135,3 +135,18 @@ def test_what_a_motion_cannot_be_given_is_refused_with_what_it_can():
         fp.InputError, match=r"inputs\.motor_position\.M1: a motion is given tendon_command, spool_angle"
     ):
         fp.identify("canal", parameters={COULOMB: (0.01, 0.5)}, recordings={"pull": told}, data=data)
+
+
+def test_the_difference_of_two_tensions_is_compared_with_a_column():
+    key, truth = "finger.tendon_friction.coulomb", 0.13
+    run = fp.simulate(fp.load_scenario("reversals", {key: truth, "simulation.duration": 0.3}))
+    first, second = (run.tendon_tension.sel(tendon=name).values for name in ("T1", "T2"))
+    data = {"both": {"t": run.time.values, "torque": 8e-3 * (first - second)}}
+    column = {"column": "torque", "scale": 125.0}
+    both = {"time": "t", "outputs": {"tendon_tension.T1-T2": column}}
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.3})
+    found = fp.identify(scenario, parameters={key: [0.05, 0.3]}, recordings={"both": both}, data=data, starts=1)
+    np.testing.assert_allclose(found.estimate, truth, rtol=1e-3)
+    both["outputs"] = {"tendon_tension.T1-T9": column}
+    with pytest.raises(fp.InputError, match=r"there is no T9; there are .* and A-B for a difference"):
+        fp.identify(scenario, parameters={key: [0.05, 0.3]}, recordings={"both": both}, data=data, starts=1)
