@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from finger_pin.description.validation import Description, choice, problem, quantity, real, vector
+from finger_pin.description.validation import Description, choice, direction, problem, quantity, real, vector
 
 #: The sizes of each shape. Solids are about their origin, cylinder and capsule along z; a half-space is z < 0.
 SIZES: dict[str, tuple[str, ...]] = {
@@ -103,12 +102,6 @@ class BodyShape(Shaped):
     position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."
     )
-    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+    orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
     )
-
-    @model_validator(mode="after")
-    def _turned(self) -> Self:
-        if abs(math.hypot(*self.orientation) - 1.0) > 1e-6:
-            raise problem("orientation", "must be a quaternion x, y, z, w of length 1", list(self.orientation))
-        return self

@@ -15,6 +15,7 @@ from finger_pin.description.validation import (
     Name,
     Numbers,
     choice,
+    direction,
     problem,
     quantity,
     real,
@@ -49,7 +50,7 @@ class TreeSolid(Description):
     position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, or a mesh's origin, in the body's frame."
     )
-    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+    orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
     )
 
@@ -67,7 +68,7 @@ class Body(Description):
     position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its frame, in the parent's."
     )
-    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+    orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of its frame in the parent's: quaternion x, y, z, w."
     )
     mass: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="kg", source="design", doc="Mass of the body.")
@@ -82,14 +83,6 @@ class Body(Description):
     )
     solids: dict[Name, TreeSolid] = Field({}, description="Solids that are drawn of it, by name.")
     shapes: dict[Name, BodyShape] = Field({}, description="Shapes with which it touches, by name, unique in a tree.")
-
-    @field_validator("orientation")
-    @classmethod
-    def _unit(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        norm = sum(each * each for each in value) ** 0.5
-        if abs(norm - 1.0) > 1e-6:
-            raise problem("", "must be a quaternion x, y, z, w of length 1", list(value))
-        return value
 
     @field_validator("inertia")
     @classmethod
@@ -108,7 +101,7 @@ class TreeJoint(Description):
     kind: Annotated[Literal["hinge", "slide"], choice("hinge", "slide")] = quantity(
         "hinge", unit="1", source="design", doc="It turns about its axis, or slides along it."
     )
-    axis: Annotated[Triple, vector(3, -1.0, 1.0)] = quantity(
+    axis: Annotated[Triple, direction(3)] = quantity(
         (0.0, 0.0, 1.0), unit="1", source="design", doc="Unit vector in the body's frame."
     )
     anchor: Annotated[Triple, PLACE] = quantity(
@@ -123,13 +116,6 @@ class TreeJoint(Description):
     bearing: bool = Field(
         True, strict=True, description="Whether it is a pin or a guide that rubs; the joints of a free body are none."
     )
-
-    @field_validator("axis")
-    @classmethod
-    def _unit(cls, value: Triple) -> Triple:
-        if abs(sum(each * each for each in value) ** 0.5 - 1.0) > 1e-6:
-            raise problem("", "must be a unit vector", list(value))
-        return value
 
 
 class TreeTendon(Description):

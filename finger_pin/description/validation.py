@@ -25,6 +25,8 @@ _FULL = r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"
 FullName = Annotated[str, StringConstraints(strict=True, pattern=_FULL, max_length=129)]
 # So many names a message lists; of more it lists so many that are near.
 _READABLE, _NEAR = 20, 5
+# Directions are given with three digits at least.
+_UNIT = 1.001
 #: The largest angle of a joint, rad: two turns. Nearly every angle in degrees is beyond it.
 MOST_ANGLE = 12.5
 IN_RADIANS = " rad (is it in degrees?)"
@@ -127,6 +129,24 @@ def vector(size: int, low: float = -math.inf, high: float = math.inf, hint: str 
         if not isinstance(value, list | tuple) or len(value) != size:
             raise problem("", f"must be a list of {size} numbers", value)
         return tuple(check(item, f"[{index}]") for index, item in enumerate(value))
+
+    return BeforeValidator(validate)
+
+
+def direction(size: int) -> BeforeValidator:
+    """Return a validator for ``size`` numbers of length 1, which rounding to three digits may miss: they are scaled."""
+    check = checker(-_UNIT, _UNIT, False, "")
+    what = "a quaternion x, y, z, w of length 1" if size == 4 else "a unit vector"
+
+    def validate(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list | tuple) or len(value) != size:
+            raise problem("", f"must be a list of {size} numbers", value)
+        numbers = [check(item, f"[{index}]") for index, item in enumerate(value)]
+        length = math.hypot(*numbers)
+        if abs(length - 1.0) > _UNIT - 1.0:
+            raise problem("", f"must be {what}", list(value))
+        # What differs by rounding alone stays, to the bit.
+        return tuple(numbers if abs(length - 1.0) < 1e-15 else (number / length for number in numbers))
 
     return BeforeValidator(validate)
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
+from finger_pin.description.validation import Description, Name, choice, direction, problem, quantity, real, vector
 
 _MILLIMETRES = " m (is it in millimetres?)"
 #: A place in a body's frame.
@@ -34,7 +34,7 @@ class Waypoint(Description):
     position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point, or the wrap's centre, in the body's frame."
     )
-    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+    orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of a wrap in the body's frame; a cylinder's axis is z."
     )
     radius: Annotated[float, real(0.0, 1.0, hint=_MILLIMETRES)] = quantity(

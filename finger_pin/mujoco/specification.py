@@ -17,6 +17,11 @@ from finger_pin.mujoco.registration import register
 
 Keys = Mapping[str, Mapping[str, Any]]
 
+# What an actuator may have of a model's default class.
+_OF_DEFAULTS = (
+    *("actearly", "actlimited", "actrange", "armature", "biasprm", "biastype", "ctrllimited", "ctrlrange", "damping"),
+    *("delay", "dynprm", "dyntype", "forcelimited", "forcerange", "gainprm", "interp", "nsample"),
+)
 # From so many times the mass over the step on, dampers and servos let rows stop too little.
 _STIFF = 5.0
 
@@ -130,8 +135,12 @@ def _write(spec: mujoco.MjSpec, model: mujoco.MjModel, found: list[PluginFrictio
     spec.activate_plugin(PLUGIN)
     plugin = spec.add_plugin(name=NAME, plugin_name=PLUGIN, active=True)
     plugin.config = {COUNT: str(len(found))}
-    # In a class of its own, so that XML keeps what makes it an actuator without an input.
-    default = spec.add_default(NAME, spec.default)
+    # In a class of its own, so that XML keeps what makes it an actuator without an input; no default of the model acts.
+    default, plain = spec.add_default(NAME, spec.default), mujoco.MjSpec()
+    for field in _OF_DEFAULTS:
+        # Older versions of MuJoCo have some of them.
+        if hasattr(plain.default.actuator, field):
+            setattr(default.actuator, field, getattr(plain.default.actuator, field))
     default.actuator.gaintype, default.actuator.ctrlspec = mujoco.mjtGain.mjGAIN_DCMOTOR, NO_INPUT
     target, kind = _target(spec, found)
     actuator = spec.add_actuator(default, name=NAME, trntype=kind, target=target, actdim=states)

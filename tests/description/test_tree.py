@@ -56,6 +56,16 @@ def test_the_tree_itself_is_taken():
     assert fp.Finger(changed()).mechanism.channels == 2
 
 
+def test_directions_that_are_rounded_have_length_1():
+    turned = changed(
+        tree__bodies__link__orientation=[0.0, 0.7071, 0.0, 0.7071], tree__joints__hinge__axis=[0.6, 0.8001, 0.0]
+    )
+    np.testing.assert_allclose(turned.tree.bodies["link"].orientation, np.sqrt([0.0, 0.5, 0.0, 0.5]), atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(turned.tree.joints["hinge"].axis), 1.0, atol=1e-15)
+    rounded_up = (0.0, -2.8e-17, 1.1e-16, 1.0000000000000022)
+    assert changed(tree__bodies__link__orientation=rounded_up).tree.bodies["link"].orientation[3] == 1.0
+
+
 @pytest.mark.parametrize(
     ("entry", "value", "says"),
     [
@@ -69,6 +79,7 @@ def test_the_tree_itself_is_taken():
         ("tree__bodies__link__orientation", [1.0, 1.0, 0.0, 0.0], "quaternion x, y, z, w of length 1"),
         ("tree__bodies__link__mass", -1.0, "finger.tree.bodies.link.mass = -1.0: must be at least 0"),
         ("tree__joints__hinge__axis", [0.0, 0.5, 0.0], "must be a unit vector"),
+        ("tree__tendons__upper__path__wrap__orientation", [0.0, 0.0, 0.0, 0.5], "quaternion x, y, z, w of length 1"),
         ("tree__joints__hinge__body", "thumb", "no such body; there are link, tip"),
         ("tree__joints__hinge__kind", "ball", "must be one of hinge, slide"),
         ("joints__more", {"range": [0.0, 1.0]}, "must be those of the finger, in order: hinge, more"),

@@ -173,3 +173,28 @@ def test_a_binary_or_pickled_model_moves_alike_in_a_process_that_imports_us_firs
     assert ours.returncode == 0 and [float.fromhex(each) for each in ours.stdout.decode().split()] == whole.tolist()
     # MuJoCo does not tell: it crashes, or goes on without friction in a version that does not.
     assert without.returncode != 0 or ours.stdout != without.stdout
+
+
+SERVO = """<mujoco><compiler angle="radian"/><default>{default}</default><worldbody><body>
+  <joint name="hinge" axis="0 1 0" range="-0.2 1.2" limited="true"/>
+  <geom type="capsule" size="0.008" fromto="0 0 0 0.06 0 0"/></body></worldbody>
+  <tendon><fixed name="cord"><joint joint="hinge" coef="0.008"/></fixed></tendon>
+  <actuator><position joint="hinge" kp="1" ctrlrange="0 1" {own}/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    "settings",
+    ['ctrllimited="true" forcelimited="true" forcerange="-1 1"', 'delay="0.01" nsample="20"', 'dampratio="1"', ""],
+)
+def test_defaults_of_a_model_act_on_its_actuators_alone(settings):
+    angles = []
+    for places in ({"default": f"<position {settings}/>", "own": ""}, {"default": "", "own": settings}):
+        spec = mujoco.MjSpec.from_string(SERVO.format(**places))
+        fp.mujoco.add_friction(spec, tendons={"*": {"coulomb": 0.1, "curvature_offset": 1.0}}, joints={"*": {}})
+        for model in (spec.compile(), mujoco.MjModel.from_xml_string(spec.to_xml())):
+            data = mujoco.MjData(model)
+            data.ctrl[:] = 0.5
+            mujoco.mj_step(model, data, 200)
+            angles.append(data.qpos[0])
+    # XML has fewer digits of what MuJoCo resolves.
+    assert np.ptp(angles) < 1e-9 < angles[0]
