@@ -10,7 +10,7 @@ import scipy
 from proxsuite import proxqp
 
 from finger_pin.description.routing import Routing
-from finger_pin.laws.inputs import internal_level
+from finger_pin.laws.input_functions import internal_level
 from finger_pin.typing import Array
 
 # The solver meets feasible programmes of this size in about ten iterations.

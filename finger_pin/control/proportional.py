@@ -14,7 +14,7 @@ from finger_pin.core.inputs import InputTable, core_signal, planned_control
 from finger_pin.description.routing import ForceClosure, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
-from finger_pin.laws.inputs import internal_level, proportional_torque
+from finger_pin.laws.input_functions import internal_level, proportional_torque
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, ReferenceSignals
 from finger_pin.typing import Array

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.laws.inputs import proportional_torque
+from finger_pin.laws.input_functions import proportional_torque
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array

@@ -13,7 +13,7 @@ from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
 from finger_pin.description.caching import cached_property
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs
 from finger_pin.mechanism.finger import Finger
@@ -109,7 +109,7 @@ class CompiledMechanism:
             row = Row(*own[: len(Row._fields)])._replace(state=own[ROW.state][..., stateful], side=0.0)
             shown = tuple(own[ROW.signals + i, ..., ::arms] for i in range(len(table.law.signals)))
             of_states = own[ROW.rate][..., stateful]
-            found[table.group] = RowSignals(table, table.law.sees(row), own[ROW.force], of_states, shown)
+            found[table.group] = RowSignals(table, table.law.arguments(row), own[ROW.force], of_states, shown)
         return Evaluation(
             mechanism.energies,
             found,

@@ -15,8 +15,8 @@ from finger_pin.typing import Number, Numbers, Parameters
 
 def _value(row: Row, p: Parameters) -> Numbers:
     gain, offset, by_length, by_speed, lowest, highest, least, most = p
-    held = np.minimum(np.maximum(row.command, lowest), highest)
-    wanted = gain * held + offset + by_length * row.length + by_speed * row.speed
+    command = np.minimum(np.maximum(row.command, lowest), highest)
+    wanted = gain * command + offset + by_length * row.length + by_speed * row.speed
     return np.minimum(np.maximum(wanted, least), most), 0.0 * row.length, wanted
 
 
@@ -46,29 +46,32 @@ ACTUATOR = Law(
 _STOPS = 1e3
 
 
-def _moved(row: Row, p: Parameters) -> Numbers:
+def _command_and_rates(row: Row, p: Parameters) -> Numbers:
     """Return u within its limits, and z' free of its limits and within them."""
-    held = np.minimum(np.maximum(row.command, p[4]), p[5])
-    rate = p[9] * held + p[10] * row.length + p[11] * row.state
-    return held, rate, np.minimum(np.maximum(rate, _STOPS * (p[12] - row.state)), _STOPS * (p[13] - row.state))
+    _, _, _, _, lowest, highest, _, _, _, by_input, by_length, by_state, least, most = p
+    command = np.minimum(np.maximum(row.command, lowest), highest)
+    rate = by_input * command + by_length * row.length + by_state * row.state
+    return command, rate, np.minimum(np.maximum(rate, _STOPS * (least - row.state)), _STOPS * (most - row.state))
 
 
 def _value_of_state(row: Row, p: Parameters) -> Numbers:
-    gain, offset, by_length, by_speed, _, _, least, most, by_state = p[:9]
-    held, free, rate = _moved(row, p)
-    wanted = gain * held + offset + by_length * row.length + by_speed * row.speed + by_state * row.state
+    gain, offset, by_length, by_speed, _, _, least, most, by_state, _, _, _, _, _ = p
+    command, free, rate = _command_and_rates(row, p)
+    wanted = gain * command + offset + by_length * row.length + by_speed * row.speed + by_state * row.state
     return np.minimum(np.maximum(wanted, least), most), rate, wanted, free
 
 
 def _slopes_of_state(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     gain, _, by_length, by_speed, lowest, highest, least, most, by_state = p[:9]
+    rate_by_input, rate_by_length, rate_by_state, least_state, most_state = p[9:]
     wanted, rate = signals
     free = 1.0 * (wanted > least) * (wanted < most)
     heard = 1.0 * (row.command > lowest) * (row.command < highest)
-    stopped = 1.0 * (rate > _STOPS * (p[13] - row.state)) + 1.0 * (rate < _STOPS * (p[12] - row.state))
+    stopped = 1.0 * (rate > _STOPS * (most_state - row.state)) + 1.0 * (rate < _STOPS * (least_state - row.state))
     moves = 1.0 - stopped
     force = (free * by_length, free * by_speed, free * by_state, 0.0, 0.0, free * heard * gain, 0.0)
-    return force, (moves * p[10], 0.0, moves * p[11] - stopped * _STOPS, 0.0, moves * heard * p[9], 0.0)
+    rate_slope = moves * rate_by_state - stopped * _STOPS
+    return force, (moves * rate_by_length, 0.0, rate_slope, 0.0, moves * heard * rate_by_input, 0.0)
 
 
 #: The same with a state: a lag, an integrating input, or the integral part of a servo.

@@ -20,10 +20,29 @@ as long as |v| <= 4 F^n M (1 + b / sigma_1) / sigma_1, which covers sticking.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from finger_pin.laws.law import Law, Row, direction, magnitude
 from finger_pin.typing import Array, Number, Numbers, Numeric, Parameters
+
+
+class BristleColumns(NamedTuple):
+    """Columns of the parameters that the laws of pins and tendons share."""
+
+    stiffness: int = 2
+    viscous: int = 3
+    stribeck_velocity: int = 4
+    floor: int = 5
+    stribeck_exponent: int = 6
+    lag: int = 7
+    hardening: int = 8
+    drag: int = 9
+
+
+#: Positions in ``p``; the compiler takes them for constants.
+BRISTLE = BristleColumns()
 
 
 def friction_coefficient(
@@ -69,7 +88,7 @@ def bristle_stiffness(stiction: Number, stiffness: Number, hardening: Number) ->
 
 
 def bristle_give(force: Number, stiffness: Number, hardening: Number) -> Number:
-    """Return how far bristles give under a force before they slip, m or rad."""
+    """Return the deflection of bristles under a force before they slip, m or rad."""
     harder = 1.0 * (hardening > 0.0)
     length = 1.0 / (hardening + (1.0 - harder))
     return (1.0 - harder) * force / stiffness + harder * length * np.log1p(force / (stiffness * length))
@@ -162,7 +181,7 @@ def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers
     kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag = p
     _, _, coefficient, level = signals
     stiffness = bristle_stiffness(row.state, soft, hardening)
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
+    by_stiction, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
     by_level = by_level * (level > floor)
     by_share = row.load * (static - kinetic) + static_drag - drag
     by_speed = by_speed + by_level * by_share * friction_coefficient_slope(
@@ -170,18 +189,19 @@ def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers
     )
     by_state = micro_slope(row, level, p) - 1.0
     force = (0.0, -viscous, by_state, -micro_lag(row.state, p), 0.0, 0.0, 0.0)
-    return force, (0.0, by_speed, own, by_level * coefficient, 0.0, 0.0)
+    return force, (0.0, by_speed, by_stiction, by_level * coefficient, 0.0, 0.0)
 
 
 def micro_lag(stiction: Number, p: Parameters) -> Number:
     """Return sigma_1 over the stiffness at F^s, s, of the numbers of `PIN_FRICTION` or of a tendon."""
-    return p[7] * (p[2] / bristle_stiffness(stiction, p[2], p[8]))
+    stiffness = p[BRISTLE.stiffness]
+    return p[BRISTLE.lag] * (stiffness / bristle_stiffness(stiction, stiffness, p[BRISTLE.hardening]))
 
 
 def micro_slope(row: Row, level: Number, p: Parameters) -> Number:
     """Return minus the derivative of the micro-damping's force by F^s at a constant rate of F^s."""
     slip = row.speed - row.state * magnitude(row.speed, row.side) / level
-    return micro_lag(row.state, p) * p[8] * np.sign(row.state) * slip
+    return micro_lag(row.state, p) * p[BRISTLE.hardening] * np.sign(row.state) * slip
 
 
 def bristle_account(
@@ -205,7 +225,8 @@ def bristle_account(
 
 def row_account(row: Row, rate: Number, level: Number, p: Parameters) -> Numbers:
     """Return `bristle_account` of a row, of the numbers of `PIN_FRICTION` or of a tendon."""
-    return bristle_account(row.speed, row.state, rate, level, p[2], p[3], micro_lag(row.state, p), p[8])
+    lag, hardening = micro_lag(row.state, p), p[BRISTLE.hardening]
+    return bristle_account(row.speed, row.state, rate, level, p[BRISTLE.stiffness], p[BRISTLE.viscous], lag, hardening)
 
 
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
@@ -215,19 +236,7 @@ def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numb
 #: Friction between two parts that a load presses together, such as the pin of a joint (17), or a seal without one.
 PIN_FRICTION = Law(
     name="pin friction (9)",
-    parameters=(
-        "kinetic",
-        "static",
-        "stiffness",
-        "viscous",
-        "stribeck_velocity",
-        "floor",
-        "stribeck_exponent",
-        "lag",
-        "hardening",
-        "drag",
-        "static_drag",
-    ),
+    parameters=("kinetic", "static", *BRISTLE._fields, "static_drag"),
     value=_value,
     slopes=_slopes,
     account=_account,

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.laws.bristle import (
+    BRISTLE,
     bristle_stiffness,
     friction_coefficient,
     friction_coefficient_slope,
@@ -71,7 +72,7 @@ def _haste(stiffness: Number, viscous: Number) -> Number:
 
 
 def _haste_slope(stiffness: Number, viscous: Number) -> Number:
-    """Return its derivative by the stiffness."""
+    """Return the derivative of `_haste` by the stiffness."""
     return 0.5 * np.sqrt(_INSTANT * viscous / stiffness) + _INSTANT
 
 
@@ -99,27 +100,28 @@ def sliding_tension(
 
 def _level(normal: Number, sliding: Number, row: Row, p: Parameters) -> Number:
     """Return F^n M + drag, or its floor."""
-    haste = _haste(bristle_stiffness(row.state, p[2], p[8]), p[3])
-    return friction_level(1.0, normal * sliding + p[9], np.maximum(p[5], haste * magnitude(row.speed, row.side)))
+    stiffness = bristle_stiffness(row.state, p[BRISTLE.stiffness], p[BRISTLE.hardening])
+    fastest = _haste(stiffness, p[BRISTLE.viscous]) * magnitude(row.speed, row.side)
+    return friction_level(1.0, normal * sliding + p[BRISTLE.drag], np.maximum(p[BRISTLE.floor], fastest))
 
 
 def _rate_slopes(
     row: Row, normal: Number, coefficient: Number, sliding: Number, level: Number, p: Parameters
 ) -> Numbers:
     """Return the derivatives of F^s' by v, F^s, F^n and phi."""
-    surface, ratio, viscous, stribeck, floor, exponent, hardening = p[0], p[1], p[3], p[4], p[5], p[6], p[8]
-    stiffness, fast = bristle_stiffness(row.state, p[2], hardening), magnitude(row.speed, row.side)
-    own, by_speed, by_any = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
-    haste = _haste(stiffness, viscous)
+    surface, ratio, soft, viscous, stribeck, floor, exponent, _, hardening, _ = p[:10]
+    stiffness, fast = bristle_stiffness(row.state, soft, hardening), magnitude(row.speed, row.side)
+    by_stiction, by_speed, by_any = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
+    haste, haste_slope = _haste(stiffness, viscous), _haste_slope(stiffness, viscous)
     hasty = 1.0 * (level > floor) * (level <= haste * fast)
-    own = own + hasty * by_any * fast * _haste_slope(stiffness, viscous) * hardening * np.sign(row.state)
+    by_stiction = by_stiction + hasty * by_any * fast * haste_slope * hardening * np.sign(row.state)
     by_speed = by_speed + hasty * by_any * haste * direction(row.speed, row.side)
     by_level = by_any * (level > floor) * (1.0 - hasty)
     slope = friction_coefficient_slope(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     # M is proportional to mu^d, which depends on the posture through the curvature.
     share = sliding / np.maximum(coefficient, 1e-300)
     by_curvature = by_level * normal * share * capstan_slope(surface, coefficient)
-    return by_speed + by_level * normal * slope, own, by_level * sliding, by_curvature
+    return by_speed + by_level * normal * slope, by_stiction, by_level * sliding, by_curvature
 
 
 def _driven(row: Row, p: Parameters) -> Numbers:
@@ -136,22 +138,23 @@ def _driven(row: Row, p: Parameters) -> Numbers:
 
 
 def _driven_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    viscous, lag = p[3], micro_lag(row.state, p)
+    (_, _, _, viscous, _, _, _, _, _, _, acting), lag = p, micro_lag(row.state, p)
     loss, normal, coefficient, sliding, level, pressing = signals
-    by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
+    by_speed, by_stiction, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
     taut = 1.0 * (delivered_tension(row.command, loss) > 0.0)
     pressed = by_normal * (pressing > 0.0)
     by_command = pressed + by_normal * (1.0 - 2.0 * (row.command < 0.0))
     by_state = taut * (micro_slope(row, level, p) - 1.0)
-    force = (0.0, -taut * viscous, by_state, -taut * lag, 0.0, taut - p[10], 0.0)
-    return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
+    force = (0.0, -taut * viscous, by_state, -taut * lag, 0.0, taut - acting, 0.0)
+    return force, (0.0, by_speed - pressed * viscous, by_stiction - pressed, 0.0, by_command, by_curvature)
 
 
 def _driven_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
+    _, _, _, _, _, _, _, _, _, _, acting = p
     stored, coulomb, viscous, micro = row_account(row, rate, signals[4], p)
     # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
     slack = (row.command - signals[0]) * row.speed * (row.command <= signals[0])
-    return stored, (1.0 - p[10]) * row.command * row.speed, coulomb, viscous, micro, slack
+    return stored, (1.0 - acting) * row.command * row.speed, coulomb, viscous, micro, slack
 
 
 def _passive(row: Row, p: Parameters) -> Numbers:
@@ -166,27 +169,16 @@ def _passive(row: Row, p: Parameters) -> Numbers:
 
 def _passive_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, normal, coefficient, sliding, level = signals
-    by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
-    force = (0.0, -p[3], micro_slope(row, level, p) - 1.0, -micro_lag(row.state, p), 0.0, 0.0, 0.0)
-    return force, (0.0, by_speed, own, by_normal, 0.0, by_curvature)
+    by_speed, by_stiction, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
+    force = (0.0, -p[BRISTLE.viscous], micro_slope(row, level, p) - 1.0, -micro_lag(row.state, p), 0.0, 0.0, 0.0)
+    return force, (0.0, by_speed, by_stiction, by_normal, 0.0, by_curvature)
 
 
 def _passive_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     return row_account(row, rate, signals[4], p)
 
 
-_PARAMETERS = (
-    "surface",
-    "ratio",
-    "stiffness",
-    "viscous",
-    "stribeck_velocity",
-    "floor",
-    "stribeck_exponent",
-    "lag",
-    "hardening",
-    "drag",
-)
+_PARAMETERS = ("surface", "ratio", *BRISTLE._fields)
 
 #: A tendon that its input pulls through a canal. Where the input acts on the finger by itself, as an elastic tendon
 #: does, ``acting`` is 1 and the row exerts what friction changes of it; else 0.
@@ -235,9 +227,10 @@ def _canal(row: Row, p: Parameters) -> Numbers:
 
 
 def _canal_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    viscous, lag, one_way = p[3], micro_lag(row.state, p), 1.0 * (p[10] > 0.0)
+    _, _, _, viscous, _, _, _, _, _, _, only_pulls = p
+    lag, one_way = micro_lag(row.state, p), 1.0 * (only_pulls > 0.0)
     loss, normal, coefficient, sliding, level, pressing = signals
-    by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
+    by_speed, by_stiction, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
     pulled = 1.0 - one_way * (row.command <= 0.0)
     tension = pulled * row.command
     taut = 1.0 - one_way * (loss >= tension)
@@ -245,7 +238,7 @@ def _canal_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, N
     by_command = pulled * (pressed + by_normal * np.sign(tension))
     by_state = taut * (micro_slope(row, level, p) - 1.0)
     force = (0.0, -taut * viscous, by_state, -taut * lag, 0.0, pulled * (taut - 1.0), 0.0)
-    return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
+    return force, (0.0, by_speed - pressed * viscous, by_stiction - pressed, 0.0, by_command, by_curvature)
 
 
 def _canal_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
@@ -269,11 +262,13 @@ CANAL_FRICTION = Law(
 
 
 def _shared(row: Row, p: Parameters) -> Numbers:
-    return np.maximum(row.command, 0.0) + p[0] * np.maximum(-row.command, 0.0), 0.0 * row.command
+    (both_ways,) = p
+    return np.maximum(row.command, 0.0) + both_ways * np.maximum(-row.command, 0.0), 0.0 * row.command
 
 
 def _shared_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    by_command = 1.0 * (row.command > 0.0) - p[0] * (row.command < 0.0)
+    (both_ways,) = p
+    by_command = 1.0 * (row.command > 0.0) - both_ways * (row.command < 0.0)
     return (0.0, 0.0, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

@@ -64,17 +64,18 @@ def _value(row: Row, p: Parameters) -> Numbers:
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     _, share, level = signals
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
+    by_stiction, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
     by_level = by_level * (level > _FLOOR)
     steep = (stribeck + stribeck_by_load * row.load) * stribeck_share_slope(row.speed, velocity, exponent, share)
     pressed = by_level * (by_load + stribeck_by_load * share)
     pulled = by_level * loss_share(row.command, row.speed, driving, driven, row.side) * np.sign(row.command)
-    return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed + by_level * steep, own, pressed, pulled, 0.0)
+    rate = (0.0, by_speed + by_level * steep, by_stiction, pressed, pulled, 0.0)
+    return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), rate
 
 
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    stored, dry, viscous, _ = bristle_account(row.speed, row.state, rate, signals[2], p[7], p[6], 0.0)
-    return stored, dry, viscous
+    _, _, _, _, _, _, viscous, stiffness, _, _ = p
+    return bristle_account(row.speed, row.state, rate, signals[2], stiffness, viscous, 0.0)[:3]
 
 
 #: The friction of a gearbox on its output.

@@ -94,8 +94,8 @@ class Law:
     arms: ClassVar[int] = 1
     states: ClassVar[int] = 1
 
-    def sees(self, row: Row) -> Row:
-        """Return the arguments of the law for rows, shape (..., k) each: these."""
+    def arguments(self, row: Row) -> Row:
+        """Return the arguments of the law for rows, shape (..., k) each: the rows themselves."""
         return row
 
     def act(self, row: Row, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
@@ -164,15 +164,15 @@ class ContactLaw:
     arms: ClassVar[int] = 3
     states: ClassVar[int] = 2
 
-    def sees(self, row: Any) -> Touch:
+    def arguments(self, row: Any) -> Touch:
         """Return the arguments for contacts from a `Row` of arms, shape (..., 3 k), and of states, (..., 2 k)."""
         slips = (row.speed[..., each::3] for each in range(3))
         return Touch(row.length[..., ::3], *slips, *(row.state[..., each::2] for each in range(2)))
 
     def act(self, touch: Touch, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
         """Return the contacts' forces, shape (..., 3 k), the rates of their states, (..., 2 k), and their signals."""
-        found = self.value(touch, p)
-        return _side_by_side(found[:3]), _side_by_side(found[3:5]), tuple(found[5:])
+        values = self.value(touch, p)
+        return _side_by_side(values[:3]), _side_by_side(values[3:5]), tuple(values[5:])
 
     def energy_terms(self, touch: Touch, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
         """Return stored energy, J, and powers, W, from the results of `act`."""

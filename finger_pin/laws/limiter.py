@@ -42,7 +42,7 @@ def limiter_loss(torque: Number, depth: Number, velocity: Number, stiffness: Num
     return (torque - stiffness * depth) * velocity
 
 
-def _seen(row: Row, p: Parameters) -> Numbers:
+def _nearer_end(row: Row, p: Parameters) -> Numbers:
     """Return the side of the nearer limit, 1 or -1, the penetration d, and 1 + c d'."""
     lower, upper, _, damping, _ = p
     end = 2.0 * (row.length > 0.5 * (lower + upper)) - 1.0
@@ -50,25 +50,26 @@ def _seen(row: Row, p: Parameters) -> Numbers:
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
-    end, past, factor = _seen(row, p)
-    push = p[2] * end * past * factor + p[4] * row.speed
+    end, past, factor = _nearer_end(row, p)
+    _, _, stiffness, _, viscous = p
+    push = stiffness * end * past * factor + viscous * row.speed
     # The torque bends or jumps where the joint meets its limit, and bends where the limiter would begin to pull.
-    grip = np.minimum(past, factor + (p[4] > 0.0) * (end * push - factor))
+    grip = np.minimum(past, factor + (viscous > 0.0) * (end * push - factor))
     torque = push * beyond(grip, row.side)
     return -torque, 0.0 * row.length, end * np.maximum(past, 0.0), grip
 
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, _, stiffness, damping, viscous = p
-    _, past, factor = _seen(row, p)
-    held = beyond(signals[1], row.side)
-    gripping = stiffness * held
-    by_speed = -damping * past * gripping - viscous * held
+    _, past, factor = _nearer_end(row, p)
+    pushes = beyond(signals[1], row.side)
+    gripping = stiffness * pushes
+    by_speed = -damping * past * gripping - viscous * pushes
     return (-factor * gripping, by_speed, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    stiffness, depth = p[2], signals[0]
+    (_, _, stiffness, _, _), depth = p, signals[0]
     return limiter_energy(depth, stiffness), limiter_loss(-force, depth, row.speed, stiffness)
 
 

@@ -35,7 +35,7 @@ def friction_torque(speed: Number, torque: Number, p: Parameters) -> tuple[Numbe
     Returns:
         The torque, and its derivatives by w and by T.
     """
-    dry, by_torque, by_load, viscous, reversal = p[6:]
+    _, _, _, _, _, _, dry, by_torque, by_load, viscous, reversal = p
     eased, pull = np.tanh(speed / reversal), np.maximum(torque, 0.0)
     # Of numbers, np.where would make arrays in compiled code.
     side = 2.0 * (by_torque * pull + by_load * eased * dry >= 0.0) - 1.0
@@ -48,19 +48,19 @@ def friction_torque(speed: Number, torque: Number, p: Parameters) -> tuple[Numbe
 
 def asked_voltage(speed: Number, command: Number, p: Parameters) -> Number:
     """Return the voltage that the drive asks for before any limit, V; see `MOTOR` for ``p``."""
-    constant, resistance, by_current, gain = p[0], p[1], p[4], p[5]
+    constant, resistance, _, _, by_current, gain, _, _, _, _, _ = p
     torque = gain * command + friction_torque(speed, gain * command, p)[0]
     return by_current * (resistance * torque / constant + constant * speed) + (1.0 - by_current) * command
 
 
 def free_current(speed: Number, asked: Number, p: Parameters) -> Number:
     """Return the current without its limit, A, for an asked voltage, V."""
-    constant, resistance, supply = p[0], p[1], p[2]
+    constant, resistance, supply, _, _, _, _, _, _, _, _ = p
     return (np.minimum(np.maximum(asked, -supply), supply) - constant * speed) / resistance
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
-    constant, resistance, limit = p[0], p[1], p[3]
+    constant, resistance, _, limit, _, _, _, _, _, _, _ = p
     free = free_current(row.speed, asked_voltage(row.speed, row.command, p), p)
     current = np.minimum(np.maximum(free, -limit), limit) * (row.command < OPEN_CIRCUIT)
     voltage = resistance * current + constant * row.speed
@@ -68,7 +68,7 @@ def _value(row: Row, p: Parameters) -> Numbers:
 
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    constant, resistance, supply, limit, by_current, gain = p[0], p[1], p[2], p[3], p[4], p[5]
+    constant, resistance, supply, limit, by_current, gain, _, _, _, _, _ = p
     asked = asked_voltage(row.speed, row.command, p)
     within = constant / resistance * (np.abs(free_current(row.speed, asked, p)) < limit) * (row.command < OPEN_CIRCUIT)
     followed = within * (np.abs(asked) < supply)
@@ -79,8 +79,8 @@ def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers
 
 
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    current, voltage = signals
-    return 0.0 * row.length, voltage * current, p[1] * current * current
+    (current, voltage), (_, resistance, _, _, _, _, _, _, _, _, _) = signals, p
+    return 0.0 * row.length, voltage * current, resistance * current * current
 
 
 #: The torque of a motor on its rotor: ``by_current`` is 1 or 0, ``gain`` torque per command, the rest of (9)'s kind.

@@ -53,7 +53,7 @@ def _speed_share(speed: Number, lengthening: Number) -> tuple[Number, Number]:
 
 
 def _stretch(length: Number, longest: Number) -> tuple[Number, Number]:
-    """Return by how much L exceeds 1, and the middle of 1 and l_max, both over half of l_max - 1."""
+    """Return the excess of L over 1, and over the middle of 1 and l_max, both over half of l_max - 1."""
     stretched = np.maximum(length - 1.0, 0.0) / (0.5 * (longest - 1.0))
     return stretched, np.maximum(stretched - 1.0, 0.0)
 
@@ -100,7 +100,7 @@ def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers
 
 
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    peak, optimal, origin, longest, passive = p[0], p[1], p[2], p[4], p[6]
+    peak, optimal, origin, _, longest, _, passive, _, _, _, _, _, _ = p
     stretched, beyond = _stretch((row.length - origin) / optimal, longest)
     half = 0.5 * (longest - 1.0) * optimal
     stored = peak * passive * half * (stretched * stretched * stretched - beyond * beyond * beyond) / 6.0

@@ -38,13 +38,14 @@ def _dahl_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Nu
     kinetic, soft, viscous, floor, hardening, _ = p
     level = signals[3]
     stiffness = bristle_stiffness(row.state, soft, hardening)
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
+    by_stiction, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
     by_load = by_level * (level > floor) * kinetic
-    return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_load, 0.0, 0.0)
+    return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, by_stiction, by_load, 0.0, 0.0)
 
 
 def _dahl_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    return bristle_account(row.speed, row.state, rate, signals[3], p[1], p[2], 0.0, p[4])
+    _, soft, viscous, _, hardening, _ = p
+    return bristle_account(row.speed, row.state, rate, signals[3], soft, viscous, 0.0, hardening)
 
 
 def _coulomb_value(row: Row, p: Parameters) -> Numbers:
@@ -62,8 +63,9 @@ def _coulomb_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers,
 
 
 def _coulomb_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    dry = signals[3] * np.tanh(row.speed / p[2]) * row.speed
-    return 0.0 * row.speed, dry, p[1] * row.speed * row.speed, 0.0 * row.speed
+    _, viscous, reversal_speed, _ = p
+    dry = signals[3] * np.tanh(row.speed / reversal_speed) * row.speed
+    return 0.0 * row.speed, dry, viscous * row.speed * row.speed, 0.0 * row.speed
 
 
 DAHL = Law(

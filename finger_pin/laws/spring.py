@@ -72,7 +72,8 @@ JOINT_SPRING = Law(
 
 
 def _constant(row: Row, p: Parameters) -> Numbers:
-    return p[0] + 0.0 * row.length, 0.0 * row.length
+    (force,) = p
+    return force + 0.0 * row.length, 0.0 * row.length
 
 
 def _constant_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
@@ -80,7 +81,8 @@ def _constant_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers
 
 
 def _constant_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    return (-p[0] * row.length,)
+    (constant,) = p
+    return (-constant * row.length,)
 
 
 #: A force that is the same everywhere, such as a weight that is compensated; it stores what it lets down.
@@ -141,7 +143,7 @@ def _elastic_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers,
 
 
 def _elastic_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    stiffness, stretch = p[0], np.maximum(0.0, -row.length)
+    (stiffness, _), stretch = p, np.maximum(0.0, -row.length)
     return elastic_energy(stretch, stiffness), (stiffness * stretch - force) * row.speed
 
 
@@ -195,13 +197,14 @@ def _hysteresis_value(row: Row, p: Parameters) -> Numbers:
 
 def _hysteresis_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     share, stiffness, floor = p
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, signals[0], stiffness, row.side)
+    by_stiction, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, signals[0], stiffness, row.side)
     by_load = by_level * share * (signals[0] > floor)
-    return (0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_load, 0.0, 0.0)
+    return (0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, by_stiction, by_load, 0.0, 0.0)
 
 
 def _hysteresis_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    return bristle_energy(row.state, p[1]), coulomb_loss(row.state, row.speed, signals[0])
+    _, stiffness, _ = p
+    return bristle_energy(row.state, stiffness), coulomb_loss(row.state, row.speed, signals[0])
 
 
 #: What a spring loses in a cycle whatever its speed; the load is the spring's force.

@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.mechanism.contact_features import ContactPart, contacts_of
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics

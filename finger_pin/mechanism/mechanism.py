@@ -221,8 +221,8 @@ class Mechanism:
                 reading=_weighted(table.readings, states, np.zeros((*lead, table.count))),
             )
             law: Any = table.law
-            exerted, rate, signals = law.act(seen := law.sees(row), table.parameters)
-            found[table.group], known[table.group] = RowSignals(table, seen, exerted, rate, signals), exerted
+            exerted, rate, signals = law.act(arguments := law.arguments(row), table.parameters)
+            found[table.group], known[table.group] = RowSignals(table, arguments, exerted, rate, signals), exerted
             if table.law.arms > 1:
                 touching.append((table.paths[:: table.law.arms], _touching(exerted, routed.force, table.law.arms)))
             torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]

@@ -13,7 +13,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import Link
 from finger_pin.exceptions import InputError
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.mechanism.contacts import check_start, contact_rows
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.gaps import PRISM

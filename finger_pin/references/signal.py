@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from finger_pin.description.caching import cached_property
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
-from finger_pin.laws.inputs import harmonic, harmonic_rate, quintic, quintic_curvature, quintic_rate
+from finger_pin.laws.input_functions import harmonic, harmonic_rate, quintic, quintic_curvature, quintic_rate
 from finger_pin.references.polynomials import ORDER, joined, polynomials
 from finger_pin.references.sample_fitting import thinned
 from finger_pin.typing import Array

@@ -9,7 +9,7 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import LEAST_ATOL_SCALE, LEAST_RTOL
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import entries

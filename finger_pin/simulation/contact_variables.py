@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.exceptions import InputError
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Touch
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.scene import POSE, VELOCITY

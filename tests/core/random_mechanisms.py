@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from law_cases import every_law, random_parameters
 
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Law
 from finger_pin.mechanism.gaps import PRISM, prism_parameters
 from finger_pin.mechanism.mechanism import Mechanism

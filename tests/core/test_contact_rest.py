@@ -5,7 +5,7 @@ import pytest
 from test_contact_motion import G, motion, plane, scene
 
 from finger_pin.description.objects import Object
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 
 SURFACE = {"stiffness": 1e4, "damping": 2.0, "friction": 0.6}
 #: About y by a quarter turn: z along x.

@@ -6,7 +6,7 @@ import pytest
 from law_cases import for_complex
 
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Touch
 
 COUNT, STEP = 4000, 1e-30

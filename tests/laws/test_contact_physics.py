@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Touch
 
 G = 9.81

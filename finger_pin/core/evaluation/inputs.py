@@ -8,7 +8,7 @@ from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.time_functions import signal_derivative, signal_derivatives, signal_values
 from finger_pin.core.inputs import HELD, SCHEDULED, InputTable
 from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
-from finger_pin.laws import inputs as controller_laws
+from finger_pin.laws import input_functions as controller_laws
 
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)

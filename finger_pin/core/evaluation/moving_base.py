@@ -8,7 +8,7 @@ from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, d
 from finger_pin.core.evaluation.time_functions import SignalTable, signal_derivative
 from finger_pin.core.jit import CompiledFunction, njit_inline, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.laws import inputs as palm_laws
+from finger_pin.laws import input_functions as palm_laws
 
 _base_motion = inlined(palm_laws.base_motion)
 

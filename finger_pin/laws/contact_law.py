@@ -40,8 +40,8 @@ def _normal(touch: Touch, p: Parameters) -> Numbers:
     stiffness, damping, exponent = p[:3]
     depth = -touch.gap * ((touch.gap < 0.0) | (touch.side > 0.0))
     factor = 1.0 - damping * touch.speed
-    held = 1.0 * (factor * (touch.side == 0.0) + touch.side > 0.0)
-    return depth, stiffness * np.abs(depth) ** (exponent - 1.0) * depth, factor, held
+    pushes = 1.0 * (factor * (touch.side == 0.0) + touch.side > 0.0)
+    return depth, stiffness * np.abs(depth) ** (exponent - 1.0) * depth, factor, pushes
 
 
 def _cone(touch: Touch, pressing: Number, p: Parameters) -> Numbers:
@@ -56,8 +56,8 @@ def _cone(touch: Touch, pressing: Number, p: Parameters) -> Numbers:
 
 def _value(touch: Touch, p: Parameters) -> Numbers:
     _, _, _, _, _, stiffness, lag, _, floor = p
-    _, spring, factor, held = _normal(touch, p)
-    normal = spring * factor * held
+    _, spring, factor, pushes = _normal(touch, p)
+    normal = spring * factor * pushes
     pressing = np.maximum(normal, 0.0)
     bend_1, bend_2, bend, _, friction, _ = _cone(touch, pressing, p)
     level = friction * pressing
@@ -79,11 +79,11 @@ def _value(touch: Touch, p: Parameters) -> Numbers:
 
 def _slopes(touch: Touch, p: Parameters, signals: Numbers) -> tuple[Numbers, ...]:
     kn, damping, exponent, static, _, stiffness, lag, stribeck, floor = p
-    depth, spring, factor, held = _normal(touch, p)
+    depth, spring, factor, pushes = _normal(touch, p)
     touching = 1.0 * ((touch.gap < 0.0) | (touch.side > 0.0))
-    normal = spring * factor * held
-    by_gap = -kn * exponent * np.abs(depth) ** (exponent - 1.0) * factor * held * touching
-    by_speed = -damping * spring * held
+    normal = spring * factor * pushes
+    by_gap = -kn * exponent * np.abs(depth) ** (exponent - 1.0) * factor * pushes * touching
+    by_speed = -damping * spring * pushes
     # A step held in touch must not depend on whether its start is just before or just behind the touch.
     pressing, pressed = np.maximum(normal, 0.0), 1.0 * ((normal > 0.0) | (touch.side > 0.0))
     bend_1, bend_2, bend, sliding, friction, excess = _cone(touch, pressing, p)
