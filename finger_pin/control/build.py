@@ -1,4 +1,4 @@
-"""From the entries of a scenario to its controller."""
+"""Construction of a controller from the entries of a scenario."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     routing = finger.routing if finger is not None else Routing.from_description(scenario.finger)
     parts = scenario.parts()
     if len(parts) > 1:
-        return joined_controller([build_controller(part) for part in parts.values()], routing)
+        return hand_controller([build_controller(part) for part in parts.values()], routing)
     scenario = next(iter(parts.values()))
     settings = scenario.controller
     if settings.kind == "tensions":
@@ -154,18 +154,18 @@ def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:
     return FingertipForce(wanted.later(scenario.simulation.start_time), finger.rigid_body.jacobian)
 
 
-def _belief(given: Numbers | None, actual: Array) -> Array:
-    return actual if given is None else expand(given, len(actual))
+def _belief(setting: Numbers | None, actual: Array) -> Array:
+    return actual if setting is None else expand(setting, len(actual))
 
 
-def joined_controller(controllers: Sequence[LoopController], routing: Routing) -> LoopController:
+def hand_controller(controllers: Sequence[LoopController], routing: Routing) -> LoopController:
     """Return the controller of a hand from those of its fingers, in the order of the routing's.
 
-    Where all are of a kind that can be joined, such as the paper's, so is the whole, and is compiled like them.
+    Controllers of one kind that has `from_fingers`, such as the paper's, become one of that kind, compiled like them.
     """
     kind, *others = {type(each) for each in controllers}
-    joined = None if others else kind.joined(controllers, routing)
-    return joined or HandController(controllers, routing)
+    whole = None if others else kind.from_fingers(controllers, routing)
+    return whole or HandController(controllers, routing)
 
 
 class HandController(LoopController):
@@ -190,18 +190,18 @@ class HandController(LoopController):
         limited = False
         for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
             desired = ReferenceSignals(reference.position[..., joints], reference.velocity[..., joints])
-            own = controller.command(time, desired, position[..., joints], velocity[..., joints])
-            torque[..., joints], tension[..., tendons] = own.torque, own.tension
-            if own.torque_deficit is not None:
+            signals = controller.command(time, desired, position[..., joints], velocity[..., joints])
+            torque[..., joints], tension[..., tendons] = signals.torque, signals.tension
+            if signals.torque_deficit is not None:
                 limited = True
-                torque_deficit[..., joints] = own.torque_deficit
+                torque_deficit[..., joints] = signals.torque_deficit
         return ControlSignals(torque, tension, torque_deficit if limited else None)
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
         """Pass on the readings of each finger's sensors, with the time since the last ones, s."""
         for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
-            of = {"tendon_tension": tendons, "joint_position": joints, "joint_velocity": joints}
-            controller.sense({name: readings[name][places] for name, places in of.items()}, elapsed)
+            indices = {"tendon_tension": tendons, "joint_position": joints, "joint_velocity": joints}
+            controller.sense({name: readings[name][places] for name, places in indices.items()}, elapsed)
 
     def signals(self) -> tuple[Signal, ...]:
         """Return the signals that any of them follows."""
@@ -209,6 +209,6 @@ class HandController(LoopController):
 
     def stateless(self) -> HandController | None:
         """Return the stateless controllers of all fingers; None if one has a state."""
-        own = [each.stateless() for each in self.controllers]
-        known = [each for each in own if each is not None]
-        return HandController(known, self.routing) if len(known) == len(own) else None
+        controllers = [each.stateless() for each in self.controllers]
+        known = [each for each in controllers if each is not None]
+        return HandController(known, self.routing) if len(known) == len(controllers) else None

@@ -103,8 +103,8 @@ class ClosedLoop:
             reference=choose_reference(reference, scenario, finger.routing),
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
-            palm=PalmPath.of(scenario.hand, start, finger, scenario.simulation.rtol),
-            guides=PrescribedObjects.of(finger, start, scenario.simulation.rtol),
+            palm=PalmPath.from_hand(scenario.hand, start, finger, scenario.simulation.rtol),
+            guides=PrescribedObjects.from_finger(finger, start, scenario.simulation.rtol),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:
@@ -117,11 +117,11 @@ class ClosedLoop:
             loop = replace(loop, varying_force=force.later(start))
         initial, keyframe = scenario.simulation.initial, scenario.keyframe
         if initial is not None or keyframe is not None:
-            given = (keyframe.position if keyframe else {}) | (initial.position if initial else {})
+            angles = (keyframe.position if keyframe else {}) | (initial.position if initial else {})
             speeds = (keyframe.velocity if keyframe else {}) | (initial.velocity if initial else {})
             joints = finger.routing.joints
             position = loop.reference.at(0.0).position
-            moved = [given.get(name, own) for name, own in zip(joints, position, strict=True)]
+            moved = [angles.get(name, angle) for name, angle in zip(joints, position, strict=True)]
             velocity = [speeds.get(name, 0.0) for name in joints]
             loop = replace(loop, start=loop.rest_state(np.array(moved), np.array(velocity)))
         return loop
@@ -211,15 +211,15 @@ class ClosedLoop:
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips, base frame, and energies in the world at times (m,) and states."""
         base, around, objects = self.base(time), self.finger.scene, None
-        found = self.dynamics.motion(state.position, state.velocity, base)
+        motion = self.dynamics.motion(state.position, state.velocity, base)
         if around is not None:
             objects = around.energies(state.object_pose, state.object_velocity, base)
         if self.palm is not None:
-            higher = found.potential_energy + self.palm.lifted(time, self.finger.rigid_body.mass)
-            found = found._replace(potential_energy=higher)
+            higher = motion.potential_energy + self.palm.lifted(time, self.finger.rigid_body.mass)
+            motion = motion._replace(potential_energy=higher)
             if around is not None and objects is not None:
                 objects = objects[0], objects[1] + self.palm.lifted(time, float(np.sum(around.mass)))
-        return found._replace(objects=objects)
+        return motion._replace(objects=objects)
 
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
@@ -235,12 +235,12 @@ class ClosedLoop:
 
 def _refuse_other(finger: Finger, scenario: Scenario) -> None:
     """Refuse a finger that has other joints, tendons or winches than a scenario's."""
-    for kind, own, described in (
+    for kind, names, described in (
         ("joints", finger.routing.joints, scenario.finger.joints),
         ("tendons", finger.routing.tendons, scenario.finger.tendons),
     ):
-        if own != tuple(described):
-            raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(own))
+        if names != tuple(described):
+            raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(names))
     for name, winched in zip(finger.routing.tendons, finger.routing.winched, strict=False):
         if winched != (scenario.finger.tendons[name].winch is not None):
             raise InputError(f"finger.tendons.{name}.winch", "must be that of the scenario's finger")

@@ -1,4 +1,4 @@
-"""From joint torques to tendon tensions: the pseudo-inverse with internal tension, (21), (22)."""
+"""Distribution of joint torques over tendons: the pseudo-inverse with internal tension, (21), (22)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class TensionDistribution(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PseudoInverse:
-    """The paper's: f_hat = pinv(H_c^T) tau^d + lambda f^k, with the least lambda that keeps every tendon at f0.
+    """The paper's distribution: f_hat = pinv(H_c^T) tau^d + lambda f^k, the least lambda that keeps every tendon at f0.
 
     Attributes:
         inverse: Pseudo-inverse of H_c^T, shape (t, n), 1/m.
@@ -120,9 +120,9 @@ class LimitedDistribution:
         wanted = torque / self._scale
         if not np.isfinite(wanted).all():
             return np.full(len(minimum), np.nan), np.full(len(torque), np.nan)
-        found = self._least(wanted, minimum)
-        if found is not None:
-            return found, np.zeros(len(torque))
+        tension = self._least(wanted, minimum)
+        if tension is not None:
+            return tension, np.zeros(len(torque))
         # A box of no width has one answer, which the solver below does not take.
         free = self.maximum > minimum
         nearest = minimum.copy()
@@ -132,8 +132,8 @@ class LimitedDistribution:
             nearest[free] = scipy.optimize.lsq_linear(self._matrix[:, free], rest, bounds, method="bvls").x
         exerted = self._matrix @ nearest
         # Of all tensions that exert the nearest torque, again the least.
-        found = self._least(exerted, minimum)
-        return nearest if found is None else found, self._scale * (wanted - exerted)
+        tension = self._least(exerted, minimum)
+        return nearest if tension is None else tension, self._scale * (wanted - exerted)
 
     def _least(self, torque: Array, minimum: Array) -> Array | None:
         programme = self._programme

@@ -23,11 +23,11 @@ def input_ranges(finger: Finger) -> tuple[Array, Array]:
     ends = [
         (0.0, each.maximum_tension or _STRONGEST)
         if each.winch is None
-        else (own.min(), own.max() + (each.maximum_tension or _STRONGEST) / each.winch.stiffness)
-        for each, own in zip(description.tendons.values(), drawn, strict=False)
+        else (lengths.min(), lengths.max() + (each.maximum_tension or _STRONGEST) / each.winch.stiffness)
+        for each, lengths in zip(description.tendons.values(), drawn, strict=False)
     ]
-    for name, each in description.tree.actuators.items():
-        reach = each.reach(description.joints[each.joint].range if each.joint else None)
+    for name, actuator in description.tree.actuators.items():
+        reach = actuator.reach(description.joints[actuator.joint].range if actuator.joint else None)
         if reach is None:
             raise InputError(
                 f"finger.tree.actuators.{name}.input_range",
@@ -54,7 +54,7 @@ def spool_ranges(finger: Finger) -> tuple[Array, Array]:
     # Of tendons that are wound in together the one that needs most decides, not all on average.
     for motor in np.flatnonzero(np.sum(actuators.spools > 0.0, axis=0) > 1):
         wound = np.flatnonzero(actuators.spools[:, motor] > 0.0)
-        own = (drawn[:, actuators.tendons[wound]] - actuators.slack[wound]) / actuators.spools[wound, motor]
+        angles = (drawn[:, actuators.tendons[wound]] - actuators.slack[wound]) / actuators.spools[wound, motor]
         stretch = _STRONGEST / actuators.stiffness[wound] / actuators.spools[wound, motor]
-        least[motor], most[motor] = own.min(), (own + stretch).max()
+        least[motor], most[motor] = angles.min(), (angles + stretch).max()
     return least, most

@@ -182,6 +182,6 @@ class LoopController(ABC):
         return None
 
     @classmethod
-    def joined(cls, controllers: Sequence[Self], routing: Routing) -> LoopController | None:
+    def from_fingers(cls, controllers: Sequence[Self], routing: Routing) -> LoopController | None:
         """Return one controller of this kind for all fingers of a hand; None if they have to stand side by side."""
         return None

@@ -21,18 +21,18 @@ def readings(sensors: Sequence[SampledSensor], now: Instant) -> dict[str, Array]
     Raises:
         InputError: If two have the same name, or one reads another number of values than it has names for.
     """
-    routing, found = now.loop.finger.routing, {}
+    routing, by_name = now.loop.finger.routing, {}
     for sensor in sensors:
         names = sensor.labels or {"joint": routing.joints, "tendon": routing.tendons}.get(sensor.dimension, ())
         shape = (len(names),) if sensor.dimension else ()
         values = np.asarray(sensor.read(now), dtype=float)
-        if sensor.name in found:
+        if sensor.name in by_name:
             raise InputError("controller.sensors", "there is another one of this name", sensor.name)
         if values.shape != shape:
             allowed = f"{sensor.name} must read values of shape {shape}, not {values.shape}"
             raise InputError("controller.sensors", allowed)
-        found[sensor.name] = values
-    return found
+        by_name[sensor.name] = values
+    return by_name
 
 
 class JointEncoder(SampledSensor):

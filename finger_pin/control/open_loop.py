@@ -25,7 +25,7 @@ from finger_pin.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class OpenLoopTensions(LoopController):
-    """f^a over time, or of winches the length that they wind in.
+    """Open-loop inputs: f^a over time, or of winches the length that they wind in.
 
     The torque that goes with it is what tensions would exert free of friction; passive ones are planned to be zero.
 
@@ -43,18 +43,18 @@ class OpenLoopTensions(LoopController):
 
         What has none holds the keyframe's, else the minimum or 0; of what is wound no tension is planned.
         """
-        given: dict[str, SignalSettings] = dict.fromkeys(wound_tendons(scenario, scenario.controller), _constant(0.0))
-        given |= scenario.controller.tensions or {}
+        signals: dict[str, SignalSettings] = dict.fromkeys(wound_tendons(scenario, scenario.controller), _constant(0.0))
+        signals |= scenario.controller.tensions or {}
         winched = dict(zip(routing.tendons, routing.winched, strict=False))
-        given |= {name: each for name, each in (scenario.controller.tendon_winding or {}).items() if winched[name]}
-        held = scenario.keyframe.inputs if scenario.keyframe else {}
+        signals |= {name: each for name, each in (scenario.controller.tendon_winding or {}).items() if winched[name]}
+        keyframe_inputs = scenario.keyframe.inputs if scenario.keyframe else {}
         least = expand(scenario.controller.minimum_tension, len(routing.tendons))
         settings: list[SignalSettings] = [
-            given.get(name) or _constant(held.get(name, float(tension)))
+            signals.get(name) or _constant(keyframe_inputs.get(name, float(tension)))
             for name, tension in zip(routing.tendons[: routing.actuated], least, strict=False)
         ]
         driven = scenario.controller.inputs or {}
-        settings += [driven.get(name) or _input(held.get(name, 0.0)) for name in _actuators(scenario)]
+        settings += [driven.get(name) or _input(keyframe_inputs.get(name, 0.0)) for name in _actuators(scenario)]
         return cls(
             Signal.from_settings(settings, scenario.simulation.rtol).later(scenario.simulation.start_time), routing
         )
@@ -82,14 +82,14 @@ class OpenLoopTensions(LoopController):
     ) -> ControlSignals:
         """Return the tensions at one time, or at times of shape (m,), with their torque by (7)."""
         # Rounding may take what is at zero below it.
-        given, actuated = self.signal.at(time)[0], self.routing.actuated
+        inputs, actuated = self.signal.at(time)[0], self.routing.actuated
         winched = self.routing.winched
-        pulled = np.where(winched, given[..., :actuated], np.maximum(given[..., :actuated], 0.0))
+        pulled = np.where(winched, inputs[..., :actuated], np.maximum(inputs[..., :actuated], 0.0))
         planned = np.zeros((*pulled.shape[:-1], self.routing.passive))
         return ControlSignals(
             np.where(winched, 0.0, pulled) @ self.routing.actuated_coupling,
             np.concatenate([pulled, planned], axis=-1),
-            inputs=given[..., actuated:],
+            inputs=inputs[..., actuated:],
         )
 
     def as_control(self, reference: LoopReference, finger: Finger) -> InputTable:
@@ -108,7 +108,7 @@ class OpenLoopTensions(LoopController):
         return self
 
     @classmethod
-    def joined(cls, controllers: Sequence[OpenLoopTensions], routing: Routing) -> OpenLoopTensions:
+    def from_fingers(cls, controllers: Sequence[OpenLoopTensions], routing: Routing) -> OpenLoopTensions:
         """Return the schedule of a hand from those of its fingers."""
         return cls(Signal.from_signals([each.signal for each in controllers]), routing)
 

@@ -34,12 +34,12 @@ class PalmPath:
     carries: bool
 
     @classmethod
-    def of(
+    def from_hand(
         cls, hand: HandSettings | None, start: float, finger: Finger | None = None, tolerance: float = 0.0
     ) -> PalmPath | None:
-        """Return the path of a hand's palm from a time on, s; None if it rests. Around the finger objects stand.
+        """Return the path of a hand's palm from a time on, s; None if it rests.
 
-        The tolerance is that of `Signal.from_settings`.
+        The tolerance is that of `Signal.from_settings`; a finger says whether objects stand around it.
         """
         if hand is None or hand.palm.path is None:
             return None
@@ -73,8 +73,8 @@ class PalmPath:
         """Return the 27 numbers of `base_motion`, and accelerations of a world that it sees, shape (..., 27 or 33)."""
         place, first, second, third = (np.moveaxis(self.signal.derivative(time, order), -1, 0) for order in range(4))
         turns = [each(angle) for angle in place[3:] for each in (np.sin, np.cos)]
-        found = base_motion(first, second, third, turns, self.gravity)
-        numbers = np.stack(np.broadcast_arrays(*found), axis=-1)
+        motion = base_motion(first, second, third, turns, self.gravity)
+        numbers = np.stack(np.broadcast_arrays(*motion), axis=-1)
         return np.concatenate([numbers, self._world(2, time)], axis=-1) if self.carries else numbers
 
     def velocity(self, time: Array) -> tuple[Array, Array]:
@@ -106,7 +106,7 @@ class PrescribedObjects:
     gravity: Array
 
     @classmethod
-    def of(cls, finger: Finger, start: float, tolerance: float) -> PrescribedObjects | None:
+    def from_finger(cls, finger: Finger, start: float, tolerance: float) -> PrescribedObjects | None:
         """Return the paths of the moved objects around a finger from a time on, s, or None.
 
         The tolerance is that of `Signal.from_settings`.

@@ -125,8 +125,8 @@ class PositionDrives:
         period = loop_period(finger)
         self._controller, actuators = controller, finger.actuators
         self._positioned = np.isin(np.arange(finger.routing.actuated), actuators.positioned)
-        given = actuators.tendons[np.any(actuators.spools[:, [*wound, *voltages]] != 0.0, axis=1)]
-        self._wound = np.isin(np.arange(len(finger.routing.tendons)), given)
+        prescribed = actuators.tendons[np.any(actuators.spools[:, [*wound, *voltages]] != 0.0, axis=1)]
+        self._wound = np.isin(np.arange(len(finger.routing.tendons)), prescribed)
         self.channels = actuators.voltages
         first = 0.0 if memory is None else -memory.age
         times: Array = first + period * np.arange(math.ceil((duration - first) / period) + 1.0)
@@ -216,20 +216,20 @@ def _positioned(finger: Finger) -> list[tuple[str, Actuator]]:
 
 
 def wound_spools(scenario: Scenario, finger: Finger) -> dict[int, tuple[Signal, float]]:
-    """Return what is wound in by motors in position drive, by their number: rad, or m and the radius of the spool."""
-    actuators, found = finger.actuators, {}
+    """Return the windings of motors in position drive, by their number: rad, or m and the radius of the spool."""
+    actuators, windings = finger.actuators, {}
     cords = [finger.routing.tendons[k] for k in actuators.tendons]
     for part in scenario.parts().values():
-        given: dict[str, SignalSettings] = {**(part.controller.spool_angle or {})}
-        for name, settings in given.items():
-            found[actuators.names.index(name)] = settings, 1.0
+        angles: dict[str, SignalSettings] = {**(part.controller.spool_angle or {})}
+        for name, settings in angles.items():
+            windings[actuators.names.index(name)] = settings, 1.0
         for name, length in (part.controller.tendon_winding or {}).items():
             if name in cords:
                 radii = actuators.spools[cords.index(name)]
                 motor = int(np.argmax(radii != 0.0))
-                found[motor] = length, float(radii[motor])
+                windings[motor] = length, float(radii[motor])
     tolerance = scenario.simulation.rtol
-    return {motor: (Signal.from_settings([each], tolerance), radius) for motor, (each, radius) in found.items()}
+    return {motor: (Signal.from_settings([each], tolerance), radius) for motor, (each, radius) in windings.items()}
 
 
 def given_voltages(scenario: Scenario, finger: Finger) -> dict[int, Signal]:
@@ -258,7 +258,11 @@ def loop_period(finger: Finger) -> float:
 
 
 def build_drives(
-    finger: Finger, goals: Array, start_time: float = 0.0, given: Array | None = None, memory: LoopMemory | None = None
+    finger: Finger,
+    goals: Array,
+    start_time: float = 0.0,
+    voltages: Array | None = None,
+    memory: LoopMemory | None = None,
 ) -> Drives:
     """Return the loops of all motors of a finger in position drive, m of them.
 
@@ -266,7 +270,7 @@ def build_drives(
         finger: The finger.
         goals: theta_m^d at the samples, one every period, shape (k, m), rad.
         start_time: What the clock shows at the start, s.
-        given: Voltages in place of the loops, shape (k, m), V; not numbers where these run.
+        voltages: Voltages in place of the loops, shape (k, m), V; not numbers where these run.
         memory: Of the sample that was taken last, where a run goes on.
     """
     chosen = [actuator for _, actuator in _positioned(finger)]
@@ -279,7 +283,7 @@ def build_drives(
         period=loop_period(finger),
         first=0.0 if memory is None else -memory.age,
         goals=np.ascontiguousarray(goals),
-        given=np.full(goals.shape, np.nan) if given is None else given,
+        given=np.full(goals.shape, np.nan) if voltages is None else voltages,
         resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
         gains=np.ascontiguousarray(np.array([[e.proportional, e.derivative, e.integral] for e in loops]).T),
         torque_off=np.array([np.inf if each.torque_off is None else each.torque_off for each in loops]) - start_time,

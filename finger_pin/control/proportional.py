@@ -108,21 +108,21 @@ class ProportionalController(LoopController):
         return self
 
     @classmethod
-    def joined(cls, controllers: Sequence[ProportionalController], routing: Routing) -> ProportionalController:
+    def from_fingers(cls, controllers: Sequence[ProportionalController], routing: Routing) -> ProportionalController:
         """Return the controller of a hand from those of its fingers, with a lambda of (22) for each."""
         tendons, joints = len(routing.tendons), len(routing.joints)
         gain, damping, minimum, internal = np.zeros(joints), np.zeros(joints), np.zeros(tendons), np.zeros(tendons)
         inverse, loop = np.zeros((tendons, joints)), np.zeros(tendons, dtype=np.int64)
-        for index, (each, (turned, pulled)) in enumerate(zip(controllers, routing.fingers, strict=True)):
-            gain[turned], damping[turned] = each.gain, each.damping
-            minimum[pulled], internal[pulled] = each.minimum, each.internal
-            inverse[np.ix_(pulled, turned)], loop[pulled] = each.inverse, index
+        for index, (controller, (turned, pulled)) in enumerate(zip(controllers, routing.fingers, strict=True)):
+            gain[turned], damping[turned] = controller.gain, controller.damping
+            minimum[pulled], internal[pulled] = controller.minimum, controller.internal
+            inverse[np.ix_(pulled, turned)], loop[pulled] = controller.inverse, index
         return cls(gain, minimum, inverse, internal, damping, loop)
 
 
 @dataclass(frozen=True, eq=False)
 class RoutedController(LoopController):
-    """tau^d by the pseudo-inverse of H_c(theta)^T, raised by the internal tensions of the posture.
+    """Controller by the pseudo-inverse of H_c(theta)^T, raised by the internal tensions of the posture.
 
     Where a posture has no force closure, tensions below f0 are raised to it alone, which turns joints.
 

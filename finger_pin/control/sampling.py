@@ -74,9 +74,9 @@ class SampledController(LoopController):
 
     def measured(self, name: str, times: Array) -> Array:
         """Return the last readings of a sensor at times (m,), shape (m,) or (m, k)."""
-        found = np.array([each[name] for each in self._readings])
-        held: Array = found[np.minimum(np.floor(times / self.period * (1.0 + 1e-12)).astype(int), len(found) - 1)]
-        return held
+        samples = np.array([each[name] for each in self._readings])
+        latest: Array = samples[np.minimum(np.floor(times / self.period * (1.0 + 1e-12)).astype(int), len(samples) - 1)]
+        return latest
 
     def _arrival(self, sample: int) -> float:
         return (sample + self._late) * self.period + self._rest
@@ -88,11 +88,11 @@ class SampledController(LoopController):
         loop, controller = self._loop, self._loop.controller
         acting = self._tension() if self._samples else np.zeros(loop.finger.routing.actuated)
         now = Instant(loop, time, x.copy(), acting)
-        found = readings(self.sensors, now)
-        self._readings.append(found)
+        values = readings(self.sensors, now)
+        self._readings.append(values)
         if controller.needs_sensors:
-            controller.sense(found, self.period if self._samples else 0.0)
-        position, velocity = (found[each.name] for each in (JointEncoder, JointSpeed))
+            controller.sense(values, self.period if self._samples else 0.0)
+        position, velocity = (values[each.name] for each in (JointEncoder, JointSpeed))
         return controller.command(time, loop.reference.at(time), position, velocity)
 
 

@@ -119,7 +119,7 @@ class JointCompensation:
         return matrix
 
     def unloaded_torque(self, desired_velocity: Array) -> Array:
-        """Return what no load makes, the drag and b v, shape (..., n), N m."""
+        """Return the torque without a load, the drag and b v, shape (..., n), N m."""
         drag = self._signed(desired_velocity, self.friction.drag, self.friction.static_drag)
         return self.share * (drag + self.friction.viscous * desired_velocity)
 

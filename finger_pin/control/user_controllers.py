@@ -63,9 +63,9 @@ class UserReference:
         """
         if np.ndim(time) == 0:
             return self._one(float(time))
-        found = [self._one(float(each)) for each in np.asarray(time)]
+        answers = [self._one(float(each)) for each in np.asarray(time)]
         return ReferenceSignals(
-            np.array([each.position for each in found]), np.array([each.velocity for each in found])
+            np.array([each.position for each in answers]), np.array([each.velocity for each in answers])
         )
 
     def signals(self) -> tuple[Signal, ...]:
@@ -76,12 +76,12 @@ class UserReference:
         """Return None: it is Python."""
 
     def _one(self, time: float) -> ReferenceSignals:
-        found = self.reference.at(time + self.start)
+        answer = self.reference.at(time + self.start)
         values = []
         for name in ("position", "velocity"):
-            if not hasattr(found, name):
+            if not hasattr(answer, name):
                 raise InputError("reference", "at(time) must return ReferenceSignals(position, velocity)")
-            value = _numbers(getattr(found, name))
+            value = _numbers(getattr(answer, name))
             if value.shape != (len(self.joints),) or not np.isfinite(value).all():
                 allowed = f"{name} at t = {time:g} s must be {len(self.joints)} finite numbers, one per joint"
                 raise InputError("reference", allowed, value.tolist())
@@ -129,12 +129,12 @@ class UserController(LoopController):
             return self._one(float(time), reference, position, velocity)
         times = np.broadcast_to(time, len(position))
         rows = zip(times, reference.position, reference.velocity, position, velocity, strict=True)
-        found = [self._one(float(t), ReferenceSignals(p, v), *motion) for t, p, v, *motion in rows]
-        missing = [each.torque_deficit for each in found if each.torque_deficit is not None]
+        answers = [self._one(float(t), ReferenceSignals(p, v), *motion) for t, p, v, *motion in rows]
+        missing = [each.torque_deficit for each in answers if each.torque_deficit is not None]
         return ControlSignals(
-            np.array([each.torque for each in found]),
-            np.array([each.tension for each in found]),
-            np.array(missing) if len(missing) == len(found) else None,
+            np.array([each.torque for each in answers]),
+            np.array([each.tension for each in answers]),
+            np.array(missing) if len(missing) == len(answers) else None,
         )
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
@@ -144,10 +144,10 @@ class UserController(LoopController):
     def _one(self, time: float, reference: ReferenceSignals, position: Array, velocity: Array) -> ControlSignals:
         first, self._asked = not self._asked, True
         try:
-            found = self._complete(self.controller.command(time + self._start, reference, position, velocity))
+            signals = self._complete(self.controller.command(time + self._start, reference, position, velocity))
             # A step that is tried in vain may ask about a motion that is no number; then the answer may be none.
-            self._check(found, first or bool(np.isfinite(position).all() and np.isfinite(velocity).all()))
-            return found
+            self._check(signals, first or bool(np.isfinite(position).all() and np.isfinite(velocity).all()))
+            return signals
         except Exception as error:
             if first:
                 raise
@@ -161,26 +161,26 @@ class UserController(LoopController):
             routing = self._routing
             return ControlSignals(np.zeros(len(routing.joints)), np.full(len(routing.tendons), np.nan))
 
-    def _complete(self, found: object) -> ControlSignals:
+    def _complete(self, answer: object) -> ControlSignals:
         routing = self._routing
-        tension = _numbers(getattr(found, "tension", found))
+        tension = _numbers(getattr(answer, "tension", answer))
         if tension.shape not in ((len(routing.tendons),), (routing.actuated,)):
             sizes = " or ".join(map(str, dict.fromkeys([routing.actuated, len(routing.tendons)])))
             names = ", ".join(routing.tendons)
             allowed = f"command() must return {sizes} tensions ({names}) for one time, not shape {tension.shape}"
             raise InputError("controller", allowed)
         pulled = np.where(routing.winched, 0.0, tension[: routing.actuated])
-        torque = _numbers(getattr(found, "torque", pulled @ routing.actuated_coupling))
+        torque = _numbers(getattr(answer, "torque", pulled @ routing.actuated_coupling))
         if torque.shape != (len(routing.joints),):
             allowed = f"command() must return {len(routing.joints)} torques for one time, not shape {torque.shape}"
             raise InputError("controller", allowed)
         # A passive tendon without a planned tension is planned to carry none.
         tension = np.append(tension, np.zeros(len(routing.tendons) - len(tension)))
-        return ControlSignals(torque, tension, getattr(found, "torque_deficit", None))
+        return ControlSignals(torque, tension, getattr(answer, "torque_deficit", None))
 
-    def _check(self, found: ControlSignals, finite: bool) -> None:
+    def _check(self, signals: ControlSignals, finite: bool) -> None:
         routing = self._routing
-        for k, (name, tension) in enumerate(zip(routing.tendons, found.tension, strict=True)):
+        for k, (name, tension) in enumerate(zip(routing.tendons, signals.tension, strict=True)):
             pushes = tension < _LEAST and not (k < routing.actuated and routing.winched[k])
             if pushes or (finite and not np.isfinite(tension)):
                 allowed = f"tensions must be finite and not negative, that of {name} is not; clip it at 0 or above"
@@ -213,31 +213,31 @@ def with_columns(
     return load_scenario(scenario, overrides), None
 
 
-def choose_controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> LoopController:
+def choose_controller(controller: Controller | Samples | None, scenario: Scenario, finger: Finger) -> LoopController:
     """Return the controller that a caller gives, ready to be asked, or the scenario's if none is given.
 
     Raises:
         InputError: If it does not fit the finger.
     """
-    if given is None:
+    if controller is None:
         return build_controller(scenario, finger)
-    if isinstance(given, tuple | list):
-        return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    if isinstance(given, LoopController):
-        return given
-    return UserController(given, finger.routing, scenario.simulation.start_time)
+    if isinstance(controller, tuple | list):
+        return OpenLoopTensions.from_samples(controller, scenario, finger.routing)
+    if isinstance(controller, LoopController):
+        return controller
+    return UserController(controller, finger.routing, scenario.simulation.start_time)
 
 
-def choose_reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> LoopReference:
+def choose_reference(reference: Reference | Samples | None, scenario: Scenario, routing: Routing) -> LoopReference:
     """Return the reference that a caller gives, ready to be asked, or the scenario's if none is given.
 
     Raises:
         InputError: If it does not fit the finger.
     """
-    if given is None:
+    if reference is None:
         return SignalReference.from_scenario(scenario, routing)
-    if isinstance(given, tuple | list):
-        return SignalReference.from_samples(given, scenario, routing)
-    if isinstance(given, SignalReference):
-        return given
-    return UserReference(given, routing.joints, scenario.simulation.start_time)
+    if isinstance(reference, tuple | list):
+        return SignalReference.from_samples(reference, scenario, routing)
+    if isinstance(reference, SignalReference):
+        return reference
+    return UserReference(reference, routing.joints, scenario.simulation.start_time)

@@ -88,8 +88,8 @@ class Simulator:
         """Build the stepper of a finger; `_begin` gives it a state."""
         self.finger, mechanism = finger, finger.mechanism
         control = held_control(mechanism.channels, mechanism.coordinates)
-        self._guides = PrescribedObjects.of(finger, 0.0, self._settings["rtol"])
-        self._palm = PalmPath.of(finger.description.hand, 0.0, finger, self._settings["rtol"])
+        self._guides = PrescribedObjects.from_finger(finger, 0.0, self._settings["rtol"])
+        self._palm = PalmPath.from_hand(finger.description.hand, 0.0, finger, self._settings["rtol"])
         control = with_paths(control, self._palm, self._guides)
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
         self._stepper = Stepper.of(finger, control, rest, **self._settings)

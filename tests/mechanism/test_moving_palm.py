@@ -150,5 +150,5 @@ def test_a_wrong_path_is_named(path, said):
 
 
 def test_a_path_starts_at_the_scenarios_start_time(scenario):
-    later = PalmPath.of(scenario.hand, 0.1)
-    np.testing.assert_allclose(later.base(0.05), PalmPath.of(scenario.hand, 0.0).base(0.15))
+    later = PalmPath.from_hand(scenario.hand, 0.1)
+    np.testing.assert_allclose(later.base(0.05), PalmPath.from_hand(scenario.hand, 0.0).base(0.15))

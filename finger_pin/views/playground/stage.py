@@ -49,7 +49,7 @@ class Stage:
         self.scale = _TENSION
         self._viser, self._turn = server.scene, self.scene.view()
         self._viser.set_up_direction("+z")
-        self._palm = PalmPath.of(session.scenario.hand, 0.0, session.finger)
+        self._palm = PalmPath.from_hand(session.scenario.hand, 0.0, session.finger)
         geometry, self._by_name = self.scene.geometry, dict(session.scenario.environment.objects or {})
         self._root = self._viser.add_frame(ROOT, show_axes=False)
         self._links = [self._viser.add_frame(f"{ROOT}/{name}", show_axes=False) for name in link_names(geometry)]
