@@ -44,8 +44,11 @@ class Controller(Protocol):
 
     def command(
         self, time: float, reference: ReferenceSignals, position: Array, velocity: Array
-    ) -> ControlSignals | ArrayLike:
-        """Return the commands at a time, s, for angles and speeds of shape (n,); tensions alone will do, N."""
+    ) -> ControlSignals | ArrayLike | Mapping[str, float]:
+        """Return the commands at a time, s, for angles and speeds of shape (n,).
+
+        Tensions alone will do, N, and the inputs of a tree's actuators behind them; or numbers by name.
+        """
 
 
 class Dynamics(Protocol):

@@ -50,7 +50,7 @@ class SampledController(LoopController):
         self._acting = 0
 
     def act(self, x: Array) -> Array:
-        """Sample if due, and return the tensions that act from now on, shape (a,)."""
+        """Sample if due, and return the tensions, and inputs of a tree, that act from now on, shape (channels,)."""
         if self.instant == len(self._samples) * self.period:
             self._samples.append(self._sample(self.instant, x))
         while self._acting + 1 < len(self._samples) and self._arrival(self._acting + 1) <= self.instant:
@@ -58,7 +58,8 @@ class SampledController(LoopController):
         self.instant = len(self._samples) * self.period
         if self._acting + 1 < len(self._samples):
             self.instant = min(self.instant, self._arrival(self._acting + 1))
-        return self._tension()
+        inputs = self._samples[self._acting].inputs
+        return self._tension() if inputs is None else np.concatenate([self._tension(), inputs])
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
@@ -70,7 +71,10 @@ class SampledController(LoopController):
         tensions = np.array([sample.tension for sample in self._samples])
         missing = [sample.torque_deficit for sample in self._samples if sample.torque_deficit is not None]
         torque_deficit = np.array(missing)[index] if len(missing) == len(self._samples) else None
-        return ControlSignals(torques[index], tensions[index], torque_deficit)
+        inputs = [sample.inputs for sample in self._samples if sample.inputs is not None]
+        return ControlSignals(
+            torques[index], tensions[index], torque_deficit, np.array(inputs)[index] if inputs else None
+        )
 
     def measured(self, name: str, times: Array) -> Array:
         """Return the last readings of a sensor at times (m,), shape (m,) or (m, k)."""

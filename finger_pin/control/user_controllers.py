@@ -14,12 +14,14 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
 from finger_pin.control.interface import Controller, ControlSignals, LoopController
+from finger_pin.control.named_inputs import inputs_by_name
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.recordings.series import Series
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.winding import WINDINGS
+from finger_pin.description.validation import choices
+from finger_pin.description.winding import WINDINGS, command_place
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals, SignalReference
@@ -92,8 +94,9 @@ class UserReference:
 class UserController(LoopController):
     """Custom controller.
 
-    It returns `ControlSignals`, or only the tensions: of all tendons, or of the actuated ones. The number of a winch is
-    the length that it winds in, m.
+    It returns `ControlSignals`, or only the tensions, of all tendons or of the actuated ones, and behind them the
+    inputs of a tree's actuators; or numbers by name, ``{"T1": 3.0, "tendon_winding.T2": 0.01, "servo": 0.2}``. What is
+    wound by a winch is in m.
 
     Attributes:
         controller: Asked for one time at a time: time, s, `ReferenceSignals`, theta and theta', shape (n,).
@@ -101,7 +104,7 @@ class UserController(LoopController):
         problem_time: When, s.
     """
 
-    def __init__(self, controller: Controller, routing: Routing, start: float) -> None:
+    def __init__(self, controller: Controller, finger: Finger, start: float) -> None:
         """Take a controller; ``start`` is its time when the simulation begins, s.
 
         Raises:
@@ -115,7 +118,7 @@ class UserController(LoopController):
         self.controller, self.problem, self.problem_time = controller, "", -np.inf
         self.needs_sensors = callable(getattr(controller, "sense", None))
         self.sensors = tuple(getattr(controller, "sensors", ()))
-        self._routing, self._start, self._asked = routing, start, False
+        self._finger, self._routing, self._start, self._asked = finger, finger.routing, start, False
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
@@ -135,6 +138,7 @@ class UserController(LoopController):
             np.array([each.torque for each in answers]),
             np.array([each.tension for each in answers]),
             np.array(missing) if len(missing) == len(answers) else None,
+            np.array([each.inputs for each in answers]) if self._finger.description.tree.actuators else None,
         )
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
@@ -158,12 +162,21 @@ class UserController(LoopController):
                 else f"the controller raised {type(error).__name__}: {error}"
             )
             self.problem, self.problem_time = " ".join(text.split()), time
-            routing = self._routing
-            return ControlSignals(np.zeros(len(routing.joints)), np.full(len(routing.tendons), np.nan))
+            routing, actuators = self._routing, self._finger.description.tree.actuators
+            unknown = np.full(len(routing.tendons), np.nan)
+            inputs = np.full(len(actuators), np.nan) if actuators else None
+            return ControlSignals(np.zeros(len(routing.joints)), unknown, inputs=inputs)
 
     def _complete(self, answer: object) -> ControlSignals:
-        routing = self._routing
-        tension = _numbers(getattr(answer, "tension", answer))
+        routing, actuators = self._routing, tuple(self._finger.description.tree.actuators)
+        if isinstance(answer, Mapping):
+            answer = inputs_by_name("controller", answer, self._finger, loops=True)
+        tension, inputs = _numbers(getattr(answer, "tension", answer)), getattr(answer, "inputs", None)
+        if actuators and inputs is None and tension.shape == (routing.actuated + len(actuators),):
+            tension, inputs = np.split(tension, [routing.actuated])
+        if actuators and (inputs is None or np.shape(inputs) != (len(actuators),)):
+            allowed = f"command() must return the inputs of {', '.join(actuators)} too: by name, or behind the tensions"
+            raise InputError("controller", allowed)
         if tension.shape not in ((len(routing.tendons),), (routing.actuated,)):
             sizes = " or ".join(map(str, dict.fromkeys([routing.actuated, len(routing.tendons)])))
             names = ", ".join(routing.tendons)
@@ -176,7 +189,8 @@ class UserController(LoopController):
             raise InputError("controller", allowed)
         # A passive tendon without a planned tension is planned to carry none.
         tension = np.append(tension, np.zeros(len(routing.tendons) - len(tension)))
-        return ControlSignals(torque, tension, getattr(answer, "torque_deficit", None))
+        inputs = _numbers(inputs) if actuators else None
+        return ControlSignals(torque, tension, getattr(answer, "torque_deficit", None), inputs)
 
     def _check(self, signals: ControlSignals, finite: bool) -> None:
         routing = self._routing
@@ -185,6 +199,8 @@ class UserController(LoopController):
             if pushes or (finite and not np.isfinite(tension)):
                 allowed = f"tensions must be finite and not negative, that of {name} is not; clip it at 0 or above"
                 raise InputError("controller", allowed, float(tension))
+        if finite and signals.inputs is not None and not np.isfinite(signals.inputs).all():
+            raise InputError("controller", "inputs of actuators must be finite", signals.inputs.tolist())
 
 
 def _numbers(value: object) -> Array:
@@ -199,16 +215,20 @@ def with_columns(
 ) -> tuple[Scenario, Controller | Samples | None]:
     """Return a scenario with samples given by name, times and columns, and the controller that is left, if any.
 
-    Columns have the names of ``controller.file``: tendons, and ``spool_angle.NAME`` and its kin.
+    Columns have the names of ``controller.file``: tendons, actuators of a tree, ``spool_angle.NAME`` and its kin.
     """
     if not (isinstance(controller, tuple | list) and len(controller) == 2 and isinstance(controller[1], Mapping)):
         return scenario, controller
     times, overrides = controller[0], dict[str, Any]()
     for name, values in controller[1].items():
-        wound = name.partition(".")[0] in WINDINGS and "." in name
+        actuators = scenario.finger.tree.actuators
+        table, label = command_place(name, actuators)
+        if table == "tensions" and label not in scenario.finger.tendons:
+            known = (*scenario.finger.actuated_names, *actuators)
+            raise InputError(f"controller.{name}", f"no such tendon or actuator; there are {choices(name, known)}")
         samples = {"kind": "samples", "times": Series(_numbers(times)), "values": Series(_numbers(values))}
-        overrides[f"controller.{name}" if wound else f"controller.tensions.{name}"] = samples
-        if not wound:
+        overrides[f"controller.{table}.{label}"] = samples
+        if table not in WINDINGS:
             overrides["controller.kind"] = "tensions"
     return load_scenario(scenario, overrides), None
 
@@ -225,7 +245,7 @@ def choose_controller(controller: Controller | Samples | None, scenario: Scenari
         return OpenLoopTensions.from_samples(controller, scenario, finger.routing)
     if isinstance(controller, LoopController):
         return controller
-    return UserController(controller, finger.routing, scenario.simulation.start_time)
+    return UserController(controller, finger, scenario.simulation.start_time)
 
 
 def choose_reference(reference: Reference | Samples | None, scenario: Scenario, routing: Routing) -> LoopReference:

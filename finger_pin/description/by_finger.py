@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.validation import Description, nested, problem
+from finger_pin.description.fields import nested
+from finger_pin.description.validation import Description, problem
 
 _Settings = TypeVar("_Settings", bound=Description)
 

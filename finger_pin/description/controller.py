@@ -244,6 +244,7 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
             raise problem(entry, f"is a passive tendon, which has no actuator; actuated are {', '.join(names)}")
         if name not in names:
             hint = f"; give controller.spool_angle.{name}" if name in finger.actuators else suggestion(name, names)
-            raise problem(entry, f"no such tendon; actuated are {', '.join(names)}{hint}")
+            driven = f"; actuators are {', '.join(actuators)}" if actuators else ""
+            raise problem(entry, f"no such tendon; actuated are {', '.join(names) or 'none'}{driven}{hint}")
         if signal.lowest < 0.0:
             raise problem(entry, f"a tendon only pulls: the tension must stay at or above 0 N, not {signal.lowest:g} N")

@@ -1,8 +1,8 @@
-"""Fields of descriptions, found by a location through nested models and tables."""
+"""Fields of descriptions, by a location through nested models and tables, and tables as files nest them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -46,3 +46,16 @@ def document(model: type[BaseModel], location: Sequence[str]) -> str:
     """Return what the field at a location is, in words."""
     field = find_field(model, location)
     return str(field.description if field and field.description else "a table")
+
+
+def nested(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it; tables in it are copies."""
+    outer: dict[str, Any] = {}
+    for name, value in table.items():
+        finger, dot, inner = name.partition(".")
+        value = nested(value) if isinstance(value, dict) else value
+        if dot:
+            outer.setdefault(finger, {})[inner] = value
+        else:
+            outer[name] = value
+    return outer

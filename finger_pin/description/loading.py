@@ -14,22 +14,12 @@ import tomli_w
 
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.overriding import normalise_overrides, override
-from finger_pin.description.reading import (
-    Table,
-    as_name,
-    as_table,
-    bench_file,
-    is_path,
-    kind_of,
-    merge,
-    read_scenario_file,
-    resolve_signals,
-    shipped,
-)
+from finger_pin.description.reading import as_name, bench_file, is_path, kind_of, merge, read_scenario_file, shipped
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.recordings.series import PACKED, Series, packed
+from finger_pin.description.recordings.signal_files import resolve_commands, resolve_signals
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import Description, suggestion, validate
+from finger_pin.description.validation import Description, Table, as_table, suggestion, validate
 from finger_pin.exceptions import InputError
 
 # Of more numbers than this a text is written that is read at once; nobody reads them one by one.
@@ -197,6 +187,7 @@ def _scenario(table: Table, folder: Path, name: str, overrides: Table) -> Scenar
     table.setdefault("name", as_name(Path(name).stem))
     override(overrides, table, folder)
     resolve_signals(table, Path())
+    resolve_commands(table)
     return validate(Scenario, table, ())
 
 
@@ -216,6 +207,7 @@ def _overridden(table: Table, overrides: Mapping[str, Any]) -> Scenario:
     with _depth_limited("scenario"):
         override(checked, table, Path())
         resolve_signals(table, Path())
+        resolve_commands(table)
         return validate(Scenario, table, ())
 
 

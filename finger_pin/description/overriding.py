@@ -10,18 +10,10 @@ from typing import Any, get_origin
 
 from finger_pin.description.effects import without_unread
 from finger_pin.description.fields import find_field
-from finger_pin.description.reading import (
-    NONE,
-    Table,
-    as_table,
-    is_other_kind,
-    is_path,
-    resolve_finger,
-    resolve_hand,
-    with_motors,
-)
+from finger_pin.description.reading import NONE, is_other_kind, is_path, resolve_finger, resolve_hand, with_motors
+from finger_pin.description.recordings.signal_files import fingers_of
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import Description, nearest, suggestion
+from finger_pin.description.validation import Description, Table, as_table, nearest, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand
 
@@ -62,7 +54,9 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
     first = (".kind", ".motor", ".law", ".drive")
     for early in (True, False):
         _apply({key: value for key, value in entries.items() if key.endswith(first) == early}, table)
-        for finger in [as_table(placed).get("finger") for placed in _fingers(table).values()] or [table.get("finger")]:
+        for finger in [as_table(placed).get("finger") for placed in fingers_of(table).values()] or [
+            table.get("finger")
+        ]:
             with_motors(as_table(finger), Path())
 
 
@@ -126,7 +120,7 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
     if name in siblings:
         return
     finger = as_table(table.get("finger"))
-    hand = {key: as_table(each).get("finger") for key, each in _fingers(table).items()}
+    hand = {key: as_table(each).get("finger") for key, each in fingers_of(table).items()}
     # A signal for a joint or a tendon that is there may have no entry of its own yet.
     present: dict[tuple[str, ...], tuple[str, Iterable[str]]] = {}
     for place, what in _BY_NAME.items():
@@ -145,10 +139,6 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
         if not names and (what == "object" or tuple(owner) not in present):
             allowed = f"{allowed}; {'.'.join(owner)} = {{ {name} = {{ ... }} }} puts it there"
         raise InputError(".".join(path), f"{allowed}{suggestion(name, names)}")
-
-
-def _fingers(table: Table) -> Table:
-    return as_table(as_table(table.get("hand")).get("fingers"))
 
 
 def normalise_overrides(overrides: Mapping[str, Any], allowed: set[str]) -> Table:

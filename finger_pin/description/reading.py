@@ -13,22 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from finger_pin.description.effects import without_unread
-from finger_pin.description.recordings.columns import read_signals
-from finger_pin.description.recordings.series import PACKED
-from finger_pin.description.validation import Description, suggestion
-from finger_pin.description.winding import WINDINGS
+from finger_pin.description.recordings.signal_files import resolve_signals
+from finger_pin.description.validation import Description, Table, as_table, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand, read_text
 
-Table = dict[str, Any]
 #: In place of an inherited table or value: takes it away, as if the base had left it out.
 NONE = "none"
-# Sections that may name a CSV file, the key that does, where its columns go, and their unit.
-_SIGNAL_FILES = (
-    ("reference", "file", "joints", "rad"),
-    ("controller", "file", "tensions", "N"),
-    ("environment", "fingertip_force_file", "fingertip_force_signal", "N"),
-)
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
 _KINDS_APART = {"step", "ramp", "points", "cosine", "samples", "tensions"}
 
@@ -219,41 +210,6 @@ def _named(owner: str) -> Iterator[None]:
         raise InputError(owner + error.entry, error.allowed, error.value) from None
 
 
-def resolve_signals(table: Table, folder: Path) -> None:
-    """Replace CSV files by signals sampled in their columns."""
-    for section, key, target, unit in _SIGNAL_FILES:
-        settings = table.get(section)
-        if isinstance(settings, dict) and key in settings:
-            apart = WINDINGS if section == "controller" else {}
-            samples = read_signals(f"{section}.{key}", settings.pop(key), folder, unit, apart)
-            for name, signal in samples.items():
-                before, _, inner = name.partition(".")
-                chosen, known = (before, inner) if inner and before in apart else (target, name)
-                if not isinstance(settings.get(chosen, {}), dict):
-                    raise InputError(f"{section}.{chosen}", f"must be a table beside {section}.{key}", settings[chosen])
-                settings[chosen] = {**as_table(settings.get(chosen)), known: signal}
-    _share_times(table)
-
-
-def _share_times(table: Table) -> None:
-    """Replace the name of a neighbour in a signal's times by that one's times."""
-    inner = [("", table)]
-    # Tables may be nested more deeply than calls.
-    while inner:
-        place, around = inner.pop()
-        for name, entry in around.items():
-            if not isinstance(entry, dict):
-                continue
-            inner.append((f"{place}{name}.", entry))
-            times = entry.get("times")
-            if isinstance(times, str) and not times.startswith(PACKED):
-                shared = as_table(around.get(times)).get("times")
-                if not shared or (isinstance(shared, str) and not shared.startswith(PACKED)):
-                    allowed = "must be a list of numbers, or the name of another signal here that has one"
-                    raise InputError(f"{place}{name}.times", allowed, times)
-                entry["times"] = shared
-
-
 def _resolve_recordings(table: Table, folder: Path) -> None:
     """Make the paths of recordings absolute, so that a scenario that extends this one finds them."""
     for recording in as_table(as_table(table.get("identify")).get("recordings")).values():
@@ -279,13 +235,6 @@ def merge(base: Table, top: Table) -> Table:
         # A table that names its base starts from that one.
         merged[key] = merge(merged[key], value) if both and "base" not in value else value
     return merged
-
-
-def as_table(value: Any) -> Table:
-    """Return a table, the entries of a description, or nothing for any other value: validation refuses that by name."""
-    if isinstance(value, Description):
-        return value.set_entries()
-    return value if isinstance(value, dict) else {}
 
 
 def as_name(stem: str) -> str:

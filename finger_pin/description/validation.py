@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Any, ClassVar, NoReturn, Self, TypeVar
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, ValidationError
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.fields import document, field_names
+from finger_pin.description.fields import document, field_names, nested
 from finger_pin.exceptions import InputError
 
 Name = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
@@ -31,6 +31,7 @@ _UNIT = 1.001
 MOST_ANGLE = 12.5
 IN_RADIANS = " rad (is it in degrees?)"
 Numbers = float | tuple[float, ...]
+Table = dict[str, Any]
 _Model = TypeVar("_Model", bound="Description")
 
 
@@ -56,17 +57,11 @@ class Description(BaseModel):
         return nested({key: getattr(self, key) for key in self.model_fields_set})
 
 
-def nested(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it; tables in it are copies."""
-    outer: dict[str, Any] = {}
-    for name, value in table.items():
-        finger, dot, inner = name.partition(".")
-        value = nested(value) if isinstance(value, dict) else value
-        if dot:
-            outer.setdefault(finger, {})[inner] = value
-        else:
-            outer[name] = value
-    return outer
+def as_table(value: Any) -> Table:
+    """Return a table, the entries of a description, or nothing for any other value: validation refuses that by name."""
+    if isinstance(value, Description):
+        return value.set_entries()
+    return value if isinstance(value, dict) else {}
 
 
 def problem(entry: str, allowed: str, value: Any = None) -> PydanticCustomError:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.control.named_inputs import inputs_by_name
 from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_paths
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -27,6 +28,9 @@ from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import as_finite_array, check_motors
 from finger_pin.simulation.step_log import StepLog
 from finger_pin.typing import Array
+
+#: Numbers in the order of the inputs, or by name.
+Inputs = ArrayLike | Mapping[str, float]
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 
@@ -181,12 +185,13 @@ class Simulator:
         """The state by name; a copy."""
         return self.finger.layout.unpack(self.x)
 
-    def step(self, inputs: ArrayLike, dt: float, fingertip_force: ArrayLike | None = None) -> State:
+    def step(self, inputs: Inputs, dt: float, fingertip_force: ArrayLike | None = None) -> State:
         """Advance by a time under constant tensions; return the state then.
 
         Args:
             inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon; of
-                an ideal winch the length that is wound in, m. Inputs of a tree's actuators follow.
+                an ideal winch the length that is wound in, m. Inputs of a tree's actuators follow. Or numbers by name:
+                ``{"T1": 5.0, "tendon_winding.T2": 0.01, "motor_voltage.M1": 3.0, "servo": 0.2}``.
             dt: s.
             fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
 
@@ -200,7 +205,9 @@ class Simulator:
         self._log.add(self._stepper.time, self._tension, self._force)
         return self._reached(status)
 
-    def _checked(self, inputs: ArrayLike, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
+    def _checked(self, inputs: Inputs, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
+        if isinstance(inputs, Mapping):
+            inputs = inputs_by_name("inputs", inputs, self.finger)
         command, force = as_finite_array("inputs", inputs, self._tension.shape), self._unloaded
         if min(command.tolist(), default=0.0) < 0.0 and (command[self._pulling] < 0.0).any():
             raise InputError("inputs", "a tension must not be negative: a tendon cannot push", command.tolist())
@@ -260,7 +267,7 @@ class Simulator:
 
 def step_many(
     simulators: Sequence[Simulator],
-    tensions: Sequence[ArrayLike],
+    tensions: Sequence[Inputs],
     dt: float,
     fingertip_forces: Sequence[ArrayLike] | None = None,
 ) -> list[State]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -140,15 +140,14 @@ class Table:
         yield from file.columns.items() or [each for each in named if each[1].column != apart]
 
 
-def read_signals(entry: str, source: Any, folder: Path, si: str, units: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+def read_signals(entry: str, source: Any, folder: Path, unit_of: Callable[[str], str]) -> dict[str, dict[str, Any]]:
     """Return the columns of a CSV file as samples of signals, by name.
 
     Args:
         entry: That names the file.
         source: Its path, or a table of `SignalFile`.
         folder: That a relative path starts from.
-        si: Unit of the signals.
-        units: Of those whose name begins with one of these and a dot.
+        unit_of: SI unit of a signal by its name; empty for that of its own unit.
 
     Raises:
         InputError: If the file cannot be read, or a column is not of numbers, or times do not increase.
@@ -164,8 +163,7 @@ def read_signals(entry: str, source: Any, folder: Path, si: str, units: Mapping[
     for name, column in signals:
         if name in samples:
             raise InputError(entry, "two columns are of the same signal", name)
-        unit = units.get(name.partition(".")[0], si) if "." in name else si
-        values = Series(table.column(f"columns.{name}", column, unit))
+        values = Series(table.column(f"columns.{name}", column, unit_of(name)))
         # A column that lags behind its quantity is of earlier times.
         at = Series(times - column.delay) if column.delay else shared
         samples[name] = {"kind": "samples", "times": at, "values": values}
