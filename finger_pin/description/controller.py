@@ -105,9 +105,9 @@ class ControllerSettings(Description):
     With ``kind = "tensions"`` the tensions are given over time instead. That is also the default where nothing is said
     of a closed loop (no gain or other entry of it, and no reference) and there is no other way: tensions or windings
     are given, a tree has actuators, or tensions cannot hold the finger at every posture, but its joints have springs.
-    In a file, ``file`` then names a CSV file: its columns are ``time`` and actuated tendons, and become samples of
-    ``tensions``; those called ``spool_angle.NAME``, ``tendon_winding.NAME`` and ``motor_voltage.NAME`` are samples of
-    these.
+    In a file, ``file`` then names a CSV file: its columns are ``time``, actuated tendons, N, and actuators of a tree,
+    and become samples of ``tensions`` and ``inputs``; those called ``spool_angle.NAME``, ``tendon_winding.NAME`` and
+    ``motor_voltage.NAME`` are samples of these. Entries of these tables stand on top.
 
     In a hand it is the controller of every finger, with what the finger's table in ``fingers`` has on top; only
     ``sampling`` is the same for all.
