@@ -24,7 +24,7 @@ from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.description.parameters import Link
 from finger_pin.description.placement import PathSignal
-from finger_pin.mechanism.contacts import contact_rows
+from finger_pin.mechanism.contact_rows import contact_rows
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.solids import add_free_objects, link_solid, object_solids

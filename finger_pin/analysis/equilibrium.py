@@ -16,7 +16,7 @@ from finger_pin.mechanism.coerce import FingerLike, as_finger, as_inputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.tendons import SOURCES_WITH_END, WINCHES
-from finger_pin.mechanism.tree import MUSCLES, STATEFUL, STATELESS
+from finger_pin.mechanism.tree_mechanism import MUSCLES, STATEFUL, STATELESS
 from finger_pin.typing import Array
 
 # Of an angle, rad, for differences.

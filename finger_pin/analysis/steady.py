@@ -10,8 +10,8 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.laws.bristle import friction_coefficient
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import loss_share, stribeck_share
-from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.coerce import FingerLike, description_of
+from finger_pin.mechanism.servos import Actuators
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 

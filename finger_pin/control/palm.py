@@ -12,7 +12,7 @@ from finger_pin.description.objects import PATH as OBJECT_PATH
 from finger_pin.description.placement import PATH, PathSignal
 from finger_pin.laws.input_functions import base_motion
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.scene import POSE, VELOCITY
+from finger_pin.mechanism.object_scene import POSE, VELOCITY
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 

@@ -11,23 +11,23 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.canals import Canals
 from finger_pin.mechanism.joints import JointFriction, JointSprings, StrokeLimiter
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.object_scene import Scene
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, state_scales
-from finger_pin.mechanism.scene import Scene
+from finger_pin.mechanism.servos import Actuators
 from finger_pin.mechanism.state import BLOCKS, Layout
 from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.tree import along_paths, tree_rows
+from finger_pin.mechanism.tree_mechanism import along_paths, tree_rows
 from finger_pin.mechanism.wiring import replaced
 from finger_pin.typing import Array
 
 
 class ConstructorArgs(NamedTuple):
-    """What a finger was built from besides its description, as `Finger` takes it."""
+    """Arguments of `Finger` besides its description."""
 
     rigid_body: RigidBody | None
     rows: tuple[Rows, ...]
@@ -46,7 +46,7 @@ class Parts(NamedTuple):
     springs: JointSprings
 
     @classmethod
-    def of(cls, description: FingerDescription) -> Parts:
+    def from_description(cls, description: FingerDescription) -> Parts:
         """Return the parts of a description."""
         routing = Routing.from_description(description)
         return cls(
@@ -85,7 +85,7 @@ class Assembly(NamedTuple):
 
 
 def assemble(
-    description: FingerDescription, body: RigidBody, paths: TendonPaths, parts: Parts, given: ConstructorArgs
+    description: FingerDescription, body: RigidBody, paths: TendonPaths, parts: Parts, args: ConstructorArgs
 ) -> Assembly:
     """Return the rows of a description, in the order in which their states stand, joined by (18).
 
@@ -94,7 +94,7 @@ def assemble(
         body: Its rigid body.
         paths: Its tendons on that body.
         parts: Its other parts.
-        given: Rows, objects and replacements of the user's own.
+        args: Rows, objects and replacements of the user's own.
 
     Raises:
         InputError: As `Finger`.
@@ -104,12 +104,12 @@ def assemble(
     # Dry friction of a tree's tendons has states of its own, which stand with those of the user's rows.
     of_tree = {table.group: table for table in tree_rows(description, paths, width)}
     dry = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
-    custom_drives = [table for table in given.rows if table.pulls]
+    custom_drives = [table for table in args.rows if table.pulls]
     drives = (*actuators.tendon_rows(width), *tendons.sources(description, width), *custom_drives)
     matrices = tendons.drive_matrices(drives)
     tendon_rows = [along_paths(description, paths, table) for table in tendons.rows(drives, len(actuators.inertias))]
     canals = Canals(description, paths, tendons, [*of_tree.values(), *tendon_rows], matrices, width)
-    further = [*springs.hysteresis_rows(joints, width), *dry, *given.rows]
+    further = [*springs.hysteresis_rows(joints, width), *dry, *args.rows]
     tables = [
         *of_tree.values(),
         *tendon_rows,
@@ -122,15 +122,15 @@ def assemble(
     ]
     alone = Mechanism(
         body,
-        replaced(tables, given.tables),
+        replaced(tables, args.tables),
         (*routing.passive_names, *(f"{name}.spool" for name in actuators.loose_names), *actuators.names),
         np.concatenate([tendons.mass, actuators.inertias]),
         # Also where a tendon's input goes nowhere: the second one of a spool has none.
         routing.actuated,
         moved=description.hand is not None and description.hand.palm.path is not None,
     )
-    scene = Scene.around(alone, given.objects, description, paths.placed)
-    mechanism = alone if scene is None else scene.joined(alone)
+    scene = Scene.from_mechanism(alone, args.objects, description, paths.placed)
+    mechanism = alone if scene is None else scene.extend(alone)
     layout = _state_layout(parts, further, scene, [*of_tree.values()], canals.tables, body.slides)
     check_layout(layout, mechanism)
     extra_rows = (*of_tree.values(), *canals.tables, *further)
@@ -148,29 +148,32 @@ def _state_layout(
     """Return the layout of all blocks; ``further`` has drives among them, ``slides`` says which joints slide."""
     routing, tendons, motors, friction, *_ = parts
     drives, of_others = (
-        state_scales([table for table in further if bool(table.pulls) == own]) for own in (True, False)
+        state_scales([table for table in further if bool(table.pulls) == pulls]) for pulls in (True, False)
     )
 
-    def each(names: Sequence[str], parts: str) -> list[str]:
+    def dotted(names: Sequence[str], parts: str) -> list[str]:
         return [f"{name}.{part}" for name in names for part in parts.split()]
 
     free, world, touching = ((), (), ()) if scene is None else (tuple(scene.free), scene.world, scene.contacts.names)
     labels = {
         "position": routing.joints,
-        "object_pose": each(free, "x y z qx qy qz qw"),
+        "object_pose": dotted(free, "x y z qx qy qz qw"),
         "world_position": world,
         "passive_position": routing.passive_names,
         "spool_position": motors.loose_names,
         "motor_position": motors.names,
         "velocity": routing.joints,
-        "object_velocity": each(free, "vx vy vz wx wy wz"),
+        "object_velocity": dotted(free, "vx vy vz wx wy wz"),
         "world_velocity": world,
         "passive_velocity": routing.passive_names,
         "spool_velocity": motors.loose_names,
         "motor_velocity": motors.names,
-        "contact_bend": each(touching, "1 2"),
+        "contact_bend": dotted(touching, "1 2"),
         "actuator_state": [name for table in of_tree if table.states for name in table.names],
-        "elastic_stiction": (*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
+        "elastic_stiction": (
+            *tendons.hysteretic_halves,
+            *(routing.tendons[motors.tendons[k]] for k in motors.hysteretic_tendons),
+        ),
         "drives": [name for name, _ in drives],
         "tendon_stiction": routing.tendons,
         "canal_stiction": [name for table in canals if table.states for name in table.names],
@@ -190,7 +193,7 @@ def _state_layout(
         for block, sliding in (("position", "object_pose"), ("velocity", "object_velocity")):
             turning, along = BLOCKS[block].scale[0], BLOCKS[sliding].scale[0]
             scaled[block] = np.where(slides, along, turning).tolist()
-    return Layout.of(labels, scaled)
+    return Layout.from_labels(labels, scaled)
 
 
 def check_layout(layout: Layout, mechanism: Mechanism) -> None:

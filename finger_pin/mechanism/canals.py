@@ -22,7 +22,7 @@ from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
 from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
 from finger_pin.mechanism.tendons import BRISTLES, LOSSES, SLACK, SOURCES, Tendons
-from finger_pin.mechanism.tree import ELASTIC, table_of
+from finger_pin.mechanism.tree_mechanism import ELASTIC, table_of
 from finger_pin.typing import Array
 
 #: The tables, in the order of evaluation; those of further wraps have a number, from 2, at the end.
@@ -81,7 +81,7 @@ class Canals:
         drive_matrices: Mapping[str, Array],
         width: int,
     ) -> None:
-        """Find the canals.
+        """Read the canals.
 
         Args:
             description: Of the finger.
@@ -99,11 +99,13 @@ class Canals:
         self._known = {table.group: table for table in rows}
         # They load the pins by themselves.
         self._pressing = {"driven_tendons", *drive_matrices}
-        own = [self._own(index, name, routes, drive_matrices) for index, name in enumerate(description.actuated_names)]
-        left = {each.name: {("driven_tendons", each.name): 1.0} for each in own}
-        self._rub(WRAPS, own, left, 2)
+        actuated = [
+            self._actuated(index, name, routes, drive_matrices) for index, name in enumerate(description.actuated_names)
+        ]
+        left = {each.name: {("driven_tendons", each.name): 1.0} for each in actuated}
+        self._rub(WRAPS, actuated, left, 2)
         for table in self.tables:
-            tendon = {row: index for index, each in enumerate(own) for _, row in left[each.name]}
+            tendon = {row: index for index, each in enumerate(actuated) for _, row in left[each.name]}
             self.wraps[table.group] = np.eye(len(tendons.routing.tendons))[:, [tendon[name] for name in table.names]]
         cords = {name: shares for name in self._tree.rubbing if (shares := self._tree.linked(name))}
         if cords:
@@ -112,7 +114,7 @@ class Canals:
         trunks = [self._trunk(name, routes) for name in self._tree.rubbing]
         left |= {each.name: {} for each in trunks}
         self._rub(CANALS, trunks, left)
-        branches = [branch for each in (*trunks, *own) for branch in self._behind(each, left[each.name])]
+        branches = [branch for each in (*trunks, *actuated) for branch in self._behind(each, left[each.name])]
         self._rub(BRANCHES, branches, {each.name: {} for each in branches})
 
     def _rub(
@@ -127,13 +129,15 @@ class Canals:
             first: Which wrap is the first, from 1.
         """
         for level in range(first, 1 + max((len(each.wraps) for each in canals), default=0)):
-            own = f"{group}_{level}" if level > 1 else group
-            found = [(each, self._at(each, level, left[each.name])) for each in canals if len(each.wraps) >= level]
-            self._known[own] = self._table(own, [wrapped for _, wrapped in found])
-            self.tables.append(self._known[own])
-            self._press(own, [wrapped for _, wrapped in found], whole=level == 1)
-            for canal, wrapped in found:
-                left[canal.name][own, wrapped.name] = 1.0
+            wrap_group = f"{group}_{level}" if level > 1 else group
+            wrapped_canals = [
+                (each, self._at(each, level, left[each.name])) for each in canals if len(each.wraps) >= level
+            ]
+            self._known[wrap_group] = self._table(wrap_group, [wrapped for _, wrapped in wrapped_canals])
+            self.tables.append(self._known[wrap_group])
+            self._press(wrap_group, [wrapped for _, wrapped in wrapped_canals], whole=level == 1)
+            for canal, wrapped in wrapped_canals:
+                left[canal.name][wrap_group, wrapped.name] = 1.0
 
     def _at(self, canal: _Canal, level: int, left: dict[tuple[str, str], float]) -> _Canal:
         """Return a canal at one of its wraps, from 1."""
@@ -153,7 +157,7 @@ class Canals:
             wraps=(wrap,),
         )
 
-    def _own(self, index: int, name: str, routes: TendonPaths, drive_matrices: Mapping[str, Array]) -> _Canal:
+    def _actuated(self, index: int, name: str, routes: TendonPaths, drive_matrices: Mapping[str, Array]) -> _Canal:
         """Return the canal of an actuated tendon of the finger, pulled by its drives besides what its source leaves."""
         drives = {
             (group, self._known[group].names[k]): float(weights[index, k])
@@ -177,10 +181,10 @@ class Canals:
         if tendon.range is not None:
             sources["tendon_limit", name] = -1.0
             one_way &= tendon.joints is None and tendon.range[0] <= 0.0
-        for key, each in tree.actuators.items():
-            if each.tendon == name:
-                sources[table_of(each), key] = -each.gear
-                one_way &= each.only_pulls
+        for key, actuator in tree.actuators.items():
+            if actuator.tendon == name:
+                sources[table_of(actuator), key] = -actuator.gear
+                one_way &= actuator.only_pulls
         if tree.linked(name):
             sources[CORDS, name] = 1.0
         cord = self._description.cord(name)
@@ -194,15 +198,15 @@ class Canals:
     def _behind(self, trunk: _Canal, friction: dict[tuple[str, str], float]) -> list[_Canal]:
         """Return the branches of a tendon: what pulls them is what the trunk's friction leaves, divided."""
         parts = self._description.cord(trunk.name).parts[1:]
-        found, behind = [], zip(trunk.route.branches, parts, strict=True)
+        branches, behind = [], zip(trunk.route.branches, parts, strict=True)
         for number, ((divisor, legs), part) in enumerate(behind, start=1):
             if legs:
                 sources = {key: weight / divisor for key, weight in (trunk.sources | friction).items()}
                 route = TendonPath(np.zeros(len(self._joints)), legs)
                 wraps = find_wraps(self._description, trunk.name, number)
                 name = f"{trunk.name}.{number}"
-                found.append(_Canal(name, trunk.tendon, route, trunk.one_way, part.crossed, sources, wraps=wraps))
-        return found
+                branches.append(_Canal(name, trunk.tendon, route, trunk.one_way, part.crossed, sources, wraps=wraps))
+        return branches
 
     def _cords(self, cords: Mapping[str, Mapping[str, float]]) -> Rows:
         """Return the tensions of cords that turn joints."""
@@ -220,47 +224,47 @@ class Canals:
 
     def _table(self, group: str, canals: Sequence[_Canal]) -> Rows:
         # Drawn in, a tendon gets shorter.
-        routes = [each.route.times(-1.0) for each in canals]
+        routes = [canal.route.times(-1.0) for canal in canals]
         arm, bends = np.zeros((2, len(canals), self._width))
-        for k, (each, route) in enumerate(zip(canals, routes, strict=True)):
+        for k, (canal, route) in enumerate(zip(canals, routes, strict=True)):
             arm[k, : len(self._joints)] = route.coefficients
-            bends[k, : each.bends.size] = each.bends
-        numbers = self._tendons.at([each.tendon for each in canals], [each.wraps[0] for each in canals])
+            bends[k, : canal.bends.size] = canal.bends
+        numbers = self._tendons.at([canal.tendon for canal in canals], [canal.wraps[0] for canal in canals])
         # Drag is that of the whole tendon, before it is divided.
-        numbers[-1] = np.maximum(numbers[-1], [each.drag for each in canals]) * (not group.startswith(BRANCHES))
-        one_way = np.array([each.one_way for each in canals], dtype=float)
+        numbers[-1] = np.maximum(numbers[-1], [canal.drag for canal in canals]) * (not group.startswith(BRANCHES))
+        one_way = np.array([canal.one_way for canal in canals], dtype=float)
         return Rows(
             group=group,
             law=CANAL_FRICTION,
-            names=tuple(each.name for each in canals),
+            names=tuple(canal.name for canal in canals),
             parameters=np.vstack([numbers, one_way]),
             arm=arm,
-            inputs=_wired([each.sources for each in canals], self._known),
+            inputs=_wired([canal.sources for canal in canals], self._known),
             bends=bends,
-            curvature_offset=np.array([each.offset for each in canals]),
+            curvature_offset=np.array([canal.offset for canal in canals]),
             paths=tuple(route.legs for route in routes),
             stored=BRISTLES,
             powers=(*LOSSES, SLACK),
         )
 
-    def _press(self, own: str, canals: Sequence[_Canal], *, whole: bool) -> None:
+    def _press(self, wrap_group: str, canals: Sequence[_Canal], *, whole: bool) -> None:
         """Record how the friction of canals, and as a whole what pulls through them, load the joints they cross."""
         for joint, (name, rubs) in enumerate(zip(self._joints, self._description.bearings, strict=True)):
             if not rubs:
                 continue
-            for each in canals:
-                pressing = each.sources if whole else {}
-                for (group, row), weight in (pressing | {(own, each.name): 1.0}).items():
-                    if name in each.crossed and group not in self._pressing:
+            for canal in canals:
+                pressing = canal.sources if whole else {}
+                for (group, row), weight in (pressing | {(wrap_group, canal.name): 1.0}).items():
+                    if name in canal.crossed and group not in self._pressing:
                         press = self.loads.setdefault(group, np.zeros((len(self._joints), self._known[group].count)))
                         press[joint, self._known[group].names.index(row)] += weight
 
 
 def _wired(sources: Sequence[Mapping[tuple[str, str], float]], known: Mapping[str, Rows]) -> dict[str, Array]:
     """Return the weights of earlier rows in the inputs of some, by table."""
-    found: dict[str, Array] = {}
-    for k, each in enumerate(sources):
-        for (group, row), weight in each.items():
-            weights = found.setdefault(group, np.zeros((len(sources), known[group].count)))
+    inputs: dict[str, Array] = {}
+    for k, source in enumerate(sources):
+        for (group, row), weight in source.items():
+            weights = inputs.setdefault(group, np.zeros((len(sources), known[group].count)))
             weights[k, known[group].names.index(row)] += weight
-    return found
+    return inputs

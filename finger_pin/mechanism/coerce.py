@@ -41,8 +41,8 @@ def with_finger(scenario: Scenario, finger: Finger | None) -> Scenario:
     """Return a scenario with the objects and the description of the finger that replaces its own; a hand's stays."""
     if finger is None:
         return scenario
-    own = {} if scenario.hand is not None else {"finger": finger.description}
-    return scenario.updated(environment={"objects": finger.constructor_args.objects}, **own)
+    replacement = {} if scenario.hand is not None else {"finger": finger.description}
+    return scenario.updated(environment={"objects": finger.constructor_args.objects}, **replacement)
 
 
 def is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:
@@ -74,36 +74,36 @@ def as_packed(finger: Finger, state: State | Mapping[str, float] | ArrayLike, na
     """
     if isinstance(state, Mapping):
         return _packed_by_name(finger, state, name)
-    given = finger.layout.pack(state) if isinstance(state, State) else state
+    values = finger.layout.pack(state) if isinstance(state, State) else state
     try:
-        found = np.array(given, dtype=float)
+        x = np.array(values, dtype=float)
     except (TypeError, ValueError):
-        found = np.array(np.nan)
+        x = np.array(np.nan)
     joints, size = len(finger.routing.joints), finger.layout.size
-    if found.shape not in ((joints,), (size,)) or not np.isfinite(found).all():
-        told = found.tolist() if found.ndim else type(state).__name__
+    if x.shape not in ((joints,), (size,)) or not np.isfinite(x).all():
+        shown = x.tolist() if x.ndim else type(state).__name__
         allowed = f"must be {size} finite numbers, a packed state, or {joints}, angles of rest"
-        raise InputError(name, allowed, told)
-    return found if found.shape == (size,) else finger.rest_state(found)
+        raise InputError(name, allowed, shown)
+    return x if x.shape == (size,) else finger.rest_state(x)
 
 
-def _packed_by_name(finger: Finger, given: Mapping[str, float], name: str) -> Array:
+def _packed_by_name(finger: Finger, state: Mapping[str, float], name: str) -> Array:
     names = finger.layout.names
-    _refuse_unknown(given, names, name, "state")
-    values = finite_vector(name, np.array([*given.values()], dtype=float), len(given))
-    angles = [given.get(f"joint_position[{joint}]", 0.0) for joint in finger.routing.joints]
+    _refuse_unknown(state, names, name, "state")
+    values = finite_vector(name, np.array([*state.values()], dtype=float), len(state))
+    angles = [state.get(f"joint_position[{joint}]", 0.0) for joint in finger.routing.joints]
     x = finger.rest_state(np.array(angles, dtype=float))
-    x[[names.index(each) for each in given]] = values
+    x[[names.index(key) for key in state]] = values
     return x
 
 
 def _refuse_unknown(
-    given: Mapping[str, float], names: Sequence[str], name: str, what: str, others: Sequence[str] = ()
+    values: Mapping[str, float], names: Sequence[str], name: str, what: str, others: Sequence[str] = ()
 ) -> None:
-    for each in given:
-        if each not in names:
-            allowed = f"no such {what}; there are {', '.join(names)}{suggestion(each, [*names, *others])}"
-            raise InputError(f"{name}.{each}", allowed)
+    for key in values:
+        if key not in names:
+            allowed = f"no such {what}; there are {', '.join(names)}{suggestion(key, [*names, *others])}"
+            raise InputError(f"{name}.{key}", allowed)
 
 
 def input_names(finger: Finger) -> list[str]:
@@ -117,22 +117,22 @@ def input_names(finger: Finger) -> list[str]:
     return [*names, *(f"input.{k}" for k in range(len(names), finger.mechanism.channels))]
 
 
-def as_inputs(finger: Finger, given: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
+def as_inputs(finger: Finger, inputs: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
     """Return inputs u, shape (u,), from a sequence or from a table by name, 0 if left out.
 
     Raises:
         InputError: If there is no such input, or the numbers are not as many as inputs and finite; ``name`` names
             the argument.
     """
-    if not isinstance(given, Mapping):
-        return np.array(finite_vector(name, np.asarray(given, dtype=float), finger.mechanism.channels))
+    if not isinstance(inputs, Mapping):
+        return np.array(finite_vector(name, np.asarray(inputs, dtype=float), finger.mechanism.channels))
     with_kinds = input_names(finger)
     names = [*finger.input_names, *with_kinds[len(finger.input_names) :]]
     short = dict(zip(with_kinds, names, strict=True))
-    named = {short.get(each, each): value for each, value in given.items()}
+    named = {short.get(each, each): value for each, value in inputs.items()}
     _refuse_unknown(named, names, name, "input", with_kinds)
-    if len(named) < len(given):
-        raise InputError(name, "must name an input once", list(given))
+    if len(named) < len(inputs):
+        raise InputError(name, "must name an input once", list(inputs))
     values = np.array([named.get(each, 0.0) for each in names], dtype=float)
     return np.array(finite_vector(name, values, finger.mechanism.channels))
 

@@ -108,24 +108,24 @@ def _corners(solid: Solid, rounding: float) -> list[ContactPart]:
 
 def _edges(solid: Solid, rounding: float) -> list[ContactPart]:
     half = 0.5 * np.array(solid.sizes) - rounding
-    found = []
+    parts = []
     for axis in range(3):
         for signs in itertools.product((-1.0, 1.0), repeat=2):
             middle, along = np.insert(np.array(signs), axis, 0.0) * half, half * np.eye(3)[axis]
-            found.append(ContactPart(np.stack([middle - along, middle + along]), rounding))
-    return found
+            parts.append(ContactPart(np.stack([middle - along, middle + along]), rounding))
+    return parts
 
 
 def _rims(solid: Solid, rounding: float) -> list[ContactPart]:
     """Return both rims of a cylinder, and three studs of each face, against spinning on the spot."""
     radius, half = solid.sizes[0], 0.5 * solid.sizes[1] - rounding
-    found = []
+    parts = []
     for side in (-half, half):
-        found.append(ContactPart(np.array([[0.0, 0.0, side], [0.0, 0.0, -side]]), rounding, radius - rounding, 0.0))
+        parts.append(ContactPart(np.array([[0.0, 0.0, side], [0.0, 0.0, -side]]), rounding, radius - rounding, 0.0))
         for turn in 2.0 * np.pi * np.arange(3) / 3.0:
             stud = np.array([_STUD * radius * np.cos(turn), _STUD * radius * np.sin(turn), side])
-            found.append(ContactPart(np.stack([stud, stud]), rounding))
-    return found
+            parts.append(ContactPart(np.stack([stud, stud]), rounding))
+    return parts
 
 
 def _whole(solid: Solid, rounding: float) -> ContactPart:

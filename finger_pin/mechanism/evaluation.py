@@ -80,9 +80,9 @@ class Evaluation:
         nothing = np.zeros(self.rate.shape[:-1])
         energies, powers = dict.fromkeys(stored, nothing), dict.fromkeys(flows, nothing)
         for signals in self.rows.values():
-            energy, taken = signals.account()
+            energy, exchanged = signals.account()
             energies[signals.rows.stored.name] = energies[signals.rows.stored.name] + energy
-            for name, value in taken.items():
+            for name, value in exchanged.items():
                 powers[name] = powers[name] + value
         if self.prescribed_power is not None:
             powers[GUIDED.name] = self.prescribed_power

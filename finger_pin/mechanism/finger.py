@@ -19,7 +19,7 @@ from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 from finger_pin.mechanism.state import Motion, as_floats
 from finger_pin.mechanism.tendon_paths import Excursions
-from finger_pin.mechanism.tree import build_body
+from finger_pin.mechanism.tree_mechanism import build_body
 from finger_pin.typing import Array
 
 
@@ -74,7 +74,7 @@ class Finger:
         self.constructor_args = ConstructorArgs(rigid_body, tuple(rows), objects, dict(tables or {}))
         self.rigid_body, self.paths = build_body(description, rigid_body)
         check_joints(self.rigid_body, description)
-        parts = Parts.of(description)
+        parts = Parts.from_description(description)
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self._excursions = Excursions(self.routing, description, self.paths)
         self.visuals: pin.GeometryModel | None = None
@@ -121,8 +121,8 @@ class Finger:
 
     def changed(self, description: FingerDescription, objects: Mapping[str, Object] | None) -> Finger:
         """Return the finger that another description and other objects make, with the body and rows that were given."""
-        given = self.constructor_args
-        finger = Finger(description, given.rigid_body, given.rows, objects, given.tables)
+        args = self.constructor_args
+        finger = Finger(description, args.rigid_body, args.rows, objects, args.tables)
         finger.visuals = self.visuals
         return finger
 
@@ -151,8 +151,8 @@ class Finger:
         state.velocity[:] = 0.0 if velocity is None else as_floats("velocity", velocity, joints, single=True)
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
         if self.actuators.names:
-            angle, taken = self.actuators.angle, self.excursion(state.position)
-            state.motor_position[:] = angle(state.position, tension, taken)
+            angle, excursion = self.actuators.angle, self.excursion(state.position)
+            state.motor_position[:] = angle(state.position, tension, excursion)
             moved = (state.velocity @ self.coupling_at(state.position).T)[: self.routing.actuated]
             state.motor_velocity[:] = angle(state.velocity, None, moved) - angle(state.velocity, None, 0.0 * moved)
             loose = self.actuators.loose
@@ -199,19 +199,19 @@ class Finger:
         packed = as_floats("x", x, self.layout.size), as_floats("inputs", inputs, self.mechanism.channels)
         return *packed, None if force is None else as_floats("fingertip_force", force, 3)
 
-    def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
+    def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, evaluation: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        bodies, torque = int(self.mechanism.body.model.nv), partial(self.tendon_torque, x, found.rows)
+        bodies, torque = int(self.mechanism.body.model.nv), partial(self.tendon_torque, x, evaluation.rows)
         return FingerSignals(
-            self.layout.unpack(x), inputs, force, found, bodies, self.drive_matrices, self.wraps, torque
+            self.layout.unpack(x), inputs, force, evaluation, bodies, self.drive_matrices, self.wraps, torque
         )
 
     @property
     def wrap_names(self) -> tuple[str, ...]:
         """Names of the places of tendons that rub at several: all first ones, all second ones, and so on."""
-        own = list(zip(self.routing.tendons, self.tendons.wraps, strict=False))
-        first = [f"{name}.{places[0].name}" for name, places in own if len(places) > 1]
+        rubbing = list(zip(self.routing.tendons, self.tendons.wraps, strict=False))
+        first = [f"{name}.{places[0].name}" for name, places in rubbing if len(places) > 1]
         return (*first, *(name for table in self.extra_rows if table.group in self.wraps for name in table.names))
 
     @property
@@ -223,8 +223,8 @@ class Finger:
         """Return H_c2^T f, the torque of the tendons (11), at packed states, shape (..., n), N m."""
         tables = [rows[group] for group in self.tendon_rows]
         torque = self._excursions.torque(x, tables[0])
-        for each in tables[1:]:
-            torque = torque + self._excursions.torque(x, each)
+        for table in tables[1:]:
+            torque = torque + self._excursions.torque(x, table)
         return torque
 
     def coupling_at(self, position: Array) -> Array:
@@ -240,8 +240,8 @@ class Finger:
         self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, shape (m, N)."""
-        found = self.mechanism.evaluate(*self._arguments(x, inputs, fingertip_force), base)
-        return np.stack(list(found.account()[1].values()), axis=-1), found.external
+        evaluation = self.mechanism.evaluate(*self._arguments(x, inputs, fingertip_force), base)
+        return np.stack(list(evaluation.account()[1].values()), axis=-1), evaluation.external
 
     def static_torque(self, position: Array) -> Array:
         """Return the torque that holds the finger at rest at theta, shape (n,): G and the springs' torque, N m."""
@@ -254,9 +254,9 @@ class Finger:
         With a base that moves, energies are those of the motion in the world, where the base has no height.
         """
         joints = len(self.routing.joints)
-        given = as_floats("position", position, joints), as_floats("velocity", velocity, joints)
-        found = self.rigid_body.kinematics(*given, base)
-        return Motion(found.tip, found.kinetic_energy, found.potential_energy)
+        arguments = as_floats("position", position, joints), as_floats("velocity", velocity, joints)
+        kinematics = self.rigid_body.kinematics(*arguments, base)
+        return Motion(kinematics.tip, kinematics.kinetic_energy, kinematics.potential_energy)
 
     def rhs(self, time: float, x: Array, inputs: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for custom solvers; ``time`` is not used."""

@@ -71,11 +71,11 @@ class TendonForces:
         return np.where(self._several(), capstan_coefficient(surface, self.curvature), whole)
 
     def _several(self) -> NDArray[np.bool_]:
-        """Which tendons rub at several places, shape (t,)."""
-        found = np.zeros(self.driven.rows.count + self.passive.rows.count, dtype=bool)
+        """Return whether each tendon rubs at several places, shape (t,)."""
+        several = np.zeros(self.driven.rows.count + self.passive.rows.count, dtype=bool)
         for _, weights in self.beyond:
-            found |= np.any(weights, axis=1)
-        return found
+            several |= np.any(weights, axis=1)
+        return several
 
     @property
     def velocity(self) -> Array:
@@ -176,15 +176,15 @@ class FingerSignals:
     @cached_property
     def tendons(self) -> TendonForces:
         """Tendon forces and friction."""
-        found, masses = self.mechanism, self.state.passive_position.shape[-1]
-        driven, passive = found.rows["driven_tendons"], found.rows["passive_tendons"]
-        strands = np.concatenate([driven.force, found.rows["passive_halves"].force], axis=-1)
+        evaluation, masses = self.mechanism, self.state.passive_position.shape[-1]
+        driven, passive = evaluation.rows["driven_tendons"], evaluation.rows["passive_tendons"]
+        strands = np.concatenate([driven.force, evaluation.rows["passive_halves"].force], axis=-1)
         for table, weights in self.drive_matrices.items():
-            strands = strands + combined(found.rows[table].force, weights.T)
-        beyond = [(found.rows[table], weights) for table, weights in self.wraps.items()]
+            strands = strands + combined(evaluation.rows[table].force, weights.T)
+        beyond = [(evaluation.rows[table], weights) for table, weights in self.wraps.items()]
         for wraps, weights in beyond:
             strands = strands + combined(wraps.force, weights.T @ np.eye(len(weights), strands.shape[-1]))
-        acceleration = found.acceleration[..., self.bodies : self.bodies + masses]
+        acceleration = evaluation.acceleration[..., self.bodies : self.bodies + masses]
         return TendonForces(driven, passive, strands, acceleration, beyond)
 
     @property

@@ -56,29 +56,32 @@ def on_model(
     body = RigidBody(reduced, tips)
     for index, name in enumerate(description.joints, start=1):
         if body.parent_links[index] == 0:
-            own = fingers.index(name.split(".")[0]) if len(fingers) > 1 or fingers[0] else 0
-            body.proximal_axes[index] = np.asarray(axes[own], dtype=float)
+            number = fingers.index(name.split(".")[0]) if len(fingers) > 1 or fingers[0] else 0
+            body.proximal_axes[index] = np.asarray(axes[number], dtype=float)
     return body, shown
 
 
 def _by_joint(joints: Mapping[str, str] | Mapping[str, Mapping[str, str]]) -> dict[str, str]:
     """Return the names of a model's joints by those of a description."""
-    found: dict[str, str] = {}
-    for name, given in joints.items():
-        found |= {name: given} if isinstance(given, str) else {f"{name}.{own}": each for own, each in given.items()}
-    return found
+    by_joint: dict[str, str] = {}
+    for name, model_joints in joints.items():
+        if isinstance(model_joints, str):
+            by_joint[name] = model_joints
+        else:
+            by_joint |= {f"{name}.{joint}": each for joint, each in model_joints.items()}
+    return by_joint
 
 
-def _by_finger(given: Any, fingers: tuple[str, ...], entry: str) -> list[Any]:
+def _by_finger(values: Any, fingers: tuple[str, ...], entry: str) -> list[Any]:
     """Return one item for each finger, of one for all or of a table by finger."""
-    if not isinstance(given, Mapping):
+    if not isinstance(values, Mapping):
         if entry == "tip_frame" and len(fingers) > 1:
-            raise InputError(entry, f"must be a table with a frame for each of {', '.join(fingers)}", given)
-        return [given] * len(fingers)
+            raise InputError(entry, f"must be a table with a frame for each of {', '.join(fingers)}", values)
+        return [values] * len(fingers)
     for name in fingers:
-        if name not in given:
+        if name not in values:
             raise InputError(f"{entry}.{name}", f"is missing: there must be one for each of {', '.join(fingers)}")
-    return [given[name] for name in fingers]
+    return [values[name] for name in fingers]
 
 
 def turned_model(body: RigidBody) -> tuple[pin.Model, list[Array]]:
@@ -87,33 +90,33 @@ def turned_model(body: RigidBody) -> tuple[pin.Model, list[Array]]:
     Raises:
         InputError: If a joint does not turn.
     """
-    own, model, turns = body.model, pin.Model(), [np.eye(3)]
-    for index in range(1, own.njoints):
-        joint, parent, placement = own.joints[index], int(own.parents[index]), own.jointPlacements[index]
+    original, model, turns = body.model, pin.Model(), [np.eye(3)]
+    for index in range(1, original.njoints):
+        joint, parent, placement = original.joints[index], int(original.parents[index]), original.jointPlacements[index]
         data = joint.createData()
         joint.calc(data, np.zeros(1), np.zeros(1))
         subspace = np.ravel(data.S)
         if joint.nv != 1 or np.any(subspace[:3]):
-            raise InputError(f"joint {own.names[index]}", "the viewer shows tendons around joints that turn")
+            raise InputError(f"joint {original.names[index]}", "the viewer shows tendons around joints that turn")
         turn = _frame(subspace[3:], _onwards(body, index))
         above = pin.SE3(turns[parent], np.zeros(3))
         at = model.addJoint(
-            parent, pin.JointModelRZ(), above.inverse() * placement * pin.SE3(turn, np.zeros(3)), own.names[index]
+            parent, pin.JointModelRZ(), above.inverse() * placement * pin.SE3(turn, np.zeros(3)), original.names[index]
         )
-        model.inertias[at] = own.inertias[index]
+        model.inertias[at] = original.inertias[index]
         turns.append(turn)
     return model, turns
 
 
 def chain(model: pin.Model, first: int, count: int) -> pin.Model:
     """Return a serial chain of joints of a tree as a separate model."""
-    own = pin.Model()
+    branch = pin.Model()
     for index in range(first, first + count):
-        own.addJoint(index - first, model.joints[index], model.jointPlacements[index], model.names[index])
+        branch.addJoint(index - first, model.joints[index], model.jointPlacements[index], model.names[index])
     for before, after in pairwise(range(first, first + count)):
         if int(model.parents[after]) != before:
             raise InputError(f"joint {model.names[after]}", f"must be carried by {model.names[before]}")
-    return own
+    return branch
 
 
 def width_of(description: FingerDescription) -> float:
@@ -125,8 +128,8 @@ def width_of(description: FingerDescription) -> float:
 
 def placed_solids(solids: pin.GeometryModel, turns: list[Array]) -> Iterator[tuple[pin.GeometryObject, pin.SE3]]:
     """Yield the solids of a model with their placements in the frames that were turned."""
-    for each in solids.geometryObjects:
-        yield each, pin.SE3(turns[each.parentJoint], np.zeros(3)).inverse() * each.placement
+    for solid in solids.geometryObjects:
+        yield solid, pin.SE3(turns[solid.parentJoint], np.zeros(3)).inverse() * solid.placement
 
 
 def _onwards(body: RigidBody, index: int) -> Array:

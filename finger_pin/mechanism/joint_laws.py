@@ -42,15 +42,16 @@ def _imported(name: str) -> object:
     Raises:
         InputError: If the module is neither imported nor allowed, or lacks the name.
     """
-    module, _, own = name.partition(":")
+    module, _, attribute = name.partition(":")
     allowed = {text.strip() for text in os.environ.get(LAWS, "").split(",")}
     if module not in sys.modules and module not in allowed:
         text = f"runs code of the module {module}: if you trust it, import {module} first or set {LAWS}={module}"
         raise InputError("finger.joint_friction.law", text, name)
     try:
         # Attributes that a module computes when asked would run its code, too.
-        return vars(importlib.import_module(module))[own]
+        return vars(importlib.import_module(module))[attribute]
     except ImportError as error:
         raise InputError("finger.joint_friction.law", f"cannot be imported: {error}", name) from None
     except KeyError:
-        raise InputError("finger.joint_friction.law", f"cannot be imported: {module} has no {own}", name) from None
+        text = f"cannot be imported: {module} has no {attribute}"
+        raise InputError("finger.joint_friction.law", text, name) from None

@@ -205,7 +205,7 @@ class JointSprings:
 
     @property
     def present(self) -> bool:
-        """Whether any joint has a spring that does something."""
+        """Return whether any joint has a spring that does something."""
         return bool(np.any(self.stiffness) or np.any(self.damping))
 
     def torque(self, position: Array, velocity: Array) -> Array:
@@ -247,19 +247,19 @@ def hysteresis_rows(group: str, springs: Rows, shares: Array, floor: float, lost
         lost: Entry of the account that its losses go to.
     """
     stiffness = springs.parameters[springs.law.parameters.index("stiffness")]
-    held = np.flatnonzero(shares * stiffness)
-    if not held.size:
+    lossy = np.flatnonzero(shares * stiffness)
+    if not lossy.size:
         return []
     return [
         Rows(
             group=group,
             law=HYSTERESIS,
-            names=tuple(springs.names[k] for k in held),
-            parameters=np.array([shares[held], STIFFER * stiffness[held], np.full(len(held), floor)]),
-            arm=springs.arm[held],
-            loads={springs.group: np.eye(springs.count)[held]},
+            names=tuple(springs.names[k] for k in lossy),
+            parameters=np.array([shares[lossy], STIFFER * stiffness[lossy], np.full(len(lossy), floor)]),
+            arm=springs.arm[lossy],
+            loads={springs.group: np.eye(springs.count)[lossy]},
             stored=springs.stored,
             powers=(lost,),
-            pulls=tuple(springs.pulls[k] for k in held if springs.pulls),
+            pulls=tuple(springs.pulls[k] for k in lossy if springs.pulls),
         )
     ]

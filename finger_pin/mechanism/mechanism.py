@@ -74,14 +74,14 @@ class Mechanism:
         self.rows = in_order(self.listed)
         self.moved = moved
         self.prescribed = np.full(self.coordinates, -1) if prescribed is None else prescribed
-        self.energies = Energies.of(self.rows, moved, not moved and bool(np.any(self.prescribed >= 0)))
+        self.energies = Energies.from_rows(self.rows, moved, not moved and bool(np.any(self.prescribed >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         ends = dict(zip((t.group for t in self.listed), accumulate(t.states for t in self.listed), strict=True))
         self.states = [slice(ends[table.group] - table.states, ends[table.group]) for table in self.rows]
         self.state_count = max(ends.values(), default=0)
 
     @classmethod
-    def join(cls, parts: Mapping[str, Mechanism]) -> Mechanism:
+    def from_parts(cls, parts: Mapping[str, Mechanism]) -> Mechanism:
         """Return several mechanisms on one base, such as the fingers of a hand.
 
         Coordinates are the joints of all parts, then the lumps of all. Names of joints, tips, lumps and tables begin
@@ -166,7 +166,7 @@ class Mechanism:
         q, v, _ = self.split(x)
         joints, turning, lead = int(self.body.model.nv), q[..., : self.body.model.nq], x.shape[:-1]
         forces = self._forces(force, lead)
-        found, torque = self._rows(x, np.asarray(command, dtype=float), forces)
+        rows, torque = self._rows(x, np.asarray(command, dtype=float), forces)
         external = np.zeros_like(torque)
         if np.any(forces):
             external[..., :joints] = self.body.external_torque(turning, forces)
@@ -179,8 +179,8 @@ class Mechanism:
         )
         prescribed, prescribed_power = np.flatnonzero(self.prescribed >= 0), None
         if len(prescribed):
-            given = self.prescribed[prescribed] + GUIDES
-            acceleration[..., prescribed] = 0.0 if base is None else base[..., given]
+            columns = self.prescribed[prescribed] + GUIDES
+            acceleration[..., prescribed] = 0.0 if base is None else base[..., columns]
             prescribed_power = -np.sum(torque[..., prescribed] * v[..., prescribed], axis=-1)
         if base is not None and self.moved:
             power = self._base_power(turning, v[..., :joints], acceleration[..., :joints], base)
@@ -188,10 +188,10 @@ class Mechanism:
                 # What pushes against a world that stands still does no work; the palm feels it.
                 power, prescribed_power = power + prescribed_power[..., None], None
         moving = self.body.position_rate(turning, v[..., :joints])
-        rates = [found[table.group].rate for table in self.listed if table.states]
+        rates = [rows[table.group].rate for table in self.listed if table.states]
         return Evaluation(
             energies=self.energies,
-            rows=found,
+            rows=rows,
             torque=torque,
             external=external,
             acceleration=acceleration,
@@ -205,7 +205,7 @@ class Mechanism:
         q, v, z = self.split(x)
         turning, linear, lead = q[..., : self.body.model.nq], self.linear_positions(q), x.shape[:-1]
         states = {table.group: z[..., part] for table, part in zip(self.rows, self.states, strict=True)}
-        found, known = dict[str, RowSignals](), dict[str, Array]()
+        rows, known = dict[str, RowSignals](), dict[str, Array]()
         touching: list[tuple[Paths, Array]] = []
         torque = np.zeros((*lead, self.coordinates))
         for table in self.rows:
@@ -222,17 +222,17 @@ class Mechanism:
             )
             law: Any = table.law
             exerted, rate, signals = law.act(arguments := law.arguments(row), table.parameters)
-            found[table.group], known[table.group] = RowSignals(table, arguments, exerted, rate, signals), exerted
+            rows[table.group], known[table.group] = RowSignals(table, arguments, exerted, rate, signals), exerted
             if table.law.arms > 1:
-                touching.append((table.paths[:: table.law.arms], _touching(exerted, routed.force, table.law.arms)))
+                touching.append((table.paths[:: table.law.arms], _vectors(exerted, routed.force, table.law.arms)))
             torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
-        return found, torque
+        return rows, torque
 
     def _forces(self, force: Array | None, lead: tuple[int, ...]) -> Array:
         """Return the forces at all tips, shape (..., t, 3)."""
-        tips, given = len(self.body.tips), np.zeros(3) if force is None else np.asarray(force, dtype=float)
-        given = given[..., None, :] if tips == 1 or force is None else given
-        return np.broadcast_to(given, (*lead, tips, 3))
+        tips, forces = len(self.body.tips), np.zeros(3) if force is None else np.asarray(force, dtype=float)
+        forces = forces[..., None, :] if tips == 1 or force is None else forces
+        return np.broadcast_to(forces, (*lead, tips, 3))
 
     def _routed(self, table: Rows, q: Array) -> PathKinematics:
         """Return lengths, turns and arms of paths through space for a table, shape (..., k) and (..., k, N)."""
@@ -240,9 +240,9 @@ class Mechanism:
             return PathKinematics(*np.zeros((4, 1)))
         if q.ndim == 1:
             return path_kinematics(self.body, q, table.paths, self.coordinates)
-        each = [path_kinematics(self.body, one, table.paths, self.coordinates) for one in q]
+        kinematics = [path_kinematics(self.body, one, table.paths, self.coordinates) for one in q]
         return PathKinematics(
-            *(np.array([getattr(one, name) for one in each]) for name in PathKinematics.__annotations__)
+            *(np.array([getattr(one, name) for one in kinematics]) for name in PathKinematics.__annotations__)
         )
 
     def _inertial(self, q: Array, v: Array, base: Array) -> Array:
@@ -293,7 +293,7 @@ def _weighted(weights: Mapping[str, Array], values: Mapping[str, Array], start: 
     return start
 
 
-def _touching(force: Array, directions: Array, arms: int) -> Array:
+def _vectors(force: Array, directions: Array, arms: int) -> Array:
     """Return the sum of the forces of every contact as vectors, shape (..., m, 3)."""
     vectors = force[..., None] * directions
     total: Array = vectors.reshape(*vectors.shape[:-2], -1, arms, 3).sum(axis=-2)

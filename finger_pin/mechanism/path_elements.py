@@ -144,7 +144,7 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
     width = int(body.model.nv)
     placements, twists = body.placements(q)
 
-    found = PathKinematics(
+    kinematics = PathKinematics(
         np.zeros(len(paths)), np.zeros((len(paths), coordinates)), np.zeros(len(paths)), np.zeros((len(paths), 3))
     )
     for k, legs in enumerate(paths):
@@ -166,14 +166,14 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
             for (force, point), end in zip(loads, piece.ends[:2], strict=False):
                 wrench = np.concatenate([force, pin.skew(point) @ force])
                 arm += wrench @ (twists[end.joint] - twists[piece.joint])
-            found.length[k] += leg.length_weight * length
-            found.arm[k, :width] += leg.arm * arm
+            kinematics.length[k] += leg.length_weight * length
+            kinematics.arm[k, :width] += leg.arm * arm
             if leg.bends:
-                found.turn[k] += turn + (_angle(before, -loads[0][0]) if leg.follows else 0.0)
+                kinematics.turn[k] += turn + (_angle(before, -loads[0][0]) if leg.follows else 0.0)
             if number == 0 and loads:
-                found.force[k] = loads[0][0]
+                kinematics.force[k] = loads[0][0]
             before = loads[-1][0] if loads else before
-    return found
+    return kinematics
 
 
 def _value(piece: PathElement, frame: pin.SE3, points: Sequence[Array]) -> Array:

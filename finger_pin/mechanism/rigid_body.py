@@ -66,9 +66,9 @@ class RigidBody:
         self.tip_frame = self.tips[0] if self.tips else -1
         self.supports = np.zeros((len(self.tips), model.njoints - 1))
         for row, tip in enumerate(self.tips):
-            self.supports[row, [each - 1 for each in model.supports[model.frames[tip].parentJoint] if each]] = 1.0
+            self.supports[row, [k - 1 for k in model.supports[model.frames[tip].parentJoint] if k]] = 1.0
         self.joints: tuple[str, ...] = tuple(model.names[1:])
-        self.topology, self._own = Topology(), threading.local()
+        self.topology, self._per_thread = Topology(), threading.local()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
         self.parent_links: list[int] = [0]
         for index in range(1, model.njoints):
@@ -81,25 +81,25 @@ class RigidBody:
 
     @property
     def slides(self) -> tuple[bool, ...]:
-        """Whether each joint of the model slides, and its position is in m."""
+        """Return whether each joint of the model slides, so that its position is in m."""
         return tuple(joint.shortname().startswith("JointModelP") for joint in self.model.joints[1:])
 
     @property
     def _data(self) -> pin.Data:
         """Pinocchio's memory; every thread has its own."""
-        if not hasattr(self._own, "data"):
-            self._own.data = self.model.createData()
-        return self._own.data
+        if not hasattr(self._per_thread, "data"):
+            self._per_thread.data = self.model.createData()
+        return self._per_thread.data
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the contents of a copy: not the memory of threads."""
-        return {name: value for name, value in vars(self).items() if name != "_own"}
+        return {name: value for name, value in vars(self).items() if name != "_per_thread"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Initialise as a copy with separate memory."""
-        vars(self).update(state, _own=threading.local())
+        vars(self).update(state, _per_thread=threading.local())
 
-    def weighing(self, inertias: Sequence[pin.Inertia], gravity: Sequence[float]) -> RigidBody:
+    def with_inertias(self, inertias: Sequence[pin.Inertia], gravity: Sequence[float]) -> RigidBody:
         """Return a body of the same form with other inertias and gravity.
 
         Args:
@@ -109,9 +109,9 @@ class RigidBody:
         twin = copy.copy(self)
         vars(twin).pop("_afloat", None)
         twin.model = pin.Model(self.model)
-        held = twin.model.inertias
+        model_inertias = twin.model.inertias
         for joint, inertia in enumerate(inertias, start=1):
-            held[joint] = inertia
+            model_inertias[joint] = inertia
         twin.model.gravity.linear[:] = gravity
         return twin
 
@@ -122,7 +122,7 @@ class RigidBody:
 
     @property
     def mass(self) -> float:
-        """Of all bodies, kg."""
+        """Mass of all bodies, kg."""
         return float(pin.computeTotalMass(self.model))
 
     def position_rate(self, q: Array, v: Array) -> Array:
@@ -191,13 +191,13 @@ class RigidBody:
         """Return J = dp/dtheta of (6) at q of shape (nq,): shape (3, n), or (t, 3, n) of t tips."""
         (q,), model, data = self._floats(single=True, q=q), self.model, self._data
         reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        found = [pin.computeFrameJacobian(model, data, q, tip, reference) for tip in self.tips]
+        jacobians = [pin.computeFrameJacobian(model, data, q, tip, reference) for tip in self.tips]
         # Of a single joint Pinocchio returns a vector.
-        return self._of_tips([np.reshape(each, (6, -1))[:3] for each in found], 3, model.nv)
+        return self._of_tips([np.reshape(each, (6, -1))[:3] for each in jacobians], 3, model.nv)
 
-    def _of_tips(self, found: list[Array], *shape: int) -> Array:
+    def _of_tips(self, values: list[Array], *shape: int) -> Array:
         """Return values at the tips, of the given shape each; of one tip without a dimension for it."""
-        return np.array(found).reshape(shape if len(found) == 1 else (len(found), *shape))
+        return np.array(values).reshape(shape if len(values) == 1 else (len(values), *shape))
 
     def mass_matrix(self, q: Array) -> Array:
         """Return M(theta) by the composite rigid body algorithm, shape (n, n)."""
@@ -239,26 +239,26 @@ class RigidBody:
         turned = np.r_[3:6, 0:3]
         pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         moving, speeding = np.append(base[:6][turned], v), np.append(base[6:12][turned], a)
-        found = np.array(pin.rnea(model, data, np.append(pose, q), moving, speeding))
-        return found[:6][turned], found[6:]
+        efforts = np.array(pin.rnea(model, data, np.append(pose, q), moving, speeding))
+        return efforts[:6][turned], efforts[6:]
 
     @cached_property
     def _afloat(self) -> pin.Model:
         """The same joints on a base that floats free of gravity."""
-        own, model = self.model, pin.Model()
+        fixed, model = self.model, pin.Model()
         base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
-        for index in range(1, own.njoints):
-            parent = int(own.parents[index])
-            at = model.addJoint(base + parent, own.joints[index], own.jointPlacements[index], own.names[index])
-            model.inertias[at] = own.inertias[index]
+        for index in range(1, fixed.njoints):
+            parent = int(fixed.parents[index])
+            at = model.addJoint(base + parent, fixed.joints[index], fixed.jointPlacements[index], fixed.names[index])
+            model.inertias[at] = fixed.inertias[index]
         model.gravity.linear[:] = 0.0
         return model
 
     @property
     def _afloat_data(self) -> pin.Data:
-        if not hasattr(self._own, "afloat"):
-            self._own.afloat = self._afloat.createData()
-        return self._own.afloat
+        if not hasattr(self._per_thread, "afloat"):
+            self._per_thread.afloat = self._afloat.createData()
+        return self._per_thread.afloat
 
     def distal_weights(self) -> Array:
         """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
@@ -274,8 +274,8 @@ class RigidBody:
         q, v = self._floats(q=q, v=v)
         if q.ndim > 1:
             bases = [None] * len(q) if base is None else base
-            each = [self.kinematics(*row) for row in zip(q, v, bases, strict=True)]
-            return Kinematics(*(np.array([getattr(k, name) for k in each]) for name in Kinematics.__annotations__))
+            rows = [self.kinematics(*row) for row in zip(q, v, bases, strict=True)]
+            return Kinematics(*(np.array([getattr(k, name) for k in rows]) for name in Kinematics.__annotations__))
         jacobian = self.jacobian(q)
         # Pinocchio's kinetic energy is without what turns with the joints' motors.
         kinetic = pin.computeKineticEnergy(self.model, self._data, q, v) + 0.5 * self.model.armature @ (v * v)

@@ -38,9 +38,9 @@ class Energy(NamedTuple):
     kind: str = STORED
 
 
-def energy(given: Energy | str) -> Energy:
+def energy(entry: Energy | str) -> Energy:
     """Return an energy; one that is given by its name has that for a label, too."""
-    return Energy(given, given.replace("_", " ")) if isinstance(given, str) else given
+    return Energy(entry, entry.replace("_", " ")) if isinstance(entry, str) else entry
 
 
 #: The powers that a moving base supplies, and what moves objects along paths.
@@ -60,17 +60,17 @@ class Energies:
     powers: tuple[Energy, ...]
 
     @classmethod
-    def of(cls, rows: Sequence[Rows], moved: bool = False, prescribed: bool = False) -> Energies:
-        """Collect those of tables, and those of moved coordinates and of a base that moves."""
+    def from_rows(cls, rows: Sequence[Rows], moved: bool = False, prescribed: bool = False) -> Energies:
+        """Collect the energies and powers of tables, of moved coordinates and of a base that moves."""
         base = ((GUIDED,) if prescribed else ()) + ((BASE,) if moved else ())
         return cls(_once(table.stored for table in rows), (*_once(p for table in rows for p in table.powers), *base))
 
 
 def _once(energies: Iterable[Energy]) -> tuple[Energy, ...]:
-    found: dict[str, Energy] = {}
-    for each in energies:
-        found.setdefault(each.name, each)
-    return tuple(found.values())
+    by_name: dict[str, Energy] = {}
+    for entry in energies:
+        by_name.setdefault(entry.name, entry)
+    return tuple(by_name.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,11 +158,11 @@ class Rows:
         """Return the powers with their kinds, from the law."""
         law = self.law
         kinds = dict.fromkeys(law.supplies, SUPPLIED) | dict.fromkeys(law.losses, LOST)
-        given = [energy(each) for each in self.powers or [f"{self.group}_{name}" for name in kinds]]
-        if len(given) != len(kinds):
-            names = [each.name for each in given]
+        powers = [energy(each) for each in self.powers or [f"{self.group}_{name}" for name in kinds]]
+        if len(powers) != len(kinds):
+            names = [each.name for each in powers]
             raise InputError(f"rows.{self.group}.powers", f"must be {', '.join(kinds) or 'none'}", names)
-        return tuple(each._replace(kind=kind) for each, kind in zip(given, kinds.values(), strict=True))
+        return tuple(each._replace(kind=kind) for each, kind in zip(powers, kinds.values(), strict=True))
 
     @property
     def count(self) -> int:
@@ -176,7 +176,7 @@ class Rows:
 
     @property
     def routed(self) -> bool:
-        """Whether paths through space belong to any row."""
+        """Return whether paths through space belong to any row."""
         return any(self.paths)
 
     @cached_property
@@ -192,9 +192,9 @@ class Rows:
         """Return the same rows with their coordinates at some places among more."""
 
         def wide(matrix: Array) -> Array:
-            found = np.zeros((len(matrix), width))
-            found[:, places] = matrix
-            return found
+            wider = np.zeros((len(matrix), width))
+            wider[:, places] = matrix
+            return wider
 
         return replace(self, arm=wide(self.arm), measure=wide(self.measure), bends=wide(self.bends))
 
@@ -244,9 +244,9 @@ def combined(force: Array, weights: Array) -> Array:
 
 def state_scales(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:
     """Return name and scale of every state of tables of rows."""
-    found: list[tuple[str, float]] = []
+    scales: list[tuple[str, float]] = []
     for table in rows:
         if table.law.scale is not None:
             for name in table.names:
-                found += [(f"{table.group}[{name}]", table.law.scale)] * table.law.states
-    return tuple(found)
+                scales += [(f"{table.group}[{name}]", table.law.scale)] * table.law.states
+    return tuple(scales)

@@ -67,7 +67,7 @@ class Solid:
 
     @property
     def reach(self) -> float:
-        """No point is farther from the origin of its shape, m; infinite for a half-space."""
+        """Largest distance of a point from the origin of its shape, m; infinite for a half-space."""
         if self.shape == "half_space":
             return np.inf
         if self.shape == "box":
@@ -126,13 +126,13 @@ def finger_solids(links: Mapping[str, Link], body: RigidBody) -> list[Solid]:
 
 def tree_solids(tree: Tree, placed: Mapping[str | None, Placed], body: RigidBody) -> list[Solid]:
     """Return the shapes of the bodies of a tree, which are one group; ``placed`` has the bodies' placements."""
-    found = []
-    for name, each in tree.bodies.items():
-        for own, shape in each.shapes.items():
+    solids = []
+    for name, part in tree.bodies.items():
+        for key, shape in part.shapes.items():
             place = pin.SE3(rotation(shape.orientation), np.array(shape.position))
-            solid = Solid(own, "tree", placed[name].joint, placed[name].frame * place, shape.shape, shape.sizes)
-            found.append(replace(solid, surface=shape.surface).kept_near(body))
-    return found
+            solid = Solid(key, "tree", placed[name].joint, placed[name].frame * place, shape.shape, shape.sizes)
+            solids.append(replace(solid, surface=shape.surface).kept_near(body))
+    return solids
 
 
 def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
@@ -154,23 +154,23 @@ def pairs_apart(objects: Mapping[str, Object], known: Collection[str]) -> set[fr
     Raises:
         InputError: If one of these is not known.
     """
-    for name, each in objects.items():
-        for other in each.apart:
+    for name, obj in objects.items():
+        for other in obj.apart:
             if other not in known or other == name:
                 allowed = f"no such link, shape or other object; there are {', '.join(k for k in known if k != name)}"
                 raise InputError(f"environment.objects.{name}.apart", allowed, other)
-    return {frozenset((name, other)) for name, each in objects.items() for other in each.apart}
+    return {frozenset((name, other)) for name, obj in objects.items() for other in obj.apart}
 
 
 def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:
     """Return objects; those that move are carried by the joints that `add_free_objects` has made."""
-    found = []
-    for name, each in objects.items():
-        joint = WORLD[-1] if each.frame == "world" else f"{name}_attitude"
-        found.append(
-            object_solid(name, each, int(body.model.getJointId(joint)) if body.model.existJointName(joint) else 0)
+    solids = []
+    for name, obj in objects.items():
+        joint = WORLD[-1] if obj.frame == "world" else f"{name}_attitude"
+        solids.append(
+            object_solid(name, obj, int(body.model.getJointId(joint)) if body.model.existJointName(joint) else 0)
         )
-    return found
+    return solids
 
 
 def object_solid(name: str, described: Object, joint: int) -> Solid:
@@ -205,20 +205,20 @@ def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm 
     world: tuple[float, ...] = ()
     if palm is not None and any(each.frame == "world" for each in objects.values()):
         world = tuple(palm.on_path(name.split()[1]).greatest for name in WORLD)
-    return _weighing(_extended(body, moved, world), body, [objects[name] for name in moved])
+    return _with_masses(_extended(body, moved, world), body, [objects[name] for name in moved])
 
 
-def _weighing(extended: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
+def _with_masses(extended: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
     """Return an extended body with the inertias of the body itself, and those of objects that move."""
     # Any inertia that is too little to count will do for what moves on a path.
     slight, none = _inertia(_SLIGHT, np.full(3, _SLIGHT)), pin.Inertia.Zero()
     inertias = body.inertias
-    for each in moved:
-        inertias += [none, slight if each.mass is None else _inertia(each.mass, each.inertia)]
+    for obj in moved:
+        inertias += [none, slight if obj.mass is None else _inertia(obj.mass, obj.inertia)]
     # Of the joints of the world the last one carries all.
     more = extended.model.njoints - 1 - len(inertias)
     inertias += [*[none] * (more - 1), slight][-more:] if more else []
-    return extended.weighing(inertias, body.model.gravity.linear)
+    return extended.with_inertias(inertias, body.model.gravity.linear)
 
 
 @memoised(lambda body, moved, world: (body.topology, *moved, world))

@@ -61,13 +61,13 @@ def as_floats(name: str, value: ArrayLike, size: int, *, single: bool = False) -
         InputError: If it is not; ``name`` names the argument.
     """
     try:
-        found = np.asarray(value, dtype=float)
+        values = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        found = np.empty(())
-    if found.ndim == 0 or found.shape[-1] != size or (single and found.ndim > 1):
-        shape = list(found.shape) if found.ndim else type(value).__name__
+        values = np.empty(())
+    if values.ndim == 0 or values.shape[-1] != size or (single and values.ndim > 1):
+        shape = list(values.shape) if values.ndim else type(value).__name__
         raise InputError(name, f"must be numbers of shape ({'' if single else '..., '}{size}{',' * single})", shape)
-    return found
+    return values
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -179,7 +179,9 @@ class Layout:
     scaled: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     @classmethod
-    def of(cls, labels: Mapping[str, Sequence[str]], scaled: Mapping[str, Sequence[float]] | None = None) -> Layout:
+    def from_labels(
+        cls, labels: Mapping[str, Sequence[str]], scaled: Mapping[str, Sequence[float]] | None = None
+    ) -> Layout:
         """Return the layout of some blocks' names; blocks that are left out are empty."""
         return cls(
             tuple(tuple(labels.get(name, ())) for name in BLOCKS),
@@ -223,8 +225,8 @@ class Layout:
         """Return the packed vector, shape (..., size)."""
         lead, blocks = state.position.shape[:-1], []
         for kind, size in zip(BLOCKS, self.sizes, strict=True):
-            given = getattr(state, kind)
-            blocks.append(np.zeros((*lead, size)) if given is None else given)
+            block = getattr(state, kind)
+            blocks.append(np.zeros((*lead, size)) if block is None else block)
         return np.concatenate(blocks, axis=-1)
 
     def unpack(self, x: Array) -> State:
@@ -255,8 +257,8 @@ class Layout:
     def _scales(self) -> Array:
         blocks = zip(BLOCKS.values(), self.sizes, strict=True)
         scales = np.concatenate([np.resize(block.scale, size) for block, size in blocks])
-        for kind, own in self.scaled:
-            scales[self._parts[kind]] = own
+        for kind, values in self.scaled:
+            scales[self._parts[kind]] = values
         return scales
 
 

@@ -86,7 +86,7 @@ class TendonPaths:
     references: Array
 
     @classmethod
-    def of(
+    def from_description(
         cls, description: FingerDescription, body: RigidBody, placed: Mapping[str | None, Placed] | None = None
     ) -> TendonPaths:
         """Read the tendons of a finger on a rigid body, on which the bodies of its tree have their places."""
@@ -119,24 +119,24 @@ class TendonPaths:
 
     def length(self, q: Array) -> Array:
         """Return the lengths at q, shape (..., n), as MuJoCo's ``ten_length``: shape (..., t), m."""
-        return self._reached(q)[0]
+        return self._kinematics(q)[0]
 
     def arms(self, q: Array) -> Array:
         """Return dL/dq at q, shape (..., n), as MuJoCo's ``ten_J``: shape (..., t, n), m."""
-        return self._reached(q)[1]
+        return self._kinematics(q)[1]
 
     def turn(self, q: Array) -> Array:
         """Return the angle by which each path turns at q, shape (..., n), before its first pulley: (..., t), rad."""
-        return self._reached(q)[2]
+        return self._kinematics(q)[2]
 
-    def _reached(self, q: Array) -> tuple[Array, Array, Array]:
+    def _kinematics(self, q: Array) -> tuple[Array, Array, Array]:
         q = np.asarray(q, dtype=float)
         if q.ndim > 1:
-            each = [self._reached(one) for one in q]
-            length, arms, turn = (np.array(part) for part in zip(*each, strict=True))
+            postures = [self._kinematics(one) for one in q]
+            length, arms, turn = (np.array(part) for part in zip(*postures, strict=True))
             return length, arms, turn
-        found = path_kinematics(self.body, q, [route.legs for route in self.routes.values()], len(q))
-        return found.length + self.fixed @ q, found.arm + self.fixed, found.turn
+        kinematics = path_kinematics(self.body, q, [route.legs for route in self.routes.values()], len(q))
+        return kinematics.length + self.fixed @ q, kinematics.arm + self.fixed, kinematics.turn
 
 
 def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> TendonPath:
@@ -144,18 +144,18 @@ def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[st
     parts: list[tuple[float, list[PathTerm]]] = [(1.0, [])]
     before: Place | None = None
     wrap: Waypoint | None = None
-    for each in path.values():
-        if each.kind == "pulley":
-            parts.append((each.divisor, []))
+    for waypoint in path.values():
+        if waypoint.kind == "pulley":
+            parts.append((waypoint.divisor, []))
             before = None
-        elif each.kind == "point":
-            here = placed[each.body].place(each.position)
+        elif waypoint.kind == "point":
+            here = placed[waypoint.body].place(waypoint.position)
             if before is not None:
                 legs = parts[-1][1]
                 legs.append(PathTerm(_piece(before, here, wrap, placed), follows=bool(legs)))
             before, wrap = here, None
         else:
-            wrap = each
+            wrap = waypoint
     (_, trunk), *branches = parts
     behind = [replace(leg, arm=1.0 / divisor, bends=False) for divisor, legs in branches for leg in legs]
     divided = tuple((divisor, tuple(legs)) for divisor, legs in branches)
@@ -221,8 +221,8 @@ class Excursions:
         if not rows.routed:
             return combined(tendons.force, rows.arm)[..., :joints]
         body, width = self._paths.body, rows.arm.shape[1]
-        found = np.zeros((*x.shape[:-1], joints))
+        torque = np.zeros((*x.shape[:-1], joints))
         for at in np.ndindex(x.shape[:-1]):
             arm = path_kinematics(body, x[at][:joints], rows.paths, width).arm + rows.arm
-            found[at] = (tendons.force[at] @ arm)[:joints]
-        return found
+            torque[at] = (tendons.force[at] @ arm)[:joints]
+        return torque

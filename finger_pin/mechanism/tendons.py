@@ -108,7 +108,7 @@ class Tendons:
 
     @property
     def at_bends(self) -> bool:
-        """Whether any tendon rubs at several places."""
+        """Return whether any tendon rubs at several places."""
         return any(len(places) > 1 for places in self.wraps)
 
     def in_sliding(self, position: Array, direction: Array) -> tuple[Array, Array]:
@@ -133,12 +133,12 @@ class Tendons:
         whole = at_place(self.surface, routing.curvature(position), direction, self.drag)
         share, lost = (np.repeat(each[..., None], joints, axis=-1) for each in whole)
         for k, places in self.several.items():
-            left, taken, drag = np.ones_like(direction[..., k]), 0.0 * direction[..., k], self.drag[k] / len(places)
+            left, loss, drag = np.ones_like(direction[..., k]), 0.0 * direction[..., k], self.drag[k] / len(places)
             for bends, offset, beyond in places:
                 turned = np.abs(position) @ bends + offset
                 ratio, lower = at_place(self.surface[k], turned, direction[..., k], drag)
-                left, taken = left * ratio, taken * ratio + lower
-                share[..., k, beyond], lost[..., k, beyond] = left[..., None], taken[..., None]
+                left, loss = left * ratio, loss * ratio + lower
+                share[..., k, beyond], lost[..., k, beyond] = left[..., None], loss[..., None]
         return share, lost
 
     def stretch(self, position: Array, passive_position: Array) -> tuple[Array, Array]:
@@ -153,10 +153,10 @@ class Tendons:
         return 0.5 * (proximal - distal)
 
     @property
-    def held(self) -> tuple[str, ...]:
+    def hysteretic_halves(self) -> tuple[str, ...]:
         """Names of the halves of passive tendons with hysteresis."""
-        held = zip(self.routing.passive_names, self.hysteresis, strict=True)
-        return tuple(f"{name}.{half}" for name, share in held if share for half in _HALVES)
+        shares = zip(self.routing.passive_names, self.hysteresis, strict=True)
+        return tuple(f"{name}.{half}" for name, share in shares if share for half in _HALVES)
 
     def sources(self, description: FingerDescription, width: int) -> list[Rows]:
         """Return the tables of ideal sources whose tension has an end, and of ideal winches, none without any."""
@@ -169,24 +169,24 @@ class Tendons:
                 winches[k] = [stiff, 0.0, -stiff, -tendon.winch.damping, -np.inf, np.inf, 0.0, end]
             elif most is not None:
                 plain[k] = [1.0, 0.0, 0.0, 0.0, 0.0, most, 0.0, most]
-        found = []
+        tables = []
         for group, numbers, supplied in ((SOURCES_WITH_END, plain, SOURCES), (WINCHES, winches, _WOUND)):
             if not numbers:
                 continue
             places, arm = np.array(list(numbers), dtype=np.int64), np.zeros((len(numbers), width))
             arm[:, : len(self.routing.joints)] = self.routing.coupling[places]
             law, pulls = np.array(list(numbers.values())).T, tuple(self.routing.tendons[k] for k in places)
-            found.append(Rows(group, ACTUATOR, pulls, law, arm, channels=places, powers=(supplied,), pulls=pulls))
-        return found
+            tables.append(Rows(group, ACTUATOR, pulls, law, arm, channels=places, powers=(supplied,), pulls=pulls))
+        return tables
 
     def drive_matrices(self, drives: Sequence[Rows]) -> dict[str, Array]:
         """Return the weights with which drives and halves' hysteresis pull the s strands, by table, shape (s, k)."""
         actuated, strands = self.routing.actuated, np.eye(len(self.routing.strand_coupling))
         by_drives = drive_matrices(drives, self.routing.tendons[:actuated])
-        found = {group: strands[:, :actuated] @ weights for group, weights in by_drives.items()}
-        if self.held:
-            found["passive_hysteresis"] = strands[:, actuated:][:, np.repeat(self.hysteresis > 0.0, 2)]
-        return found
+        matrices = {group: strands[:, :actuated] @ weights for group, weights in by_drives.items()}
+        if self.hysteretic_halves:
+            matrices["passive_hysteresis"] = strands[:, actuated:][:, np.repeat(self.hysteresis > 0.0, 2)]
+        return matrices
 
     def _halves(self, motors: int) -> list[Rows]:
         """Return the tables of halves of passive tendons, (12), and of their hysteresis."""
@@ -227,7 +227,7 @@ class Tendons:
                 bends[k, :joints], offset[k], _ = _places(routing, k, places)[0]
         friction, names = self._friction, routing.passive_names
         wired = drive_matrices(drives, routing.tendons[:actuated])
-        taken = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
+        replaced = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
         halves = self._halves(motors)
         # What loads a canal is what its tendon's halves pull with, and what they hold.
         both = np.repeat(np.eye(passive), 2, axis=1)
@@ -239,9 +239,9 @@ class Tendons:
                 group="driven_tendons",
                 law=DRIVEN_TENDON,
                 names=routing.tendons[:actuated],
-                parameters=np.vstack([friction[:, :actuated], taken]),
+                parameters=np.vstack([friction[:, :actuated], replaced]),
                 arm=driven[:actuated],
-                channels=np.where(taken, -1, np.arange(actuated)),
+                channels=np.where(replaced, -1, np.arange(actuated)),
                 inputs=wired,
                 bends=bends[:actuated],
                 curvature_offset=offset[:actuated],
@@ -270,10 +270,10 @@ class Tendons:
 
     def at(self, tendons: Sequence[int], wraps: Sequence[Wrap]) -> Array:
         """Return the numbers of friction, as in ``canals``, of some tendons at some of their places, shape (f, k)."""
-        found: Array = self.canals[:, tendons]
+        friction: Array = self.canals[:, tendons]
         shared = [PASSIVE_FRICTION.parameters.index(name) for name in ("stiffness", "viscous", "drag")]
-        found[shared] *= [wrap.share for wrap in wraps]
-        return found
+        friction[shared] *= [wrap.share for wrap in wraps]
+        return friction
 
 
 def _places(routing: Routing, tendon: int, wraps: Sequence[Wrap]) -> list[tuple[Array, float, NDArray[np.bool_]]]:

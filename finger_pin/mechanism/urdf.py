@@ -138,7 +138,7 @@ def build_hand(hand: HandSettings) -> RigidBody:
 @memoised(lambda hand, placed, parts: (hand.gravity, *placed, *parts.values()))
 def _weighed_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping[str, RigidBody]) -> RigidBody:
     joined = _joined_hand(hand, placed, parts)
-    return joined.weighing([each for part in parts.values() for each in part.inertias], hand.gravity)
+    return joined.with_inertias([each for part in parts.values() for each in part.inertias], hand.gravity)
 
 
 @memoised(lambda hand, placed, parts: (*placed, *(part.topology for part in parts.values())))
@@ -225,25 +225,25 @@ def join_bodies(parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | 
     axes, carriers = [np.array([1.0, 0.0, 0.0])], [0]
     model.gravity = next(iter(parts.values())).model.gravity
     for part, body in parts.items():
-        own, shift = body.model, model.njoints - 1
+        part_model, shift = body.model, model.njoints - 1
         place = (places or {}).get(part, pin.SE3.Identity())
-        if own.gravity != model.gravity:
-            raise InputError(f"{part}.gravity", f"must be {model.gravity.linear}", own.gravity.linear)
-        for index in range(1, own.njoints):
-            parent = int(own.parents[index])
-            joint, placement = own.joints[index], own.jointPlacements[index]
+        if part_model.gravity != model.gravity:
+            raise InputError(f"{part}.gravity", f"must be {model.gravity.linear}", part_model.gravity.linear)
+        for index in range(1, part_model.njoints):
+            parent = int(part_model.parents[index])
+            joint, placement = part_model.joints[index], part_model.jointPlacements[index]
             placement = placement if parent else place * placement
-            at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{own.names[index]}")
+            at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{part_model.names[index]}")
             # Appending bodies, or frames with theirs, would round.
-            model.inertias[at] = own.inertias[index]
-            at, moved = model.joints[at].idx_v, own.joints[index]
-            model.armature[at : at + moved.nv] = own.armature[moved.idx_v : moved.idx_v + moved.nv]
+            model.inertias[at] = part_model.inertias[index]
+            at, moved = model.joints[at].idx_v, part_model.joints[index]
+            model.armature[at : at + moved.nv] = part_model.armature[moved.idx_v : moved.idx_v + moved.nv]
         for tip in body.tips:
-            frame = own.frames[tip]
+            frame = part_model.frames[tip]
             holder = frame.parentJoint and frame.parentJoint + shift
             tips.append(f"{part}.{frame.name}")
-            held = frame.placement if holder else place * frame.placement
-            model.addFrame(pin.Frame(tips[-1], holder, 0, held, pin.FrameType.OP_FRAME), False)
+            frame_placement = frame.placement if holder else place * frame.placement
+            model.addFrame(pin.Frame(tips[-1], holder, 0, frame_placement, pin.FrameType.OP_FRAME), False)
         along = zip(body.proximal_axes[1:], body.parent_links[1:], strict=True)
         axes += [axis if carrier else place.rotation @ axis for axis, carrier in along]
         carriers += [carrier and carrier + shift for carrier in body.parent_links[1:]]

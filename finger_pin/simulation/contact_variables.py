@@ -11,7 +11,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Touch
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.scene import POSE, VELOCITY
+from finger_pin.mechanism.object_scene import POSE, VELOCITY
 from finger_pin.mechanism.state import State
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.typing import Array

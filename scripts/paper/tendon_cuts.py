@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.mechanism.geometry import TendonGeometry
-from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
+from finger_pin.mechanism.geometry.wound_tendon import Arc, WoundSpan
 from finger_pin.typing import Array
 
 

@@ -10,7 +10,7 @@ from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
-from finger_pin.mechanism.contacts import contact_rows
+from finger_pin.mechanism.contact_rows import contact_rows
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.solids import add_free_objects, object_solids

@@ -36,7 +36,7 @@ class Joined:
         """Join loops by their names."""
         self.loops = loops
         parts = {name: loop.finger.mechanism for name, loop in loops.items()}
-        self.parts, self.mechanism = tuple(parts.values()), Mechanism.join(parts)
+        self.parts, self.mechanism = tuple(parts.values()), Mechanism.from_parts(parts)
 
     def pack(self, vectors):
         """Join packed vectors of the fingers, shape (..., size), one for each."""
@@ -216,7 +216,7 @@ def test_parts_under_different_gravity_are_not_joined(scenarios):
         for name, g in (("index", -9.81), ("thumb", 0.0))
     }
     with pytest.raises(InputError, match=r"thumb\.gravity"):
-        Mechanism.join(parts)
+        Mechanism.from_parts(parts)
 
 
 STILL = """<mujoco><option gravity="0 0 0"/><worldbody><site name="p" pos="-.03 0 .01"/>

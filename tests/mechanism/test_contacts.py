@@ -7,7 +7,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.description.objects import Object
 from finger_pin.laws.contact_law import CONTACT
-from finger_pin.mechanism.contacts import check_start, contact_rows
+from finger_pin.mechanism.contact_rows import check_start, contact_rows
 from finger_pin.mechanism.path_elements import path_kinematics
 from finger_pin.mechanism.solids import add_free_objects, finger_solids, object_solids
 from finger_pin.mechanism.urdf import build_rigid_body

@@ -17,7 +17,7 @@ def layout_of(joints, tendons, passive, motors=(), objects=(), contacts=(), worl
     free = {"object_pose": poses, "object_velocity": rates, "world_position": world, "world_velocity": world}
     bends = [f"{name}.{k}" for name in contacts for k in range(2)]
     masses = dict.fromkeys(("passive_position", "passive_velocity"), slack)
-    return Layout.of(
+    return Layout.from_labels(
         {**of_joints, **of_motors, **free, **masses, "tendon_stiction": tendons, "contact_bend": bends, **more}
     )
 
@@ -118,6 +118,6 @@ def test_a_layout_that_lacks_a_number_of_any_block_is_refused_before_anything_is
     finger = fp.Finger(name)
     labels = dict(zip(BLOCKS, finger.layout.labels, strict=True))
     for block in filter(labels.get, BLOCKS):
-        less = Layout.of(labels | {block: labels[block][1:]})
+        less = Layout.from_labels(labels | {block: labels[block][1:]})
         with pytest.raises(RuntimeError, match=r"^state\.\w+ ends at"):
             check_layout(less, finger.mechanism)

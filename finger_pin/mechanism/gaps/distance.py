@@ -58,7 +58,7 @@ def _nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
 
 
 def _ramps(start: float, most: float) -> Any:
-    """Return how long dc/du rises and falls, its most, and where it is zero again."""
+    """Return the lengths over which dc/du rises and falls, its maximum, and its second zero."""
     rise = min(start, np.sqrt(0.5 * most * start))
     peak, fall = 2.0 * rise / start, max(rise, 0.5 * most)
     return rise, fall, peak, most / peak + 0.5 * (rise + fall)

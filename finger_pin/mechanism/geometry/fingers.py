@@ -1,4 +1,4 @@
-"""One finger of a picture: its wound tendons, its solids, and the index of its first joint."""
+"""Finger of a picture: its wound tendons, its solids, and the index of its first joint."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.from_pinocchio import chain, placed_solids, turned_model, width_of
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes, tendon_lanes
-from finger_pin.mechanism.geometry.winding import BASE_LEAD, Arc, WoundSpan, wind
+from finger_pin.mechanism.geometry.wound_tendon import BASE_LEAD, Arc, WoundSpan, wind
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.shapes import MATERIALS
 from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
@@ -76,7 +76,7 @@ class WoundFinger:
     size: float
 
     @classmethod
-    def of_links(cls, description: FingerDescription, resolution: int) -> WoundFinger:
+    def from_links(cls, description: FingerDescription, resolution: int) -> WoundFinger:
         """Wind the tendons of a finger that is made of links.
 
         Raises:
@@ -91,7 +91,7 @@ class WoundFinger:
         return cls._wound(description, model, visuals, widths, size, resolution)
 
     @classmethod
-    def on_chain(cls, description: FingerDescription, model: pin.Model, resolution: int) -> WoundFinger:
+    def from_chain(cls, description: FingerDescription, model: pin.Model, resolution: int) -> WoundFinger:
         """Wind the tendons of a finger on the joints of a chain, which carries solids of its own."""
         width = width_of(description)
         lengths = [float(np.linalg.norm(each.translation)) for each in list(model.jointPlacements)[2:]]
@@ -156,15 +156,15 @@ def fingers_of_links(description: FingerDescription, resolution: int) -> list[Wo
         if joint.link is None:
             allowed = "is missing; the viewer shows links, or with finger= the model of the user's own"
             raise InputError(f"finger.joints.{name}.link", allowed)
-    hand, first, found = description.hand, 0, []
+    hand, first, fingers = description.hand, 0, []
     if hand is None:
-        return [WoundFinger.of_links(description, resolution)]
+        return [WoundFinger.from_links(description, resolution)]
     for name, finger in hand.built().items():
         placed = hand.fingers[name]
         place = pin.SE3(placed.rotation, np.array(placed.position))
-        found.append(WoundFinger.of_links(finger, resolution).placed(name, place, first))
+        fingers.append(WoundFinger.from_links(finger, resolution).placed(name, place, first))
         first += len(finger.joints)
-    return found
+    return fingers
 
 
 def fingers_on_model(
@@ -176,13 +176,13 @@ def fingers_on_model(
         InputError: If a joint does not turn, or the joints of a finger do not follow each other.
     """
     model, turns = turned_model(body)
-    hand, first, found = description.hand, 0, []
+    hand, first, fingers = description.hand, 0, []
     for name, finger in {"": description}.items() if hand is None else hand.built().items():
-        wound = WoundFinger.on_chain(finger, chain(model, first + 1, len(finger.joints)), resolution)
-        found.append(wound.placed(name, pin.SE3.Identity(), first) if name else wound)
+        wound = WoundFinger.from_chain(finger, chain(model, first + 1, len(finger.joints)), resolution)
+        fingers.append(wound.placed(name, pin.SE3.Identity(), first) if name else wound)
         first += len(finger.joints)
     placed = placed_solids(solids, turns) if solids is not None else ()
-    return model, found, tuple(_visual(each, placement) for each, placement in placed)
+    return model, fingers, tuple(_visual(each, placement) for each, placement in placed)
 
 
 def palm_of(hand: HandSettings | None) -> tuple[Visual, ...]:

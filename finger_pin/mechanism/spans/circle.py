@@ -7,13 +7,32 @@ other through an angle phi. Length and turn are functions of these three. Which 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 #: Which way the path goes.
 FREE, SHORT_WAY, LONG_WAY, INSIDE = range(4)
 # Below this, a length or a radius is none, as in MuJoCo.
 _TINY = 1e-15
 _MOST_STEPS = 50
+
+
+class CirclePath(NamedTuple):
+    """Length P and turn T of a path, with their derivatives by r_0, r_1 and phi."""
+
+    length: Any
+    by_r0: Any
+    by_r1: Any
+    by_angle: Any
+    by_r0_r0: Any
+    by_r1_r1: Any
+    by_angle_angle: Any
+    by_r0_r1: Any
+    by_r0_angle: Any
+    by_r1_angle: Any
+    turn: Any
+    turn_by_r0: Any
+    turn_by_r1: Any
+    turn_by_angle: Any
 
 
 def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: Any, has_side: Any, inside: Any) -> Any:
@@ -46,12 +65,7 @@ def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: A
 
 
 def path(way: Any, r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
-    """Return length and turn of a path, and their derivatives by r_0, r_1, phi.
-
-    Returns:
-        14 numbers: the length P, then P_0, P_1, P_phi, P_00, P_11, P_phiphi, P_01, P_0phi, P_1phi, then the turn T and
-        T_0, T_1, T_phi.
-    """
+    """Return length and turn of a path, and their derivatives."""
     if way == INSIDE:
         return _inside(r0, r1, angle, radius)
     return _around(r0, r1, angle if way == SHORT_WAY else 2.0 * math.pi - angle, radius)
@@ -65,7 +79,7 @@ def _around(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
     turn = angle - math.acos(radius / r0) - math.acos(radius / r1)
     by0, by1 = -radius / (r0 * h0), -radius / (r1 * h1)
     length = h0 + h1 + radius * turn
-    return (
+    return CirclePath(
         *(length, h0 / r0, h1 / r1, radius),
         *(radius * radius / (h0 * r0 * r0), radius * radius / (h1 * r1 * r1), 0.0, 0.0, 0.0, 0.0),
         *(turn, by0, by1, 1.0),
@@ -91,7 +105,7 @@ def _inside(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
     # Angle between the first line and the circle's normal, and its derivatives.
     slant = math.atan2(r0 * s0, r0 * c0 - radius)
     slant_r, slant_psi = -radius * s0 / (d0 * d0), (r0 * r0 - radius * r0 * c0) / (d0 * d0)
-    return (
+    return CirclePath(
         *(d0 + d1, by_r0, by_r1, by_psi),
         *((1.0 - by_r0 * by_r0) / d0 + mixed0 * psi_0, (1.0 - by_r1 * by_r1) / d1 - mixed1 * psi_1),
         *(bend0 * psi_angle, mixed0 * psi_1, mixed0 * psi_angle, mixed1 * (1.0 - psi_angle)),

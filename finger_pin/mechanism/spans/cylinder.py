@@ -42,13 +42,13 @@ def cylinder_value(y: Any, p: Any, out: Any) -> None:
     if way == FREE:
         straight_value(y, p, out)
         return
-    found = path(way, r0, r1, angle, p[0])
-    pull = gradient(found[1], found[2], found[3], r0, r1, directions(a, b, r0, r1, normal, way))
+    wrap = path(way, r0, r1, angle, p[0])
+    pull = gradient(wrap.by_r0, wrap.by_r1, wrap.by_angle, r0, r1, directions(a, b, r0, r1, normal, way))
     rise = y[5] - y[2]
-    length = math.sqrt(found[0] ** 2 + rise**2)
-    flat = found[0] / length
+    length = math.sqrt(wrap.length**2 + rise**2)
+    flat = wrap.length / length
     out[0] = length
-    out[1] = _turned(way, found[10], flat)[0]
+    out[1] = _turned(way, wrap.turn, flat)[0]
     for i in range(6):
         out[2 + i] = flat * pull[i]
     out[4] = -rise / length
@@ -61,14 +61,14 @@ def cylinder_slopes(y: Any, p: Any, out: Any) -> None:
     if way == FREE:
         straight_slopes(y, p, out)
         return
-    found = path(way, r0, r1, angle, p[0])
+    wrap = path(way, r0, r1, angle, p[0])
     frame = directions(a, b, r0, r1, normal, way)
-    flat_pull = gradient(found[1], found[2], found[3], r0, r1, frame)
-    flat_turn = gradient(found[11], found[12], found[13], r0, r1, frame)
-    curvatures(found, 0.0, math.cos(angle), r0, r1, frame, out)
-    length = math.sqrt(found[0] ** 2 + (y[5] - y[2]) ** 2)
-    flat, steep = found[0] / length, (y[5] - y[2]) / length
-    _, by_turn, by_flat = _turned(way, found[10], flat)
+    flat_pull = gradient(wrap.by_r0, wrap.by_r1, wrap.by_angle, r0, r1, frame)
+    flat_turn = gradient(wrap.turn_by_r0, wrap.turn_by_r1, wrap.turn_by_angle, r0, r1, frame)
+    curvatures(wrap, 0.0, math.cos(angle), r0, r1, frame, out)
+    length = math.sqrt(wrap.length**2 + (y[5] - y[2]) ** 2)
+    flat, steep = wrap.length / length, (y[5] - y[2]) / length
+    _, by_turn, by_flat = _turned(way, wrap.turn, flat)
     for i in range(6):
         up = 1.0 * (i == 5) - 1.0 * (i == 2)
         pull = flat * flat_pull[i] + steep * up

@@ -37,10 +37,10 @@ def sphere_value(y: Any, p: Any, out: Any) -> None:
     if way == FREE:
         straight_value(y, p, out)
         return
-    found = path(way, r0, r1, angle, p[0])
-    pull = gradient(found[1], found[2], found[3], r0, r1, directions(a, b, r0, r1, normal, way))
-    out[0] = found[0]
-    out[1] = found[10]
+    wrap = path(way, r0, r1, angle, p[0])
+    pull = gradient(wrap.by_r0, wrap.by_r1, wrap.by_angle, r0, r1, directions(a, b, r0, r1, normal, way))
+    out[0] = wrap.length
+    out[1] = wrap.turn
     for i in range(6):
         out[2 + i] = pull[i]
 
@@ -51,13 +51,13 @@ def sphere_slopes(y: Any, p: Any, out: Any) -> None:
     if way == FREE:
         straight_slopes(y, p, out)
         return
-    found = path(way, r0, r1, angle, p[0])
+    wrap = path(way, r0, r1, angle, p[0])
     frame = directions(a, b, r0, r1, normal, way)
-    turn = gradient(found[11], found[12], found[13], r0, r1, frame)
+    turn = gradient(wrap.turn_by_r0, wrap.turn_by_r1, wrap.turn_by_angle, r0, r1, frame)
     for i in range(6):
         out[i] = turn[i]
     sine = max(math.sin(angle), 1e-300) * (-1.0 if way == LONG_WAY else 1.0)
-    curvatures(found, sine, math.cos(angle), r0, r1, frame, out)
+    curvatures(wrap, sine, math.cos(angle), r0, r1, frame, out)
 
 
 #: About the origin.
@@ -87,11 +87,11 @@ def gradient(by0: Any, by1: Any, by_angle: Any, r0: Any, r1: Any, frame: Any) ->
     )
 
 
-def curvatures(found: Any, sine: Any, cosine: Any, r0: Any, r1: Any, frame: Any, out: Any) -> None:
+def curvatures(wrap: Any, sine: Any, cosine: Any, r0: Any, r1: Any, frame: Any, out: Any) -> None:
     """Fill in the 36 second derivatives of the length by both points, from out[6] on.
 
     Args:
-        found: Length, turn and derivatives, from `path`.
+        wrap: Length, turn and derivatives, from `path`.
         sine: Of phi; 0 for a plane that does not turn with the points.
         cosine: Of phi.
         r0: Distance of the first end, m.
@@ -100,7 +100,7 @@ def curvatures(found: Any, sine: Any, cosine: Any, r0: Any, r1: Any, frame: Any,
         out: Filled in.
     """
     u, t, v, s = frame
-    by0, by1, by_angle, d00, d11, daa, d01, d0a, d1a = found[1:10]
+    _, by0, by1, by_angle, d00, d11, daa, d01, d0a, d1a, _, _, _, _ = wrap
     n = crossed(u, t)
     # Where the plane turns, points that leave it lengthen the arc; phi -> 0 has a limit.
     turning = sine != 0.0

@@ -13,7 +13,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.from_pinocchio import turned_model
 from finger_pin.mechanism.geometry.fingers import fingers_of_links, fingers_on_model, palm_of
-from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
+from finger_pin.mechanism.geometry.wound_tendon import Arc, WoundSpan
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.urdf import build_rigid_body
 from finger_pin.typing import Array
@@ -89,18 +89,18 @@ class TendonGeometry:
         """
         self.description = description
         if body is None:
-            fingers, own = fingers_of_links(description, resolution), palm_of(description.hand)
+            fingers, visuals = fingers_of_links(description, resolution), palm_of(description.hand)
             body = build_rigid_body(description)
             self.model = body.model
         else:
-            self.model, fingers, own = fingers_on_model(description, body, solids, resolution)
+            self.model, fingers, visuals = fingers_on_model(description, body, solids, resolution)
         rotations = [np.eye(3)] * self.model.njoints if body.model is self.model else turned_model(body)[1]
         frames = [body.model.frames[tip] for tip in body.tips]
         self.tips = tuple((int(f.parentJoint), rotations[f.parentJoint].T @ f.placement.translation) for f in frames)
         pieces = {name: each for finger in fingers for name, each in finger.pieces.items()}
         self.pieces = {name: pieces[name] for name in description.tendons}
         self.pulleys = tuple(pulley for finger in fingers for pulley in finger.pulleys)
-        self.visuals = (*own, *(visual for finger in fingers for visual in finger.visuals))
+        self.visuals = (*visuals, *(visual for finger in fingers for visual in finger.visuals))
         self.widths = tuple(width for finger in fingers for width in finger.widths)
         travel = 0.0
         if description.hand is not None:

@@ -15,12 +15,12 @@ from finger_pin.description.meshes import Mesh
 from finger_pin.description.tree_parts import TreeSolid
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes, joint_axes
-from finger_pin.mechanism.geometry.paths import LinkPoses, TendonPath
+from finger_pin.mechanism.geometry.tendon_geometry import LinkPoses, TendonPath
 from finger_pin.mechanism.path_elements import PathElement, PathTerm
 from finger_pin.mechanism.shapes import MATERIALS
 from finger_pin.mechanism.spans import CYLINDER, STRAIGHT
 from finger_pin.mechanism.tendon_paths import rotation
-from finger_pin.mechanism.tree import build_body
+from finger_pin.mechanism.tree_mechanism import build_body
 from finger_pin.typing import Array
 
 # Points of a stretch that may wrap.
@@ -77,9 +77,9 @@ class TreeGeometry:
         ]
         still = self.poses(np.zeros(self.model.nq))
         paths = self.paths(np.zeros(self.model.nq), poses=still)
-        seen = np.concatenate([still.translation[self.first_seen :], *(path.points for path in paths)])
-        self.size = float(np.linalg.norm(seen, axis=1).max()) or 0.1
-        extent = float(np.ptp(seen, axis=0).max()) or self.size
+        points = np.concatenate([still.translation[self.first_seen :], *(path.points for path in paths)])
+        self.size = float(np.linalg.norm(points, axis=1).max()) or 0.1
+        extent = float(np.ptp(points, axis=0).max()) or self.size
         self.widths: tuple[float, ...] = (_WIDTH * extent,)
         axes = joint_axes(self.model)
         along = np.where(axes.any(axis=1), np.abs(axes @ np.array(description.gravity)), np.inf)
@@ -90,11 +90,11 @@ class TreeGeometry:
         """Return the poses of the bodies at theta, shape (..., n), rad; a tree has no ``palm`` that moves."""
         assert palm is None
         q = np.asarray(joint_position, dtype=float)
-        data, found = self.model.createData(), []
+        data, matrices = self.model.createData(), []
         for position in np.ascontiguousarray(q.reshape(-1, self.model.nq)):
             pin.forwardKinematics(self.model, data, position)
-            found.append(np.array([placement.homogeneous for placement in data.oMi]))
-        placed = np.array(found).reshape(*q.shape[:-1], self.model.njoints, 4, 4)
+            matrices.append(np.array([placement.homogeneous for placement in data.oMi]))
+        placed = np.array(matrices).reshape(*q.shape[:-1], self.model.njoints, 4, 4)
         return LinkPoses(placed[..., :3, :3], placed[..., :3, 3])
 
     def paths(
@@ -118,13 +118,13 @@ class TreeGeometry:
 
 def _branches(legs: Sequence[PathTerm]) -> list[list[PathTerm]]:
     """Return the parts of a path that hang together: behind a pulley it goes on elsewhere."""
-    found: list[list[PathTerm]] = []
+    branches: list[list[PathTerm]] = []
     for leg in legs:
-        if found and leg.follows:
-            found[-1].append(leg)
+        if branches and leg.follows:
+            branches[-1].append(leg)
         else:
-            found.append([leg])
-    return found
+            branches.append([leg])
+    return branches
 
 
 def _path(legs: Sequence[PathTerm], rotations: Array, places: Array) -> Array:
@@ -140,8 +140,8 @@ def _stretch(piece: PathElement, rotations: Array, places: Array) -> Array:
     origin = rotations[piece.joint] @ piece.frame.translation + places[piece.joint]
     a, b = (first - origin) @ turned, (second - origin) @ turned
     out = np.zeros(8)
-    seen = [(each - origin) @ turned for each in side]
-    piece.shape.value(np.concatenate([a, b, *seen]), piece.parameters, out)
+    sides = [(each - origin) @ turned for each in side]
+    piece.shape.value(np.concatenate([a, b, *sides]), piece.parameters, out)
     if out[1] == 0.0:
         return np.linspace(first, second, _POINTS)
     start, end = _touch(piece, a, -out[2:5]), _touch(piece, b, out[5:8] * -1.0)
@@ -174,12 +174,12 @@ def _arc(piece: PathElement, start: Array, end: Array, direction: Array, turn: f
 
 def _surface(mesh: Mesh) -> coal.BVHModelBase:
     points, faces = mesh.unpacked()
-    found = coal.BVHModelOBBRSS()
-    found.beginModel(len(faces), len(points))
-    found.addVertices(points)
-    found.addTriangles(faces.astype(np.uint64))
-    found.endModel()
-    return found
+    bvh = coal.BVHModelOBBRSS()
+    bvh.beginModel(len(faces), len(points))
+    bvh.addVertices(points)
+    bvh.addTriangles(faces.astype(np.uint64))
+    bvh.endModel()
+    return bvh
 
 
 def _visuals(

@@ -79,8 +79,8 @@ class Actuators:
         strands = [(name, tendon) for name, each in description.actuators.items() for tendon in each.tendons]
 
         def of_tendons(field: str) -> Array:
-            given = [expand(getattr(each, field), len(each.tendons)) for each in actuators]
-            return np.concatenate([np.zeros(0), *given])
+            values = [expand(getattr(each, field), len(each.tendons)) for each in actuators]
+            return np.concatenate([np.zeros(0), *values])
 
         stiffness = of_tendons("tendon_rigidity") / of_tendons("tendon_length")
         spools = np.zeros((len(strands), len(names)))
@@ -178,8 +178,8 @@ class Actuators:
         return angle
 
     @property
-    def held(self) -> NDArray[np.intp]:
-        """The tendons that hold a part of their tension, shape (h,)."""
+    def hysteretic_tendons(self) -> NDArray[np.intp]:
+        """The tendons with hysteresis, shape (h,)."""
         return np.flatnonzero(self.hysteresis)
 
     def _torques(self, weight: Array) -> dict[str, Array]:
@@ -191,8 +191,9 @@ class Actuators:
 
     def _wired(self, weights: Array) -> dict[str, Array]:
         """Return weights of the elastic tendons' tensions in later rows, by table, from weights of shape (..., k)."""
-        held = {"tendon_hysteresis": weights[..., self.held]} if self.held.size else {}
-        return {"elastic_tendons": weights, **held}
+        tendons = self.hysteretic_tendons
+        hysteresis = {"tendon_hysteresis": weights[..., tendons]} if tendons.size else {}
+        return {"elastic_tendons": weights, **hysteresis}
 
     def tendon_rows(self, width: int) -> list[Rows]:
         """Return the tables of elastic tendons and their hysteresis, for coordinates (theta, p, theta_s, theta_m)."""

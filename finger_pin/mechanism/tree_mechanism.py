@@ -76,11 +76,11 @@ def build_body(description: FingerDescription, body: RigidBody | None = None) ->
     """
     if not description.tree.bodies:
         body = body or build_rigid_body(description)
-        return body, TendonPaths.of(description, body)
+        return body, TendonPaths.from_description(description, body)
     if body is not None:
         raise InputError("rigid_body", "has no place beside a tree, whose bodies are its own")
     body, placed = _body_of_tree(description)
-    return body, TendonPaths.of(description, body, placed)
+    return body, TendonPaths.from_description(description, body, placed)
 
 
 def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[str | None, Placed]]:
@@ -92,7 +92,7 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
     for name, body in tree.bodies.items():
         joint, place = placed[body.parent].joint, placed[body.parent].frame
         place = place * pin.SE3(rotation(body.orientation), np.array(body.position))
-        for own, moved in tree.joints.items():
+        for joint_name, moved in tree.joints.items():
             if moved.body == name:
                 axis, to_anchor = np.array(moved.axis), pin.SE3(np.eye(3), np.array(moved.anchor))
                 hinge = moved.kind == "hinge"
@@ -100,7 +100,7 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
                 back = np.zeros(6)
                 back[3 * hinge : 3 * hinge + 3] = -moved.reference * axis
                 kind = (pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned)(axis)
-                joint = model.addJoint(joint, kind, place * to_anchor * pin.exp6(back), own)
+                joint = model.addJoint(joint, kind, place * to_anchor * pin.exp6(back), joint_name)
                 model.armature[model.joints[joint].idx_v] = moved.armature
                 place = to_anchor.inverse()
         placed[name] = Placed(joint, place)
@@ -166,14 +166,14 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
         tables.append(table(ELASTIC, ELASTIC_TENDON, along, numbers, offset=offset, unit="m"))
     first = len(description.actuated_names)
     for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE), (MUSCLES, MUSCLE)):
-        own = {name: each for name, each in tree.actuators.items() if table_of(each) == group}
+        actuators = {name: each for name, each in tree.actuators.items() if table_of(each) == group}
         along = {
             name: (joints[each.joint] if each.joint else routes.routes[str(each.tendon)]).times(each.gear)
-            for name, each in own.items()
+            for name, each in actuators.items()
         }
-        if own:
-            channels = first + np.array([list(tree.actuators).index(name) for name in own])
-            tables.append(table(group, law, along, [_actuator(each) for each in own.values()], channels=channels))
+        if actuators:
+            channels = first + np.array([list(tree.actuators).index(name) for name in actuators])
+            tables.append(table(group, law, along, [_actuator(each) for each in actuators.values()], channels=channels))
     return tables
 
 
@@ -210,10 +210,10 @@ def _couplings(tree: Tree, routes: TendonPaths, joints: Mapping[str, TendonPath]
 
 def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: Mapping[str, TendonPath]) -> TendonPath:
     """Return what a coupling holds at its offset: q less all else that it is a sum of."""
-    held = joints[coupling.joint].coefficients
+    coefficients = joints[coupling.joint].coefficients
     if coupling.other is None:
-        return TendonPath(held, ())
-    route = TendonPath(held - coupling.slope * joints[coupling.other].coefficients, ())
+        return TendonPath(coefficients, ())
+    route = TendonPath(coefficients - coupling.slope * joints[coupling.other].coefficients, ())
     if not any(coupling.higher):
         return route
     # An angle is measured from its range's middle, so that it never comes to half a turn.
@@ -237,11 +237,11 @@ def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: 
 def _loops(tree: Tree, routes: TendonPaths) -> _Described:
     """Return the springs that hold points of bodies together, one along each axis of the base."""
     along = {}
-    for name, each in tree.loops.items():
-        first, second = routes.placed[each.body], routes.placed[each.other]
+    for name, loop in tree.loops.items():
+        first, second = routes.placed[loop.body], routes.placed[loop.other]
         for axis, unit in zip("xyz", np.eye(3), strict=True):
-            along[f"{name}.{axis}"] = _rise(first.place(each.position), second.place(each.other_position), unit)
-    numbers = [(each.stiffness, 0.0, each.damping) for each in tree.loops.values() for _ in "xyz"]
+            along[f"{name}.{axis}"] = _rise(first.place(loop.position), second.place(loop.other_position), unit)
+    numbers = [(loop.stiffness, 0.0, loop.damping) for loop in tree.loops.values() for _ in "xyz"]
     return "loop", JOINT_SPRING, along, numbers
 
 
@@ -249,14 +249,14 @@ def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
     """Return the forces that hold up a part of bodies' weight."""
     tree, gravity = description.tree, np.array(description.gravity)
     size = float(np.linalg.norm(gravity))
-    held = {
+    compensated = {
         name: each
         for name, each in tree.bodies.items()
         if size and each.gravity_compensation and each.mass and routes.placed[name].joint
     }
-    base = Place(0, np.zeros(3))
-    along = {name: _rise(base, routes.placed[name].place(each.centre), -gravity / size) for name, each in held.items()}
-    numbers = [(each.gravity_compensation * each.mass * size,) for each in held.values()]
+    base, places = Place(0, np.zeros(3)), routes.placed
+    along = {name: _rise(base, places[name].place(each.centre), -gravity / size) for name, each in compensated.items()}
+    numbers = [(each.gravity_compensation * each.mass * size,) for each in compensated.values()]
     return "gravity_compensation", CONSTANT_FORCE, along, numbers
 
 
@@ -280,20 +280,21 @@ def table_of(actuator: TreeActuator) -> str:
     return STATEFUL if actuator.has_state else STATELESS
 
 
-def _actuator(each: TreeActuator) -> tuple[float, ...]:
+def _actuator(actuator: TreeActuator) -> tuple[float, ...]:
     """Return the numbers of an actuator's law."""
-    if each.muscle is not None:
-        own = each.muscle
-        origin = own.length_range[0] - own.range[0] * own.optimal_length
-        shape = own.lmin, own.lmax, own.vmax, own.fpmax, own.fvmax
-        return own.force, own.optimal_length, origin, *shape, *own.time_constants, own.smoothing, *each.excitations
-    bounds = (*(each.input_range or _UNLIMITED), *(each.force_range or _UNLIMITED))
-    if not each.has_state:
-        return each.gain, each.offset, each.by_length, each.by_speed, *bounds
-    if each.integral:
-        law, state = each.gain, (each.integral, 1.0, -1.0, 0.0)
+    if (muscle := actuator.muscle) is not None:
+        origin = muscle.length_range[0] - muscle.range[0] * muscle.optimal_length
+        shape = muscle.lmin, muscle.lmax, muscle.vmax, muscle.fpmax, muscle.fvmax
+        peak = muscle.force, muscle.optimal_length, origin
+        return *peak, *shape, *muscle.time_constants, muscle.smoothing, *actuator.excitations
+    bounds = (*(actuator.input_range or _UNLIMITED), *(actuator.force_range or _UNLIMITED))
+    bias = actuator.offset, actuator.by_length, actuator.by_speed
+    if not actuator.has_state:
+        return actuator.gain, *bias, *bounds
+    if actuator.integral:
+        law, state = actuator.gain, (actuator.integral, 1.0, -1.0, 0.0)
     else:
         # What it holds takes the place of its input.
-        rate = 1.0 / each.time_constant if each.time_constant else 0.0
-        law, state = 0.0, (each.gain, rate or 1.0, 0.0, -rate)
-    return law, each.offset, each.by_length, each.by_speed, *bounds, *state, *(each.state_range or _UNLIMITED)
+        rate = 1.0 / actuator.time_constant if actuator.time_constant else 0.0
+        law, state = 0.0, (actuator.gain, rate or 1.0, 0.0, -rate)
+    return law, *bias, *bounds, *state, *(actuator.state_range or _UNLIMITED)

@@ -49,10 +49,10 @@ def contact_rows(
         apart = pair in never or (one.group == other.group and pair not in within)
         if apart or (one.prescribed and other.prescribed) or one.never_meets(other):
             continue
-        found = list(contacts_of(one, other))
-        for index, (a, part, w, prism) in enumerate(found):
+        touches = list(contacts_of(one, other))
+        for index, (a, part, w, prism) in enumerate(touches):
             piece = _piece(a, part, w, prism)
-            names.append(f"{a.name}-{w.name}" + (f".{index}" if len(found) > 1 else ""))
+            names.append(f"{a.name}-{w.name}" + (f".{index}" if len(touches) > 1 else ""))
             numbers.append(law_numbers(a.surface, w.surface))
             paths += [(PathTerm(piece, column),) for column in range(CONTACT.arms)]
     parameters = np.array(numbers).reshape(-1, len(CONTACT.parameters)).T
@@ -86,8 +86,8 @@ def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     if gaps.size and gaps.min() < -DEEPEST_START:
         deep, most = -1e3 * float(gaps.min()), 1e3 * DEEPEST_START
         # With as many digits as say that it is more.
-        told = next((each for each in (f"{deep:.3g}", f"{deep:.6g}") if float(each) > most), repr(deep))
-        allowed = f"starts {told} mm deep in each other, at most {most:g} mm"
+        depth = next((each for each in (f"{deep:.3g}", f"{deep:.6g}") if float(each) > most), repr(deep))
+        allowed = f"starts {depth} mm deep in each other, at most {most:g} mm"
         pair = contacts.names[int(np.argmin(gaps))]
         raise InputError(
             f"environment.objects: {pair}", f"{allowed}; move the object, or let the joints start elsewhere"

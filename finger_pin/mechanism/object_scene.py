@@ -14,7 +14,7 @@ from finger_pin.description.objects import Object
 from finger_pin.description.parameters import Link
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact_law import CONTACT
-from finger_pin.mechanism.contacts import check_start, contact_rows
+from finger_pin.mechanism.contact_rows import check_start, contact_rows
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.mechanism import Mechanism
@@ -55,7 +55,7 @@ def _touching(
     width: int,
     placed: object,
 ) -> tuple[object, ...]:
-    """Return all that contacts depend on: how heavy objects are, and where they move, is nothing to them."""
+    """Return all that contacts depend on, which is neither the mass nor the motion of objects."""
     shapes = (
         (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.surface, each.apart, *place)
         for name, each in objects.items()
@@ -85,7 +85,7 @@ class Scene:
     contacts: Rows
 
     @classmethod
-    def around(
+    def from_mechanism(
         cls,
         mechanism: Mechanism,
         objects: Mapping[str, Object] | None,
@@ -98,10 +98,10 @@ class Scene:
             objects = {**description.tree.objects, **(objects or {})}
         if objects is None and (description.touches_itself or (hand is not None and hand.fingers_touch)):
             objects = {}
-        return None if objects is None else cls.of(objects, description, mechanism, placed)
+        return None if objects is None else cls.from_objects(objects, description, mechanism, placed)
 
     @classmethod
-    def of(
+    def from_objects(
         cls,
         objects: Mapping[str, Object],
         description: FingerDescription,
@@ -121,9 +121,9 @@ class Scene:
         """
         hand = description.hand
         extended = add_free_objects(mechanism.body, objects, hand.palm if hand and mechanism.moved else None)
-        free = {name: each for name, each in objects.items() if extended.model.existJointName(f"{name}_attitude")}
-        for name, each in free.items():
-            if each.path and mechanism.moved:
+        free = {name: obj for name, obj in objects.items() if extended.model.existJointName(f"{name}_attitude")}
+        for name, obj in free.items():
+            if obj.path and mechanism.moved:
                 raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
         width = int(extended.model.nv) + len(mechanism.lumps)
         contacts = cls._contacts(mechanism.body.topology, objects, description, extended, width, placed)
@@ -141,18 +141,18 @@ class Scene:
     ) -> Rows:
         """Return the contacts of links and objects."""
         hand, links = description.hand, _links(description)
-        own = [*tree_solids(description.tree, placed, extended), *finger_solids(links, extended)]
+        bodies = [*tree_solids(description.tree, placed, extended), *finger_solids(links, extended)]
         if hand is not None and hand.fingers_touch is False:
-            own = [replace(each, group=hand.name) for each in own]
+            bodies = [replace(each, group=hand.name) for each in bodies]
         for name in objects:
-            for what, taken in (("joint", description.joints), ("shape", [each.name for each in own])):
-                if name in taken:
+            for what, names in (("joint", description.joints), ("shape", [each.name for each in bodies])):
+                if name in names:
                     raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
-        solids = [*own, *object_solids(objects, extended)]
+        solids = [*bodies, *object_solids(objects, extended)]
         never = pairs_apart(objects, [each.name for each in solids])
         return contact_rows(solids, width, pairs_within(description), never)
 
-    def joined(self, mechanism: Mechanism) -> Mechanism:
+    def extend(self, mechanism: Mechanism) -> Mechanism:
         """Return a mechanism with the scene: free objects after the joints, contacts before all other rows.
 
         What contacts exert loads the pins of joints, so they are evaluated first.
@@ -191,7 +191,7 @@ class Scene:
 
     @property
     def mass(self) -> Array:
-        """Of the free objects, shape (f,), kg."""
+        """Mass of the free objects, shape (f,), kg."""
         return np.array([each.mass or 0.0 for each in self.free.values()])
 
     def energies(self, pose: Array, velocity: Array, base: Array | None = None) -> tuple[Array, Array]:
@@ -227,7 +227,7 @@ class Scene:
         body, data, placed = self.body, self.body.model.createData(), _placed(state)
         pieces = [legs[0].piece for legs in self.contacts.paths[:: CONTACT.arms]]
         along = force.reshape(len(force), len(pieces), CONTACT.arms)
-        found, out = ContactPoints(*(np.zeros((len(force), len(pieces), 3)) for _ in range(3))), np.zeros(16)
+        points, out = ContactPoints(*(np.zeros((len(force), len(pieces), 3)) for _ in range(3))), np.zeros(16)
         for m in np.flatnonzero(np.any(along[..., 0], axis=1)):
             pin.forwardKinematics(body.model, data, placed[m])
             for c in np.flatnonzero(along[m, :, 0]):
@@ -236,10 +236,10 @@ class Scene:
                 y = np.concatenate([frame.actInv(data.oMi[end.joint].act(end.point)) for end in piece.ends])
                 PRISM.value(y, piece.parameters, out)
                 axes = frame.rotation @ out[[1, 2, 3, 7, 8, 9, 10, 11, 12]].reshape(3, 3).T
-                found.force[m, c] = -axes @ along[m, c]
-                found.normal[m, c] = axes[:, 0]
-                found.point[m, c] = frame.act(out[4:7])
-        return found
+                points.force[m, c] = -axes @ along[m, c]
+                points.normal[m, c] = axes[:, 0]
+                points.point[m, c] = frame.act(out[4:7])
+        return points
 
 
 def _placed(state: State) -> Array:
