@@ -15,7 +15,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class CancelToken:
-    """A request to end; what it is called for ends soon, with what was computed.
+    """Request to end a computation, which then ends soon with the results so far.
 
     While the token is entered, the first Ctrl-C sets it; a second one raises KeyboardInterrupt at once. Where others
     than Python handle the signal, such as another token, and in threads, which get none, it is theirs.
@@ -42,15 +42,15 @@ class CancelToken:
     def __enter__(self) -> Self:
         """Catch the signals that would raise KeyboardInterrupt."""
         if threading.current_thread() is threading.main_thread():
-            self._caught = [each for each in _SIGNALS if signal.getsignal(each) is signal.default_int_handler]
-        for each in self._caught:
-            signal.signal(each, self._catch)
+            self._caught = [number for number in _SIGNALS if signal.getsignal(number) is signal.default_int_handler]
+        for number in self._caught:
+            signal.signal(number, self._catch)
         return self
 
     def __exit__(self, *error: object) -> None:
         """Leave the signals as they were."""
-        for each in self._caught:
-            signal.signal(each, signal.default_int_handler)
+        for number in self._caught:
+            signal.signal(number, signal.default_int_handler)
 
     def _catch(self, number: int, frame: FrameType | None) -> None:
         if self.cancelled:

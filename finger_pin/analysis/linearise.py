@@ -174,7 +174,7 @@ def _over(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
         stepper = Stepper(mechanism, control, start, rodas5p(), _TIGHT, atol)
         stepper.hold(inputs)
         if ends is not None:
-            stepper.repeat([Steps.whole(each) for each in ends])
+            stepper.repeat([Steps.from_ends(each) for each in ends])
         trajectory = integrate_compiled(stepper, dt, other.layout.names)
         if trajectory.failure:
             raise InputError("state", f"cannot be integrated over dt: {trajectory.failure}")

@@ -171,7 +171,7 @@ class ClosedLoop:
     def spool_goals(self, time: Array) -> Array | None:
         """Return theta_m^d of the motors in position drive at times (m,), shape (m, k), rad; None without loops."""
         drives = None if self.drives is None else self.drives.compiled
-        return None if drives is None else drives.held(drives.goals, time)
+        return None if drives is None else drives.zero_order_hold(drives.goals, time)
 
     def wound(self, angle: Array) -> Array:
         """Return the lengths that spools at angles (m, k), rad, wind in of their k' cords, shape (m, k'), m."""

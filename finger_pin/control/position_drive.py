@@ -158,7 +158,7 @@ class PositionDrives:
 
         From when it is let go a motor has `OPEN_CIRCUIT`.
         """
-        return self.compiled.held(self.compiled.voltages, time)
+        return self.compiled.zero_order_hold(self.compiled.voltages, time)
 
 
 def spool_goals(
@@ -202,7 +202,7 @@ class SteppedDrives:
 
     def reset(self) -> None:
         """Forget all samples."""
-        self._drives.taken[:], self._drives.integral[:] = 0, 0.0
+        self._drives.sample_count[:], self._drives.integral[:] = 0, 0.0
 
     def voltages(self, time: float, x: Array, goals: Array) -> Array:
         """Return the voltages of a sample, shape (m,), V, at a packed state, for goals of spools, shape (m,), rad."""
@@ -283,12 +283,12 @@ def build_drives(
         period=loop_period(finger),
         first=0.0 if memory is None else -memory.age,
         goals=np.ascontiguousarray(goals),
-        given=np.full(goals.shape, np.nan) if voltages is None else voltages,
+        prescribed_voltages=np.full(goals.shape, np.nan) if voltages is None else voltages,
         resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
         gains=np.ascontiguousarray(np.array([[e.proportional, e.derivative, e.integral] for e in loops]).T),
         torque_off=np.array([np.inf if each.torque_off is None else each.torque_off for each in loops]) - start_time,
         supply=np.array([each.motor.voltage for each in chosen]),
-        taken=np.zeros(1, dtype=np.int64),
+        sample_count=np.zeros(1, dtype=np.int64),
         integral=np.zeros(len(chosen)),
         last=np.zeros(len(chosen)),
         voltages=np.zeros(goals.shape),
@@ -296,6 +296,6 @@ def build_drives(
         integrals=np.zeros(goals.shape),
     )
     if memory is not None:
-        drives.taken[:], drives.last[:], drives.integral[:] = 1, memory.error, memory.integral
+        drives.sample_count[:], drives.last[:], drives.integral[:] = 1, memory.error, memory.integral
         drives.errors[:2], drives.integrals[:2], drives.voltages[:2] = memory[1:]
     return drives

@@ -67,13 +67,13 @@ class Subset:
         ranges = [np.arange(start[k], start[k + 1]) for start, places in starts for k in self.kept[places]]
         self.keep(axis, np.concatenate([np.zeros(0, dtype=np.int64), *ranges]), int(starts[-1][0][-1]))
 
-    def of(self, table: _Table) -> _Table:
+    def select(self, table: _Table) -> _Table:
         """Return the table of this part; fields without axes stay as they are.
 
         Tables of one type have the same integers.
         """
         known = self._integers.get(type(table), {})
-        found: dict[str, Any] = dict(known)
+        fields: dict[str, Any] = dict(known)
         ends: dict[str, int] = {}
         for name, (axes, of, starts) in _fields(table):
             if name in known:
@@ -81,16 +81,16 @@ class Subset:
             value = getattr(table, name)
             if starts:
                 counts = np.diff(value)[self.kept[axes[0]]]
-                found[name] = ends.get(starts, 0) + np.append(0, np.cumsum(counts))
-                ends[starts] = int(found[name][-1])
+                fields[name] = ends.get(starts, 0) + np.append(0, np.cumsum(counts))
+                ends[starts] = int(fields[name][-1])
                 continue
             for place, axis in enumerate(axes):
                 if axis in self.kept:
                     value = value.take(self.kept[axis], axis=place)
-            found[name] = self.new[of][value] if of else value
+            fields[name] = self.new[of][value] if of else value
         if not known:
-            self._integers[type(table)] = {name: each for name, each in found.items() if each.dtype == np.int64}
-        return table._replace(**found)
+            self._integers[type(table)] = {name: each for name, each in fields.items() if each.dtype == np.int64}
+        return table._replace(**fields)
 
 
 def _fields(table: NamedTuple) -> Any:

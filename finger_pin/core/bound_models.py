@@ -16,7 +16,7 @@ from finger_pin.core.evaluation.linearisation import linearise
 from finger_pin.core.evaluation.moving_base import base_power, bias_rate, move_base
 from finger_pin.core.evaluation.path_derivatives import linearise_paths
 from finger_pin.core.evaluation.paths import look
-from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
+from finger_pin.core.evaluation.state_batches import STATES, States, evaluate_many
 from finger_pin.core.inputs import InputTable, held_control
 from finger_pin.core.jit import call, copied, nothing, pack
 from finger_pin.core.linear_systems import Linear, build_linear
@@ -51,30 +51,30 @@ class SignalBuffer(NamedTuple):
     def part(self, at: slice) -> SignalBuffer:
         """Return the buffer of some of the states, the same memory."""
         first = self.first + at.indices(len(self.packed))[0]
-        own = (self.packed, self.rates, self.torques, self.externals, self.energy_terms, self.touches)
-        packed, rates, torques, externals, energy_terms, touches = (values[at] for values in own)
+        arrays = (self.packed, self.rates, self.torques, self.externals, self.energy_terms, self.touches)
+        packed, rates, torques, externals, energy_terms, touches = (values[at] for values in arrays)
         return SignalBuffer(packed, rates, self.rows, first, self.column, torques, externals, energy_terms, touches)
 
     def states(
         self, at: slice, model: int, states: Array, commands: Array, forces: Array, bases: Array, attitudes: Array
     ) -> States:
         """Return some states with the arrays of their signals, for the model at an address."""
-        own = self.part(at)
+        buffer = self.part(at)
         return States(
             model=model,
             states=states[at],
             commands=commands[at],
             forces=forces[at],
-            rates=own.rates,
-            rows=own.rows,
-            first=own.first,
-            column=own.column,
-            torques=own.torques,
-            externals=own.externals,
-            energy_terms=own.energy_terms,
+            rates=buffer.rates,
+            rows=buffer.rows,
+            first=buffer.first,
+            column=buffer.column,
+            torques=buffer.torques,
+            externals=buffer.externals,
+            energy_terms=buffer.energy_terms,
             bases=bases[at],
             attitudes=attitudes[at],
-            touches=own.touches,
+            touches=buffer.touches,
         )
 
 
@@ -140,11 +140,10 @@ class Models:
         Each has memory of its own: without loads, nothing writes where loads have left their torques.
         """
         if (loaded, thread) not in self._known:
-            tables = self.tables
-            own = copied(tables)._replace(has_tip_force=loaded)
-            work = build_work(own, self._laws, self._channels)
+            tables = copied(self.tables)._replace(has_tip_force=loaded)
+            work = build_work(tables, self._laws, self._channels)
             control = held_control(self._channels, len(work.torque))
-            self._known[loaded, thread] = BoundModel(own, control, work, self._moved, False)
+            self._known[loaded, thread] = BoundModel(tables, control, work, self._moved, False)
         return self._known[loaded, thread]
 
 
@@ -180,15 +179,15 @@ def fill(
     else:
         half = count // 2
         pair = (models.model(loaded), models.model(loaded, 1))
-        in_threads(lambda each: fill_part(*each), list(zip(pair, (slice(half), slice(half, None)), strict=True)))
+        in_threads(lambda share: fill_part(*share), list(zip(pair, (slice(half), slice(half, None)), strict=True)))
 
 
 def path_motions(base: Array | None, count: int, prescribed: int) -> Array:
     """Return the motions of the base and of the prescribed coordinates, shape (count, 15 + g), or no rows at rest."""
     if base is None:
         return np.zeros((0, 15 + prescribed))
-    given = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + prescribed]], axis=-1)
-    return rows_of(given, (count, 15 + prescribed))
+    motions = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + prescribed]], axis=-1)
+    return rows_of(motions, (count, 15 + prescribed))
 
 
 def rows_of(values: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from finger_pin.core.bound_models import FEW, Models, SignalBuffer, fill, path_motions, rows_of
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import ROW
-from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
+from finger_pin.core.evaluation.state_batches import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
 from finger_pin.description.caching import cached_property
@@ -27,7 +27,7 @@ _Asked = tuple[Motions, Array, Block]
 
 
 class CompiledMechanism:
-    """Evaluates a mechanism without Python inside; not to be shared between threads.
+    """Compiled evaluation of a mechanism; not to be shared between threads.
 
     Attributes:
         mechanism: The mechanism.
@@ -39,7 +39,7 @@ class CompiledMechanism:
     def __init__(self, mechanism: Mechanism) -> None:
         """Read a mechanism."""
         self.mechanism = mechanism
-        self.charts = Charts.of(mechanism)
+        self.charts = Charts.from_mechanism(mechanism)
         self.tables = build_tables(mechanism)
         size = 2 * len(self.tables.prescribed) + len(self.tables.state_row)
         if self.charts.size != size:
@@ -98,21 +98,21 @@ class CompiledMechanism:
                 acceleration[:, i : i + 3] += np.stack([b * c, -a * c, a * b], axis=1)
             moving = mechanism.body.position_rate(q[:, : mechanism.body.model.nq], v[:, :joints])
             rate = np.concatenate([moving, v[:, joints:], acceleration, rates[:, 2 * width :]], axis=1)
-        found, begin = {}, 0
+        signals, begin = {}, 0
         for table in mechanism.rows:
             end = begin + table.count
-            own, arms, begin = rows[:, at, begin:end], table.law.arms, end
+            columns, arms, begin = rows[:, at, begin:end], table.law.arms, end
             if buffer.column == ROW.force:
-                found[table.group] = RowSignals(table, None, own[0], own[0, ..., :0], ())
+                signals[table.group] = RowSignals(table, None, columns[0], columns[0, ..., :0], ())
                 continue
             stateful = np.arange(table.count) % arms > 0 if arms > 1 else slice(None)
-            row = Row(*own[: len(Row._fields)])._replace(state=own[ROW.state][..., stateful], side=0.0)
-            shown = tuple(own[ROW.signals + i, ..., ::arms] for i in range(len(table.law.signals)))
-            of_states = own[ROW.rate][..., stateful]
-            found[table.group] = RowSignals(table, table.law.arguments(row), own[ROW.force], of_states, shown)
+            row = Row(*columns[: len(Row._fields)])._replace(state=columns[ROW.state][..., stateful], side=0.0)
+            shown = tuple(columns[ROW.signals + i, ..., ::arms] for i in range(len(table.law.signals)))
+            of_states = columns[ROW.rate][..., stateful]
+            signals[table.group] = RowSignals(table, table.law.arguments(row), columns[ROW.force], of_states, shown)
         return Evaluation(
             mechanism.energies,
-            found,
+            signals,
             buffer.torques[at],
             buffer.externals[at],
             acceleration[at],
@@ -143,8 +143,8 @@ class CompiledMechanism:
         loaded = force is not None and bool(np.any(force))
         forces = np.zeros((count, tips, 3))
         if loaded:
-            given = np.asarray(force, dtype=float)
-            forces[...] = given[..., None, :] if tips == 1 else given
+            tip_force = np.asarray(force, dtype=float)
+            forces[...] = tip_force[..., None, :] if tips == 1 else tip_force
         states, attitudes = buffer.packed, np.zeros((count, 0, 4))
         if self.charts.quaternions:
             states, attitudes = self.charts.to_core(states)
@@ -159,8 +159,8 @@ class CompiledMechanism:
         count = 1 if alone else len(position)
         # A few postures after the other are asked for in loops: what is bound once serves them all.
         kept = count < FEW and base is None
-        found = self._motions.get(count) if kept else None
-        motions, tips, block = found or self._bound_motions(count, base)
+        buffers = self._motions.get(count) if kept else None
+        motions, tips, block = buffers or self._bound_motions(count, base)
         if kept:
             self._motions[count] = motions, tips, block
         motions.positions[:], motions.velocities[:] = position, velocity
@@ -183,7 +183,7 @@ class CompiledMechanism:
 
 
 class CompiledFinger:
-    """Evaluates a finger without Python inside; not to be shared between threads.
+    """Compiled evaluation of a finger; not to be shared between threads.
 
     Attributes:
         finger: The finger.
@@ -204,8 +204,8 @@ class CompiledFinger:
         outputs: Outputs = "all",
     ) -> FingerSignals:
         """Return the signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
-        found = self.mechanism.evaluate(x, command, fingertip_force, base, outputs)
-        return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
+        evaluation = self.mechanism.evaluate(x, command, fingertip_force, base, outputs)
+        return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, evaluation)
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.evaluation.signals import STATES, evaluate_many
+from finger_pin.core.evaluation.state_batches import STATES, evaluate_many
 from finger_pin.core.jit import Block, pack
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
@@ -22,7 +22,7 @@ _MOTION = ("tip", "kinetic_energy", "potential_energy")
 
 
 class CompiledFingers:
-    """Evaluates m fingers as `CompiledFinger` evaluates m states of one; not to be shared between threads.
+    """Compiled evaluation of m fingers, each at a state; not to be shared between threads.
 
     What it returns is overwritten by the next evaluation.
     """
@@ -56,7 +56,7 @@ class CompiledFingers:
         return partial(CompiledFingers, accelerated=self._accelerated), (self._fingers,)
 
     def replace(self, index: int, finger: CompiledFinger) -> None:
-        """Put another finger in the place of one, or the same with other numbers."""
+        """Replace a finger by another one, or by itself with other parameters."""
         if finger is not self._fingers[index]:
             self._fingers[index], self._first = finger, self._fingers[0]
             for kind, blocks in self._blocks.items():
@@ -72,20 +72,20 @@ class CompiledFingers:
             [table for table in each.finger.mechanism.rows if table.group in each.finger.tendon_rows] for each in pair
         ]
         pairs = zip(*rows, strict=True)
-        alike = all(own.arm is other.arm or np.array_equal(own.arm, other.arm) for own, other in pairs)
+        same_arms = all(one.arm is other.arm or np.array_equal(one.arm, other.arm) for one, other in pairs)
         at_home = finger is self._mover
         if not at_home:
             tables = [each.mechanism.tables for each in (finger, self._mover)]
             bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in tables]
             at_home = all(map(np.array_equal, *bodies))
-        return not alike or any(table.routed for table in rows[0]), not at_home
+        return not same_arms or any(table.routed for table in rows[0]), not at_home
 
     def _bound(self, index: int, loaded: bool, moved: bool) -> Block:
         """Return a block with a finger, its state, and the arrays of its signals."""
         model = self._fingers[index].mechanism.models.model(loaded)
         bases = self._bases if moved else self._bases[:0]
-        given = (self._states, self._commands, self._forces, bases, self._attitudes)
-        return pack(self._buffer.states(slice(index, index + 1), model.address, *given), STATES)
+        inputs = (self._states, self._commands, self._forces, bases, self._attitudes)
+        return pack(self._buffer.states(slice(index, index + 1), model.address, *inputs), STATES)
 
     def evaluate(
         self,
@@ -111,14 +111,14 @@ class CompiledFingers:
             self._blocks[kind] = [self._bound(index, *kind) for index in range(len(self._fingers))]
         for block in self._blocks[kind]:
             evaluate_many(block.address)
-        found = mechanism.to_evaluation(self._buffer)
-        signals = self._first.finger.signals(x, command, fingertip_force, found)
+        evaluation = mechanism.to_evaluation(self._buffer)
+        signals = self._first.finger.signals(x, command, fingertip_force, evaluation)
         if not self._differs[:, 0].any():
             return signals
 
         def tendon_torque() -> Array:
-            own = [each.mechanism.to_evaluation(self._buffer, index).rows for index, each in enumerate(self._fingers)]
-            return np.array([each.finger.tendon_torque(*at) for each, *at in zip(self._fingers, x, own, strict=True)])
+            rows = [each.mechanism.to_evaluation(self._buffer, index).rows for index, each in enumerate(self._fingers)]
+            return np.array([each.finger.tendon_torque(*at) for each, *at in zip(self._fingers, x, rows, strict=True)])
 
         return replace(signals, compute_tendon_torque=tendon_torque)
 
@@ -135,6 +135,8 @@ class CompiledFingers:
         if not self._differs[:, 1].any() and base is None:
             return self._mover.motion(position, velocity)
         bases = [None] * len(position) if base is None else base
-        found = [each.motion(*given) for each, *given in zip(self._fingers, position, velocity, bases, strict=True)]
-        tips, kinetic, potential = (np.array([getattr(each, name) for each in found]) for name in _MOTION)
+        motions = [
+            each.motion(*arguments) for each, *arguments in zip(self._fingers, position, velocity, bases, strict=True)
+        ]
+        tips, kinetic, potential = (np.array([getattr(each, name) for each in motions]) for name in _MOTION)
         return Motion(tips, kinetic, potential)

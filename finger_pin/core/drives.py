@@ -32,12 +32,12 @@ class Drives(NamedTuple):
         period: s.
         first: Time of the first sample, s; not above zero, and negative where a run goes on.
         goals: theta_m^d at the samples, one every period, shape (k, m), rad; the last one is kept.
-        given: In place of what a loop asks for, at the same times, shape (k, m), V; not numbers where it runs.
+        prescribed_voltages: Voltages at the same times in place of a loop's, shape (k, m), V; NaN where the loop runs.
         resolution: Step of the measured angles, 0 for none, shape (m,), rad.
         gains: k_p, k_d, k_i, shape (3, m).
         supply: V, shape (m,), V.
         torque_off: Times from which on no current flows, shape (m,), s.
-        taken: Memory, the number of samples so far, shape (1,).
+        sample_count: Memory, the number of samples so far, shape (1,).
         integral: Memory, int e, shape (m,).
         last: Memory, e of the last sample, shape (m,).
         voltages: Memory, U from every sample on, shape (k, m), V.
@@ -51,25 +51,25 @@ class Drives(NamedTuple):
     period: float
     first: float
     goals: Matrix
-    given: Matrix
+    prescribed_voltages: Matrix
     resolution: Vector
     gains: Matrix
     supply: Vector
     torque_off: Vector
-    taken: Indices
+    sample_count: Indices
     integral: Vector
     last: Vector
     voltages: Matrix
     errors: Matrix
     integrals: Matrix
 
-    def held(self, values: Array, time: Array | float) -> Array:
-        """Return values of samples, shape (k, m), held at one time, or at times; an instant belongs to its sample."""
-        found: Array = values[np.clip(self.latest(time), 0, len(values) - 1)]
-        return found
+    def zero_order_hold(self, values: Array, time: Array | float) -> Array:
+        """Return samples, shape (k, m), held until the next, at one time or more; an instant belongs to its sample."""
+        held_values: Array = values[np.clip(self.latest(time), 0, len(values) - 1)]
+        return held_values
 
     def latest(self, time: Array | float) -> Indices:
-        """Return the numbers of the last samples at one time, or at times; one within rounding has been taken."""
+        """Return the numbers of the last samples at one time, or at times; one within rounding counts."""
         latest: Indices = np.floor((np.asarray(time) - self.first) / self.period * (1.0 + 1e-12)).astype(int)
         return latest
 
@@ -80,14 +80,14 @@ class AdvanceDrivenArgs(NamedTuple):
     Attributes:
         drives: The loops.
         args: Address of the bound `AdvanceArgs`.
-        advance: Address of what is called to advance, and is given ``given``.
-        given: Address of a block.
+        advance: Address of what is called to advance, with the block at ``advance_args``.
+        advance_args: Address of a block.
     """
 
     drives: Drives
     args: int
     advance: int
-    given: int
+    advance_args: int
 
 
 ADVANCE_DRIVEN_ARGS = StructType(AdvanceDrivenArgs)
@@ -96,13 +96,13 @@ ADVANCE_DRIVEN_ARGS = StructType(AdvanceDrivenArgs)
 def sample(drives: Drives, time: float, x: Vector, tension: Vector) -> None:
     """Take a sample of all motors at a time, s, and set their voltages."""
     last = drives.goals.shape[0] - 1
-    k = min(drives.taken[0], last)
+    k = min(drives.sample_count[0], last)
     for j in drives.motors:
         angle, step = x[drives.places[j]], drives.resolution[j]
         if step > 0.0:
             angle = np.round(angle / step) * step
         error = drives.goals[k, j] - angle
-        rate = (error - drives.last[j]) / drives.period if drives.taken[0] > 0 else 0.0
+        rate = (error - drives.last[j]) / drives.period if drives.sample_count[0] > 0 else 0.0
         drives.last[j] = error
         summed = drives.integral[j] + error * drives.period
         duty = drives.gains[0, j] * error + drives.gains[1, j] * rate + drives.gains[2, j] * summed
@@ -110,8 +110,8 @@ def sample(drives: Drives, time: float, x: Vector, tension: Vector) -> None:
             # The integral stands still while the supply is at its limit.
             drives.integral[j] = summed
         voltage = drives.supply[j] * min(max(duty, -1.0), 1.0)
-        if not np.isnan(drives.given[k, j]):
-            voltage = drives.given[k, j]
+        if not np.isnan(drives.prescribed_voltages[k, j]):
+            voltage = drives.prescribed_voltages[k, j]
         if time * (1.0 + 1e-12) >= drives.torque_off[j]:
             voltage = OPEN_CIRCUIT
         # Until the next one is taken, perhaps never.
@@ -120,7 +120,7 @@ def sample(drives: Drives, time: float, x: Vector, tension: Vector) -> None:
         drives.errors[k, j] = drives.errors[after, j] = error
         drives.integrals[k, j] = drives.integrals[after, j] = drives.integral[j]
         tension[drives.channels[j]] = voltage
-    drives.taken[0] += 1
+    drives.sample_count[0] += 1
 
 
 _sample = njit_always_inline(sample)
@@ -138,14 +138,14 @@ def advance_driven(address: int, end: float) -> int:
     model = unpack(integration.model, MODEL)
     memory, times = integration.memory, args.times
     while True:
-        due = drives.first + drives.taken[0] * drives.period
+        due = drives.first + drives.sample_count[0] * drives.period
         if memory.time[0] * (1.0 + 1e-12) >= due:
             _sample(drives, due, integration.x, model.control.tension)
-            due = drives.first + drives.taken[0] * drives.period
+            due = drives.first + drives.sample_count[0] * drives.period
         if memory.time[0] >= end:
             return DONE
-        if args.taken[0] == args.taken[1] and times.size > 0:
+        if args.record_range[0] == args.record_range[1] and times.size > 0:
             return FULL
-        status: int = call_at(driven.advance, driven.given, min(end, due))
+        status: int = call_at(driven.advance, driven.advance_args, min(end, due))
         if status != DONE:
             return status

@@ -79,26 +79,26 @@ def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> 
     labels = _connected(first, second, total)
     # What no coordinate feels, such as friction of a cord whose points all stand still, is the first one's.
     labels[~np.isin(labels, labels[:width])] = labels[0]
-    found: list[Island] = []
+    islands: list[Island] = []
     unread = np.setdiff1d(np.arange(channels), tables.channel)
     for label in dict.fromkeys(labels[:width].tolist()):
         rows = np.flatnonzero(labels[row_at:loop_at] == label)
         fed = tables.channel[rows]
         states = tables.state[rows]
-        found.append(
+        islands.append(
             Island(
                 coordinates=np.flatnonzero(labels[:width] == label),
                 rows=rows,
                 states=np.sort(states[states >= 0]),
                 # What nobody reads is the first one's.
-                channels=np.union1d(fed[fed >= 0], unread if not found else []).astype(np.int64),
+                channels=np.union1d(fed[fed >= 0], unread if not islands else []).astype(np.int64),
                 planned=np.flatnonzero(labels[loop_at + control.loop] == label)
                 if planned
                 else np.zeros(0, dtype=np.int64),
                 tips=np.flatnonzero((tables.tip_body >= 0) & (labels[tables.tip_body] == label) if bodies else []),
             )
         )
-    return found
+    return islands
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class Selection:
     contact_rows: int
 
     @classmethod
-    def of(cls, tables: Tables, island: Island) -> Selection:
+    def from_island(cls, tables: Tables, island: Island) -> Selection:
         """Return the part that an island has of tables."""
         rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.prescribed)
         bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
@@ -146,7 +146,7 @@ class Selection:
         part.keep_entries(paths, "leg")
         part.keep("piece", np.unique(paths.piece[part.kept["leg"]]), len(paths.columns))
         part.keep_entries(paths, "mover")
-        groups = part.of(tables.groups)._replace(first=ends[:-1], end=ends[1:])
+        groups = part.select(tables.groups)._replace(first=ends[:-1], end=ends[1:])
         return cls(island, part, groups, present, int(np.count_nonzero(tables.touch[rows])))
 
     def tables(self, tables: Tables) -> Tables:
@@ -154,8 +154,10 @@ class Selection:
         part = self.subset
         if part is None:
             return tables
-        own = part.of(tables)
-        return own._replace(groups=self.groups, contact_rows=self.contact_rows, paths=part.of(tables.paths))
+        island_tables = part.select(tables)
+        return island_tables._replace(
+            groups=self.groups, contact_rows=self.contact_rows, paths=part.select(tables.paths)
+        )
 
     def control(self, control: InputTable) -> InputTable:
         """Return the inputs of the island."""
@@ -169,7 +171,7 @@ class Selection:
         part.keep("loop", np.unique(control.loop[island.planned]), len(control.level))
         schedule = _chosen(control.schedule, island.channels)
         force = _chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel())
-        return part.of(control)._replace(schedule=schedule, force=force)
+        return part.select(control)._replace(schedule=schedule, force=force)
 
 
 @memoised(_wires)
@@ -181,7 +183,7 @@ def selections(tables: Tables, control: InputTable) -> list[Selection]:
         raise RuntimeError(f"islands have the states {states.tolist()} of {len(tables.state_row)}")
     if len(islands) == 1:
         return [Selection(islands[0], None, tables.groups, np.arange(len(tables.groups.first)), tables.contact_rows)]
-    return [Selection.of(tables, island) for island in islands]
+    return [Selection.from_island(tables, island) for island in islands]
 
 
 def _chosen(signal: SignalTable, functions: Indices) -> SignalTable:

@@ -26,7 +26,7 @@ class PieceBodies(NamedTuple):
 
 
 class LookColumns(NamedTuple):
-    """Columns of looks at a gap: the share of the step, the gap, its normal, how far the core of one body is."""
+    """Columns of looks at a gap: the share of the step, the gap, its normal, the distance of one body's core."""
 
     share: int
     gap: int
@@ -134,7 +134,7 @@ class PathWork(NamedTuple):
         push: Force of a contact on the first body, shape (E, 3), N.
         length: Of every row, shape (K,).
         turn: Of every row, shape (K,).
-        seen: All three as each piece's frame sees them, shape (E, 9), m.
+        local_points: All three points in the piece's frame, shape (E, 9), m.
         gather: Shape (N,).
         slopes: Of a shape, shape (SLOPES,).
         wrench_slope: Derivatives of the wrenches by the coordinates that move them, shape (entries, COLUMNS, WRENCH).
@@ -161,7 +161,7 @@ class PathWork(NamedTuple):
     push: Matrix
     length: Vector
     turn: Vector
-    seen: Matrix
+    local_points: Matrix
     gather: Vector
     slopes: Vector
     turn_slope: Vector
@@ -183,8 +183,8 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
     for row, piece in zip(parameters, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in row]) for row in ends]
-    carrying = Carrying.of(chains)
-    found = [motion_bounds(piece, *each, last, carrying) for piece, each in zip(pieces, entries, strict=True)]
+    carrying = Carrying.from_chains(chains)
+    bounds = [motion_bounds(piece, *each, last, carrying) for piece, each in zip(pieces, entries, strict=True)]
     halves = [0.5 * float(np.linalg.norm(row[3:6] - row[:3])) for row in points]
     rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
     carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
@@ -205,8 +205,8 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         start=np.cumsum([0, *(len(at) for at, _ in entries)]),
         at=np.concatenate([np.zeros(0, dtype=np.int64), *(at for at, _ in entries)]),
         moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
-        motion_bounds=np.concatenate([np.zeros(0), *(each for each, _ in found)]),
-        opposing_coordinate=np.concatenate([np.zeros(0, dtype=np.int64), *(others for _, others in found)]),
+        motion_bounds=np.concatenate([np.zeros(0), *(each for each, _ in bounds)]),
+        opposing_coordinate=np.concatenate([np.zeros(0, dtype=np.int64), *(others for _, others in bounds)]),
         cores=np.array([half + piece.breadth for half, piece in zip(halves, pieces, strict=True)]),
         extents=np.array([piece.extent for piece in pieces], dtype=float),
         row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
@@ -224,11 +224,11 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
 
 def reached(paths: Paths, count: int, width: int) -> NDArray[np.bool_]:
     """Return a mask of the coordinates that the paths of every row depend on, shape (K, N)."""
-    found = np.zeros((count, width), dtype=bool)
+    mask = np.zeros((count, width), dtype=bool)
     for k, begin, end in zip(paths.rows, paths.leg_start[:-1], paths.leg_start[1:], strict=True):
         for e in paths.piece[begin:end]:
-            found[k, paths.at[paths.start[e] : paths.start[e + 1]]] = True
-    return found
+            mask[k, paths.at[paths.start[e] : paths.start[e + 1]]] = True
+    return mask
 
 
 def _movers(bodies: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -268,7 +268,7 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         push=np.zeros((pieces, 3)),
         length=np.zeros(count),
         turn=np.zeros(count),
-        seen=np.zeros((pieces, 9)),
+        local_points=np.zeros((pieces, 9)),
         gather=np.zeros(width),
         slopes=np.zeros(SLOPES),
         turn_slope=np.zeros(entries),

@@ -59,14 +59,14 @@ def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
     rows = mechanism.rows
     ends = np.cumsum([0, *(table.count for table in rows)])
     state, touch = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    for table, own, begin, end in zip(rows, mechanism.states, ends[:-1], ends[1:], strict=True):
+    for table, places, begin, end in zip(rows, mechanism.states, ends[:-1], ends[1:], strict=True):
         stateful = np.arange(begin, end)
         if table.law.arms > 1:
             touch[begin:end] = 2
             touch[begin : end : table.law.arms] = 1
             stateful = stateful[touch[begin:end] == 2]
         if table.states:
-            state[stateful] = np.arange(own.start, own.stop)
+            state[stateful] = np.arange(places.start, places.stop)
     return {
         "state": state,
         "state_row": np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
@@ -116,9 +116,9 @@ def _of_wiring(mechanism: Mechanism) -> dict[str, Any]:
                 continue
             for k in range(table.count):
                 for group, matrix in weighted.items():
-                    found = np.flatnonzero(matrix[k])
-                    terms.extend(first_row[group] + found)
-                    weights.extend(matrix[k, found])
+                    sources = np.flatnonzero(matrix[k])
+                    terms.extend(first_row[group] + sources)
+                    weights.extend(matrix[k, sources])
                 starts[-1].append(len(terms))
     channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
     return {

@@ -154,10 +154,10 @@ def build_tables(mechanism: Mechanism) -> Tables:
 def _parameters(rows: Sequence[Rows]) -> Array:
     """Return the parameters of the laws of all rows, shape (most parameters, K)."""
     ends = np.cumsum([0, *(table.count for table in rows)])
-    found = np.zeros((max((len(table.law.parameters) for table in rows), default=0), ends[-1]))
+    parameters = np.zeros((max((len(table.law.parameters) for table in rows), default=0), ends[-1]))
     for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True):
-        found[: len(table.parameters), begin : end : table.law.arms] = table.parameters
-    return found
+        parameters[: len(table.parameters), begin : end : table.law.arms] = table.parameters
+    return parameters
 
 
 def _wired(mechanism: Mechanism) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""Threads, for tasks that hold no lock of Python; and the memory of the machine."""
+"""Threads for tasks that release the GIL, and the memory of the machine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 _Item = TypeVar("_Item")
-_Found = TypeVar("_Found")
+_Result = TypeVar("_Result")
 
 
 # In a container of Linux: time that all its processes may use, and in which time, us.
@@ -41,21 +41,21 @@ def threads() -> int:
     return usable_cores() if threading.current_thread() is threading.main_thread() else 1
 
 
-def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[_Found]:
-    """Return the results of a task that holds no lock of Python, done for all items side by side, in their order.
+def in_threads(task: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    """Return the results of a task that releases the GIL, done for all items side by side, in their order.
 
     Only what the main thread does is spread: who runs many at once has no core to spare.
     """
     workers = min(len(items), threads())
     if workers < 2:
         return [task(item) for item in items]
-    found: dict[int, _Found] = {}
+    results: dict[int, _Result] = {}
     # Whoever is free takes the next one.
     left = iter(range(len(items)))
 
     def work() -> None:
         for index in left:
-            found[index] = task(items[index])
+            results[index] = task(items[index])
 
     others = [pool().submit(work) for _ in range(workers - 1)]
     try:
@@ -66,7 +66,7 @@ def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[
     for failure in failures:
         if failure is not None:
             raise failure
-    return [found[index] for index in range(len(items))]
+    return [results[index] for index in range(len(items))]
 
 
 @cache

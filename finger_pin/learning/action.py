@@ -24,7 +24,7 @@ from finger_pin.typing import Array
 # Of the tensions that goals of joints stretch tendons by, which turn no joint, the largest, N.
 _CLOSING = 5.0
 # What loops remember of their samples.
-_MEMORY = ("taken", "integral", "last", "voltages", "errors", "integrals")
+_MEMORY = ("sample_count", "integral", "last", "voltages", "errors", "integrals")
 
 
 class Action(LoopController):
@@ -163,7 +163,7 @@ class Action(LoopController):
     def voltages(self, time: Array | float) -> Array:
         """Return the voltages held at one time, or at times (m,), by motor, V."""
         assert self._drives is not None
-        return self._drives.held(self._drives.voltages, time)
+        return self._drives.zero_order_hold(self._drives.voltages, time)
 
     def _places(self, time: Array | float) -> Array:
         return np.maximum(np.searchsorted(self._begins, np.asarray(time) * (1.0 + 1e-12), side="right") - 1, 0)

@@ -110,7 +110,9 @@ class BatchedLoop(ClosedLoop):
     def spool_goals(self, time: Array) -> Array | None:
         """Return the goals of the worlds' motors, each at its own time, shape (w, k), rad."""
         drives = [action.compiled for action in self.actions]
-        goals = [each.held(each.goals, at) for each, at in zip(drives, time, strict=True) if each is not None]
+        goals = [
+            each.zero_order_hold(each.goals, at) for each, at in zip(drives, time, strict=True) if each is not None
+        ]
         return np.array(goals) if goals else None
 
     def wound(self, angle: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, sampled_control
-from finger_pin.core.stepping.batch import IDLE
+from finger_pin.core.stepping.batch_stepper import IDLE
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.caching import cached_property
@@ -134,7 +134,7 @@ class World:
     def _stepper_at(self, x: Array) -> Stepper:
         """Return a stepper that starts from a state, with the loops of the action if there are any."""
         loop, settings = self.origin, self._scenario.simulation
-        stepper = Stepper.of(
+        stepper = Stepper.from_finger(
             loop.finger,
             sampled_control(loop),
             x,
@@ -251,7 +251,7 @@ class World:
         if self.action.compiled is not None:
             stepper.drive(self.action.again())
         replayed = self.action.replayed()
-        trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, held=replayed)
+        trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, controller=replayed)
         # None beyond the end, also by rounding.
         times = np.minimum(np.arange(int(end * sample_rate * (1.0 + 1e-12)) + 1) / sample_rate, end)
         motions = SampledTrajectory(self.loop, trajectory, times)

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from finger_pin.core.stepping.batch import IDLE, BatchStepper
+from finger_pin.core.stepping.batch_stepper import IDLE, BatchStepper
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.exceptions import InputError
 from finger_pin.learning.sensors import measurements

@@ -53,7 +53,7 @@ def _of_loops() -> dict[str, Quantity]:
     def sampled(of: SampledTrajectory, name: str) -> Array:
         assert of.loop.drives is not None and of.loop.drives.compiled is not None
         drives, values = of.loop.drives.compiled, np.zeros((len(of.times), len(of.loop.finger.actuators.names)))
-        values[:, of.loop.finger.actuators.holds] = drives.held(getattr(drives, name), of.times)
+        values[:, of.loop.finger.actuators.holds] = drives.zero_order_hold(getattr(drives, name), of.times)
         return values
 
     texts = (

@@ -167,7 +167,7 @@ class Setup:
             stepper,
             settings.duration,
             loop.finger.layout.names,
-            held=self.sampled,
+            controller=self.sampled,
             knots=knots,
             watch=watch,
             chunk=chunk,
@@ -178,7 +178,7 @@ class Setup:
     def stepper(self, settings: SimulationSettings | None = None) -> Stepper:
         """Return the compiled stepper, at the start, by default at the scenario's tolerances."""
         tolerances, loop = settings or self.scenario.simulation, self.loop
-        return Stepper.of(
+        return Stepper.from_finger(
             loop.finger,
             self.control or sampled_control(loop),
             loop.initial_state(),

@@ -15,7 +15,7 @@ from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import held_control
-from finger_pin.core.stepping.batch import BatchStepper
+from finger_pin.core.stepping.batch_stepper import BatchStepper
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.validation import suggestion
@@ -96,7 +96,7 @@ class Simulator:
         self._palm = PalmPath.from_hand(finger.description.hand, 0.0, finger, self._settings["rtol"])
         control = with_paths(control, self._palm, self._guides)
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
-        self._stepper = Stepper.of(finger, control, rest, **self._settings)
+        self._stepper = Stepper.from_finger(finger, control, rest, **self._settings)
         self._fresh = self._stepper.state_snapshot
         self._compiled = CompiledFinger(finger)
         # Which of the inputs are tensions.

@@ -107,7 +107,7 @@ class StepLog:
             else None,
         )
         again = _Repeated(stepper, knots, inputs, force)
-        trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, held=again)
+        trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, controller=again)
         # Rounding must not take a sample to the other side of a step's end, where other tensions act.
         times = knots[0] + scenario.sample_times()
         near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]

@@ -102,7 +102,7 @@ def test_islands_found_for_other_numbers_of_the_same_wiring_select_the_same_tabl
     found = selections(one, control)
     assert len(found) > 1 and selections(other, control) is found
     for each in found:
-        anew = Selection.of(other, each.island).tables(other)
+        anew = Selection.from_island(other, each.island).tables(other)
         assert all(np.array_equal(*pair) for pair in zip(leaves(each.tables(other)), leaves(anew), strict=True))
     assert any(
         not np.array_equal(*pair)

@@ -254,6 +254,6 @@ def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
 @pytest.mark.slow
 def test_importing_the_core_compiles_nothing(tmp_path):
     environment = os.environ | {"FINGER_PIN_CACHE_DIR": str(tmp_path)}
-    code = "import finger_pin.core.evaluation.signals, finger_pin.core.stepping.rosenbrock"
+    code = "import finger_pin.core.evaluation.state_batches, finger_pin.core.stepping.rosenbrock"
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr, list(tmp_path.iterdir())) == ("", "", [])

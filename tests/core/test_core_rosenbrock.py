@@ -44,7 +44,7 @@ def test_the_interpolant_of_a_step_converges_with_its_order(smooth, method):
     for h in (2.5e-4, 1.25e-4, 6.25e-5):
         recorder = _Recorder(smooth.stepper(method, step=h), 0, 1)
         part = recorder.part
-        assert recorder.advance(h) == integration.DONE and recorder.taken == 1
+        assert recorder.advance(h) == integration.DONE and recorder.step_count == 1
         times = np.linspace(0.0, h, 9)
         found, _ = recorder.steps().interpolate(times)
         np.testing.assert_allclose(found[[0, -1]], [x, part.x], rtol=1e-15, atol=1e-18)

@@ -11,6 +11,7 @@ import numpy as np
 
 from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import ROW
+from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.path_tables import COLUMNS, PIECE, Paths, PathWork
 from finger_pin.core.tables import Tables
@@ -25,28 +26,28 @@ _STRAIGHT_DEFLECTION = 1e-14
 
 
 @njit_always_inline
-def record_start_gaps(tables: Tables, own: PathWork) -> None:
+def record_start_gaps(tables: Tables, pieces: PathWork) -> None:
     """Record the gap of every active pair at the start of a step."""
     paths = tables.paths
     for e in range(paths.columns.size):
-        if paths.columns[e] > 1 and own.culled[paths.row[e]] == 0:
-            own.clear[e], own.far[e] = own.out[e, 0], distance(paths, e, own)
+        if paths.columns[e] > 1 and pieces.culled[paths.row[e]] == 0:
+            pieces.clear[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap], distance(paths, e, pieces)
 
 
 @njit_inline
-def distance(paths: Paths, e: int, own: PathWork) -> float:
+def distance(paths: Paths, e: int, pieces: PathWork) -> float:
     """Return the largest distance of the core of a gap's first body from the origin of its frame, m."""
     total = 0.0
     for c in range(3):
-        middle = 0.5 * (own.seen[e, c] + own.seen[e, 3 + c])
+        middle = 0.5 * (pieces.local_points[e, c] + pieces.local_points[e, 3 + c])
         total += middle * middle
     return np.sqrt(total) + paths.cores[e]
 
 
 @njit_always_inline
-def bound_step_motion(dense: Matrix, k: Matrix, x: Vector, end: Vector, size: int, own: PathWork) -> None:
+def bound_step_motion(dense: Matrix, k: Matrix, x: Vector, end: Vector, size: int, pieces: PathWork) -> None:
     """Bound the motion of a step: fill its interpolant's Bernstein coefficients and the path of each coordinate."""
-    last, control = k.shape[0] - 1, own.control
+    last, control = k.shape[0] - 1, pieces.control
     for j in range(size):
         # (1 - s) x + s end + s (1 - s) (first + s second + s^2 third)
         first, second, step = dense[0, j], dense[1, j], end[j] - x[j]
@@ -56,39 +57,39 @@ def bound_step_motion(dense: Matrix, k: Matrix, x: Vector, end: Vector, size: in
         control[j, 2] = x[j] + 0.5 * step + (first + 0.5 * second) / 3.0
         control[j, 3] = end[j] - 0.25 * (step - first - second - third)
         # The last stage is beside the end by the last increment.
-        own.travel[j] = abs(k[last, j])
+        pieces.travel[j] = abs(k[last, j])
         for i in range(4):
-            own.travel[j] += abs(control[j, i + 1] - control[j, i])
+            pieces.travel[j] += abs(control[j, i + 1] - control[j, i])
 
 
 @njit_always_inline
-def bound_linear_motion(x: Vector, end: Vector, size: int, own: PathWork) -> None:
+def bound_linear_motion(x: Vector, end: Vector, size: int, pieces: PathWork) -> None:
     """Bound a motion along a straight line: fill its Bernstein coefficients and the path of each coordinate."""
     for j in range(size):
         for i in range(5):
-            own.control[j, i] = x[j] + 0.25 * i * (end[j] - x[j])
-        own.travel[j] = abs(end[j] - x[j])
+            pieces.control[j, i] = x[j] + 0.25 * i * (end[j] - x[j])
+        pieces.travel[j] = abs(end[j] - x[j])
 
 
 @njit_inline
-def path_of(tables: Tables, e: int, own: PathWork) -> float:
+def path_of(tables: Tables, e: int, pieces: PathWork) -> float:
     """Return a bound of the relative path of a contact's bodies in the bounded motion, m."""
-    paths, control = tables.paths, own.control
+    paths, control = tables.paths, pieces.control
     endless = np.isinf(paths.extents[e])
     total, turned = 0.0, 0.0
     for s in range(paths.start[e], paths.start[e + 1]):
         j, other, lever = paths.at[s], paths.opposing_coordinate[s], paths.motion_bounds[s]
-        way = own.travel[j]
+        way = pieces.travel[j]
         if other >= 0:
             # Beside what the last stage is off: what both have in common moves neither.
             for i in range(4):
                 one, two = control[j, i + 1] - control[j, i], control[other, i + 1] - control[other, i]
                 way += abs(one - two) - abs(one) - abs(two)
-            way += own.travel[other]
+            way += pieces.travel[other]
         total += lever * way
         if endless and paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and tables.kinds[j] == 0:
             turned += way
-    return widened(total, turned, own.far[e])
+    return widened(total, turned, pieces.far[e])
 
 
 @njit_inline
@@ -107,37 +108,37 @@ def set_culled(k: int, value: int, culled: Indices) -> None:
 
 
 @njit_inline
-def list_active_pairs(tables: Tables, own: PathWork) -> None:
+def list_active_pairs(tables: Tables, pieces: PathWork) -> None:
     """List the active contact pairs."""
     count = 0
     for e in range(tables.contact_rows // COLUMNS):
-        if own.culled[tables.paths.row[e]] == 0:
-            own.active_pairs[count] = e
+        if pieces.culled[tables.paths.row[e]] == 0:
+            pieces.active_pairs[count] = e
             count += 1
-    own.active_pair_count[0] = count
+    pieces.active_pair_count[0] = count
 
 
 @njit_always_inline
-def activate_near(tables: Tables, own: PathWork) -> None:
+def activate_near(tables: Tables, pieces: PathWork) -> None:
     """Activate the pairs that may close in the bounded motion; fill the paths of all."""
     paths = tables.paths
     for e in range(paths.columns.size):
         k = paths.row[e]
         if paths.columns[e] > 1:
-            own.path[e] = path_of(tables, e, own)
-            if own.culled[k]:
-                own.ahead[e] = own.clear[e] - own.path[e]
-                if not own.ahead[e] > 0.0:
-                    set_culled(k, 0, own.culled)
+            pieces.path[e] = path_of(tables, e, pieces)
+            if pieces.culled[k]:
+                pieces.ahead[e] = pieces.clear[e] - pieces.path[e]
+                if not pieces.ahead[e] > 0.0:
+                    set_culled(k, 0, pieces.culled)
 
 
 @njit_always_inline
-def record_end_gaps(tables: Tables, own: PathWork) -> None:
+def record_end_gaps(tables: Tables, pieces: PathWork) -> None:
     """Record the gap of every active pair at the end of a bounded motion."""
     paths = tables.paths
     for e in range(paths.columns.size):
-        if paths.columns[e] > 1 and own.culled[paths.row[e]] == 0:
-            own.ahead[e], own.far[e] = own.out[e, 0] - GAP_ACCURACY, distance(paths, e, own)
+        if paths.columns[e] > 1 and pieces.culled[paths.row[e]] == 0:
+            pieces.ahead[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap] - GAP_ACCURACY, distance(paths, e, pieces)
 
 
 @njit_always_inline
@@ -152,7 +153,7 @@ def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
 
 
 @njit_inline
-def update_culling(tables: Tables, rows: Matrix, own: PathWork, states: Vector) -> bool:
+def update_culling(tables: Tables, rows: Matrix, pieces: PathWork, states: Vector) -> bool:
     """Cull or activate contact pairs at the end of a step, by bounds of their gaps there.
 
     Returns:
@@ -163,32 +164,32 @@ def update_culling(tables: Tables, rows: Matrix, own: PathWork, states: Vector) 
         k = paths.row[e]
         if paths.columns[e] == 1:
             continue
-        near = not own.ahead[e] > _STEPS_AHEAD * own.path[e]
-        if own.culled[k]:
-            own.clear[e] = own.ahead[e]
-            own.far[e] += own.path[e]
+        near = not pieces.ahead[e] > _STEPS_AHEAD * pieces.path[e]
+        if pieces.culled[k]:
+            pieces.clear[e] = pieces.ahead[e]
+            pieces.far[e] += pieces.path[e]
             if near:
                 changed = True
-                set_culled(k, 0, own.culled)
-        elif not near and own.active[e] == 0 and _straighten(tables, rows, k, states):
-            own.clear[e], own.far[e] = own.ahead[e], own.far[e] + own.path[e]
+                set_culled(k, 0, pieces.culled)
+        elif not near and pieces.active[e] == 0 and _straighten(tables, rows, k, states):
+            pieces.clear[e], pieces.far[e] = pieces.ahead[e], pieces.far[e] + pieces.path[e]
             changed = True
-            set_culled(k, 1, own.culled)
+            set_culled(k, 1, pieces.culled)
     return changed
 
 
 @njit_always_inline
-def forget_culled(tables: Tables, own: PathWork, first: int, values: Vector) -> None:
+def forget_culled(tables: Tables, pieces: PathWork, first: int, values: Vector) -> None:
     """Set the states of culled contacts to zero in a vector, in which states of rows begin at a place."""
     for k in range(0, tables.contact_rows, COLUMNS):
-        if own.culled[k]:
+        if pieces.culled[k]:
             for m in range(k + 1, k + COLUMNS):
                 values[first + tables.state[m]] = 0.0
 
 
 @njit_inline
 def activate_all_pairs(tables: Tables, work: Work) -> None:
-    """Make all contact pairs active, as where nothing is known of them."""
+    """Activate all contact pairs, as for a new state."""
     for k in range(tables.contact_rows):
         work.paths.culled[k] = 0
     for e in range(work.paths.path.size):

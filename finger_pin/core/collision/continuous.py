@@ -23,6 +23,7 @@ from finger_pin.core.collision.broad_phase import (
     widened,
 )
 from finger_pin.core.evaluation.law_code import ROW
+from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
 from finger_pin.core.path_tables import LOOK, LOOKS, PIECE, PathWork
@@ -46,8 +47,8 @@ _MEETING_BISECTIONS, _MAX_MEETING_SHARE = 10, 0.999
 
 
 @njit_inline
-def _difference(own: PathWork, j: int, other: int, i: int) -> float:
-    return own.control[j, i] if other < 0 else own.control[j, i] - own.control[other, i]
+def _difference(pieces: PathWork, j: int, other: int, i: int) -> float:
+    return pieces.control[j, i] if other < 0 else pieces.control[j, i] - pieces.control[other, i]
 
 
 @njit_always_inline
@@ -66,7 +67,7 @@ def _between(start: float, end: float, b: _Coefficients) -> _Coefficients:
 
 
 @njit_always_inline
-def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> tuple[float, float]:
+def _bounds(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) -> tuple[float, float]:
     """Return bounds of the path between two moments, and of its distance from its chord, m."""
     paths, far = tables.paths, max(one[LOOK.far], two[LOOK.far])
     endless = np.isinf(paths.extents[e])
@@ -77,11 +78,11 @@ def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> 
         if lever == 0.0 and not carries:
             continue
         whole = (
-            _difference(own, j, other, 0),
-            _difference(own, j, other, 1),
-            _difference(own, j, other, 2),
-            _difference(own, j, other, 3),
-            _difference(own, j, other, 4),
+            _difference(pieces, j, other, 0),
+            _difference(pieces, j, other, 1),
+            _difference(pieces, j, other, 2),
+            _difference(pieces, j, other, 3),
+            _difference(pieces, j, other, 4),
         )
         b0, b1, b2, b3, b4 = _between(one[LOOK.share], two[LOOK.share], whole)
         d0, d1, d2, d3 = b1 - b0, b2 - b1, b3 - b2, b4 - b3
@@ -106,9 +107,9 @@ def _bounds(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> 
 
 
 @njit_always_inline
-def _clear(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> bool:
+def _clear(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) -> bool:
     """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
-    path, bend = _bounds(tables, own, e, one, two)
+    path, bend = _bounds(tables, pieces, e, one, two)
     if one[LOOK.gap] < 0.0 or two[LOOK.gap] < 0.0:
         return path < PARTING_PATH_PER_DEPTH * (abs(one[LOOK.gap]) + abs(two[LOOK.gap])) + MIN_PARTING_PATH
     if path < one[LOOK.gap] + two[LOOK.gap] + _GAP_ROUNDING:
@@ -125,19 +126,23 @@ def _clear(tables: Tables, own: PathWork, e: int, one: Vector, two: Vector) -> b
 
 
 @njit_inline
-def _look(integration: Integration, model: Model, e: int, share: float, seen: Vector) -> None:
+def _look(integration: Integration, model: Model, e: int, share: float, look: Vector) -> None:
     """Store a gap and its slopes at a share of the step."""
-    own, state = model.work.paths, model.state
+    pieces, state = model.work.paths, model.state
     s, c = share, 1.0 - share
     w0, w1, w2, w3, w4 = c**4, 4.0 * c**3 * s, 6.0 * c * c * s * s, 4.0 * c * s**3, s**4
     for j in range(model.tables.parents.size):
-        b = own.control[j]
+        b = pieces.control[j]
         state[j] = w0 * b[0] + w1 * b[1] + w2 * b[2] + w3 * b[3] + w4 * b[4]
     near = call_at(model.look, integration.model, float(e))
-    seen[LOOK.share], seen[LOOK.gap], seen[LOOK.far] = share, own.out[e, 0], distance(model.tables.paths, e, own)
+    look[LOOK.share], look[LOOK.gap], look[LOOK.far] = (
+        share,
+        pieces.out[e, GAP_OUT.gap],
+        distance(model.tables.paths, e, pieces),
+    )
     for r in range(3):
         # Of what is far away the normal is not asked for.
-        seen[LOOK.normal_x + r] = own.out[e, 1 + r] if near else 0.0
+        look[LOOK.normal_x + r] = pieces.out[e, GAP_OUT.normal + r] if near else 0.0
 
 
 @njit_always_inline
@@ -155,20 +160,20 @@ def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: V
 
 
 @njit_inline
-def _scan(integration: Integration, model: Model, e: int, seen: bool) -> float:
+def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -> float:
     """Return the share of the step to a meeting of bodies that part again before its end, or `NOTHING`.
 
-    Those that are not apart at its end have parted too, unless that is ``seen``.
+    Those that are not apart at its end have parted too, unless ``contact_known``: the step knows of it.
     """
-    tables, own = model.tables, model.work.paths
-    looks = own.looks
+    tables, pieces = model.tables, model.work.paths
+    looks = pieces.looks
     _look(integration, model, e, 1.0, looks[1])
     _look(integration, model, e, 0.0, looks[0])
-    own.ahead[e] = looks[1, LOOK.gap] - GAP_ACCURACY
+    pieces.ahead[e] = looks[1, LOOK.gap] - GAP_ACCURACY
     parted, met, depth = looks[0, LOOK.gap] >= 0.0, NOTHING, 1
     while depth > 0:
         one, two = looks[0], looks[depth]
-        if depth < LOOKS - 2 and not _clear(tables, own, e, one, two):
+        if depth < LOOKS - 2 and not _clear(tables, pieces, e, one, two):
             depth += 1
             _look(integration, model, e, 0.5 * (one[LOOK.share] + two[LOOK.share]), looks[depth])
             continue
@@ -181,7 +186,7 @@ def _scan(integration: Integration, model: Model, e: int, seen: bool) -> float:
         for i in range(looks.shape[1]):
             one[i] = two[i]
         depth -= 1
-    return NOTHING if seen else met
+    return NOTHING if contact_known else met
 
 
 @njit_always_inline
@@ -200,34 +205,34 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
 
     It is `MISSED_BY_CULLING` if a culled pair is closed at the end, or may be: it is active now.
     """
-    tables, own, rows, state = model.tables, model.work.paths, model.work.rows, model.state
+    tables, pieces, rows, state = model.tables, model.work.paths, model.work.rows, model.state
     paths, size, first, woken = tables.paths, tables.parents.size, NOTHING, False
-    bound_step_motion(integration.dense, integration.k, integration.x, state, size, own)
+    bound_step_motion(integration.dense, integration.k, integration.x, state, size, pieces)
     for e in range(paths.columns.size):
         if paths.columns[e] == 1:
             continue
-        k, path = paths.row[e], path_of(tables, e, own)
-        own.path[e] = path
-        if own.culled[k]:
-            own.ahead[e] = own.clear[e] - path
-            if own.ahead[e] > 0.0:
+        k, path = paths.row[e], path_of(tables, e, pieces)
+        pieces.path[e] = path
+        if pieces.culled[k]:
+            pieces.ahead[e] = pieces.clear[e] - path
+            if pieces.ahead[e] > 0.0:
                 continue
             share = _scan(integration, model, e, True)
-            if share < NOTHING or own.ahead[e] < 0.0:
+            if share < NOTHING or pieces.ahead[e] < 0.0:
                 # Until it is listed again it exerts nothing, whatever else the step has met.
-                set_culled(k, 0, own.culled)
+                set_culled(k, 0, pieces.culled)
                 woken = True
         else:
-            start, end = own.clear[e], own.out[e, 0]
-            own.ahead[e] = end - GAP_ACCURACY - path
+            start, end = pieces.clear[e], pieces.out[e, GAP_OUT.gap]
+            pieces.ahead[e] = end - GAP_ACCURACY - path
             if min(start, end) >= 0.0 and path < start + end:
                 continue
             if max(start, end) < 0.0 and rows[ROW.side, k] > 0.0:
                 continue
-            ahead = own.ahead[e]
+            ahead = pieces.ahead[e]
             share = _scan(integration, model, e, _pressed(tables, rows, k))
-            own.ahead[e] = ahead
+            pieces.ahead[e] = ahead
         first = min(first, share)
     for j in range(size):
-        state[j] = own.control[j, 4]
+        state[j] = pieces.control[j, 4]
     return MISSED_BY_CULLING if woken else first

@@ -14,6 +14,7 @@ from scipy.special import comb
 from finger_pin.core.collision.broad_phase import GAP_ACCURACY
 from finger_pin.core.collision.continuous import MIN_PARTING_PATH, PARTING_PATH_PER_DEPTH
 from finger_pin.core.evaluation.attitude_charts import Charts
+from finger_pin.core.evaluation.shape_code import GAP_OUT, OUT
 from finger_pin.core.path_tables import PIECE
 from finger_pin.core.stepping.trajectory import Meeting
 from finger_pin.core.tables import build_tables
@@ -45,7 +46,7 @@ class _Meetings:
 
     def __init__(self, mechanism: Mechanism) -> None:
         tables = build_tables(mechanism)
-        self._mechanism, self._charts, self._paths = mechanism, Charts.of(mechanism), tables.paths
+        self._mechanism, self._charts, self._paths = mechanism, Charts.from_mechanism(mechanism), tables.paths
         self._bodies, self._kinds = len(tables.parents), tables.kinds
         pieces = list(dict.fromkeys(leg.piece for table in mechanism.rows for legs in table.paths for leg in legs))
         self._pieces = [(e, piece) for e, piece in enumerate(pieces) if piece.shape.columns > 1]
@@ -57,7 +58,7 @@ class _Meetings:
         self._nodes, self._to_control = nodes, np.linalg.inv(basis)
 
     def __call__(self, start: float, end: float, interpolate: Interpolant) -> float | None:
-        """See `Meeting`; a touch that lasts to the end shows there, in bodies that still approach."""
+        """Return the time of the first meeting that a step passes over, as `Meeting`, None without one."""
         if start != self._time:
             # From another moment than that where the last step ended.
             self._clear[:] = 0.0
@@ -65,8 +66,8 @@ class _Meetings:
         ahead = self._clear - paths
         for e, _ in self._pieces:
             if not ahead[e] > 0.0:
-                ahead[e], found = self._scan(e, start, end, interpolate)
-                first = min(first, found)
+                ahead[e], meeting = self._scan(e, start, end, interpolate)
+                first = min(first, meeting)
         if first < end - _MIN_INTERVAL * max(1.0, abs(end)):
             return first
         self._clear, self._time = ahead, end
@@ -90,20 +91,20 @@ class _Meetings:
         ).sum(axis=0)
         ways = np.where(paths.opposing_coordinate >= 0, against, way[paths.at])
         levers = np.where(ways > 0.0, paths.motion_bounds, 0.0)
-        found = np.zeros(len(paths.columns))
+        bounds = np.zeros(len(paths.columns))
         for e, _ in self._pieces:
-            own = slice(paths.start[e], paths.start[e + 1])
-            found[e] = float(levers[own] @ np.where(levers[own] > 0.0, ways[own], 0.0))
-            carries = (paths.moves[own, PIECE.frame] > paths.moves[own, PIECE.first]) & (
-                self._kinds[paths.at[own]] == 0
+            entries = slice(paths.start[e], paths.start[e + 1])
+            bounds[e] = float(levers[entries] @ np.where(levers[entries] > 0.0, ways[entries], 0.0))
+            carries = (paths.moves[entries, PIECE.frame] > paths.moves[entries, PIECE.first]) & (
+                self._kinds[paths.at[entries]] == 0
             )
-            turned = float(ways[own][carries].sum()) if np.isinf(paths.extents[e]) else 0.0
+            turned = float(ways[entries][carries].sum()) if np.isinf(paths.extents[e]) else 0.0
             if turned > 0.0:
-                distance = self._seen(e, interpolate(np.array([start]))[0])[1]
-                found[e] = (found[e] + turned * distance) / (1.0 - turned) if turned < 1.0 else np.inf
-        return found
+                distance = self._gap_and_distance(e, interpolate(np.array([start]))[0])[1]
+                bounds[e] = (bounds[e] + turned * distance) / (1.0 - turned) if turned < 1.0 else np.inf
+        return bounds
 
-    def _seen(self, e: int, x: Array) -> tuple[float, float]:
+    def _gap_and_distance(self, e: int, x: Array) -> tuple[float, float]:
         """Return a gap at a packed state, and the distance of the first body's core from the second's frame, m."""
         mechanism, piece = self._mechanism, dict(self._pieces)[e]
         q = np.array(x[: mechanism.body.model.nq])
@@ -115,15 +116,15 @@ class _Meetings:
         middle = float(np.linalg.norm(0.5 * (ends[0] + ends[1])))
         if middle > piece.reach:
             return middle - piece.reach, middle + float(self._paths.cores[e])
-        out = np.zeros(16)
+        out = np.zeros(OUT)
         piece.shape.value(np.concatenate(ends), piece.parameters, out)
-        return float(out[0]), middle + float(self._paths.cores[e])
+        return float(out[GAP_OUT.gap]), middle + float(self._paths.cores[e])
 
     def _scan(self, e: int, start: float, end: float, interpolate: Interpolant) -> tuple[float, float]:
         """Return a bound of the gap at the end, and the time at which bodies met that part again; else infinity."""
 
         def gap(time: float) -> float:
-            return self._seen(e, interpolate(np.array([time]))[0])[0]
+            return self._gap_and_distance(e, interpolate(np.array([time]))[0])[0]
 
         def clear(one: tuple[float, float], two: tuple[float, float]) -> bool:
             path = self._ways(one[0], two[0], interpolate)[e]

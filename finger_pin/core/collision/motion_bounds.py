@@ -29,7 +29,7 @@ class Carrying(NamedTuple):
     axes: list[tuple[float, ...] | None]
 
     @classmethod
-    def of(cls, chains: Chains) -> Carrying:
+    def from_chains(cls, chains: Chains) -> Carrying:
         """Return the motions of chains."""
         parents, sliding = chains.parents.tolist(), (chains.kinds == PRISMATIC).tolist()
         slides = [float(most) if each else None for each, most in zip(sliding, chains.slides, strict=True)]
@@ -57,7 +57,7 @@ def motion_bounds(
         carrying: Motions by the bodies.
     """
     parents, slides, distances, axes = carrying
-    found, opposing_coordinate = dict[int, float](), dict[int, int]()
+    bounds, opposing_coordinate = dict[int, float](), dict[int, int]()
     first = max(_length(end.point) for end in piece.ends) + piece.breadth
     # Of what has no end, how far the first body is counts: `far` is added.
     second = _length(piece.frame.translation) + (piece.extent if math.isfinite(piece.extent) else 0.0)
@@ -65,20 +65,20 @@ def motion_bounds(
         at = last[joint]
         while at >= 0:
             most = slides[at]
-            found[at] = reach if most is None else 1.0
+            bounds[at] = reach if most is None else 1.0
             reach += distances[at] if most is None else most
             at = parents[at]
     movers = list(zip(coordinates.tolist(), moves.tolist(), strict=True))
     for at, (one, _, two) in movers:
         if one and two:
-            found[at] = 0.0
+            bounds[at] = 0.0
     twos = [at for at, (one, _, two) in movers if two > one and axes[at]]
     for one in (at for at, (one, _, two) in movers if one > two and axes[at]):
         for two in twos:
             if axes[one] == axes[two]:
-                opposing_coordinate[one], found[two] = two, 0.0
+                opposing_coordinate[one], bounds[two] = two, 0.0
     others = np.array([opposing_coordinate.get(at, -1) for at, _ in movers], dtype=np.int64)
-    return np.array([found.get(at, 0.0) for at, _ in movers]), others
+    return np.array([bounds.get(at, 0.0) for at, _ in movers]), others
 
 
 def _length(vector: Array) -> float:

@@ -77,9 +77,9 @@ def _turn(q: Vector, axis: int, angle: float) -> None:
     """Replace a quaternion by its product with a turn about a body axis."""
     cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle)
     second, third = (axis + 1) % 3, (axis + 2) % 3
-    own, scalar, along, across = q[axis], q[3], q[second], q[third]
-    q[axis] = cosine * own + sine * scalar
-    q[3] = cosine * scalar - sine * own
+    about, scalar, along, across = q[axis], q[3], q[second], q[third]
+    q[axis] = cosine * about + sine * scalar
+    q[3] = cosine * scalar - sine * about
     q[second] = cosine * along + sine * across
     q[third] = cosine * across - sine * along
 
@@ -95,17 +95,17 @@ def angular_velocity(angles: Array, rates: Array) -> Array:
 
 def turned(attitude: Array, angles: Array) -> Array:
     """Return quaternions (x, y, z, w) after turns about the body's x, y and z axes, shape (..., 4)."""
-    found = attitude
+    quaternions = attitude
     for axis in range(3):
         cosine, sine = np.cos(0.5 * angles[..., axis]), np.sin(0.5 * angles[..., axis])
         second, third = (axis + 1) % 3, (axis + 2) % 3
-        new = np.empty_like(found)
-        new[..., axis] = cosine * found[..., axis] + sine * found[..., 3]
-        new[..., 3] = cosine * found[..., 3] - sine * found[..., axis]
-        new[..., second] = cosine * found[..., second] + sine * found[..., third]
-        new[..., third] = cosine * found[..., third] - sine * found[..., second]
-        found = new
-    return found
+        new = np.empty_like(quaternions)
+        new[..., axis] = cosine * quaternions[..., axis] + sine * quaternions[..., 3]
+        new[..., 3] = cosine * quaternions[..., 3] - sine * quaternions[..., axis]
+        new[..., second] = cosine * quaternions[..., second] + sine * quaternions[..., third]
+        new[..., third] = cosine * quaternions[..., third] - sine * quaternions[..., second]
+        quaternions = new
+    return quaternions
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ class Charts:
     size: int
 
     @classmethod
-    def of(cls, mechanism: Mechanism) -> Charts:
+    def from_mechanism(cls, mechanism: Mechanism) -> Charts:
         """Read a mechanism."""
         model, width = mechanism.body.model, mechanism.coordinates
         spheres = [joint for joint in model.joints[1:] if joint.nq != joint.nv]

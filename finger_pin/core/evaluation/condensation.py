@@ -136,34 +136,34 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
             by_load, by_command = factor * slopes[SLOPE.rate_by_load, k], factor * slopes[SLOPE.rate_by_command, k]
             # d phi by z and by z' = g dz - r_z.
             total = slopes[SLOPE.force_by_state, k] + g * slopes[SLOPE.force_by_rate, k]
-        own = linear.state_gain[max(state, 0)]
+        state_gain = linear.state_gain[max(state, 0)]
         for c in range(full):
             row[c] = 0.0
         if state >= 0:
             for c in range(full):
-                own[c] = 0.0
+                state_gain[c] = 0.0
         pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.contact_rows and tables.joint_pin[k] >= 0)
         if pressed and (of_load != 0.0 or by_load != 0.0):
             _load(model, address, k, own_places, width, wide)
             _add_scaled(row, of_load, load, full)
             if by_load != 0.0:
-                _add_scaled(own, by_load, load, full)
+                _add_scaled(state_gain, by_load, load, full)
         fed = tables.channel[k] >= 0 or tables.input_start[k + 1] > tables.input_start[k]
         if fed and (of_command != 0.0 or by_command != 0.0):
             _command(model, k, own_places, width, wide)
             _add_scaled(row, of_command, command, full)
             if by_command != 0.0:
-                _add_scaled(own, by_command, command, full)
+                _add_scaled(state_gain, by_command, command, full)
         reads = tables.read_start[k + 1] > tables.read_start[k]
         if state >= 0:
             by_length, by_speed = factor * slopes[SLOPE.rate_by_length, k], factor * slopes[SLOPE.rate_by_speed, k]
-            _add_motion(model, k, width, by_length, by_speed, factor * slopes[SLOPE.rate_by_curvature, k], own)
+            _add_motion(model, k, width, by_length, by_speed, factor * slopes[SLOPE.rate_by_curvature, k], state_gain)
             if reads:
-                add_readings(tables, k, factor * slopes[SLOPE.rate_by_reading, k], wide, own)
-            _add_scaled(row, total, own, full)
+                add_readings(tables, k, factor * slopes[SLOPE.rate_by_reading, k], wide, state_gain)
+            _add_scaled(row, total, state_gain, full)
             # The column of r_z itself, without the difference g dz - r_z.
             itself = 2 * width + blocks.state_place[state]
-            own[itself] += factor
+            state_gain[itself] += factor
             row[itself] += factor * (
                 slopes[SLOPE.force_by_state, k] + slopes[SLOPE.force_by_rate, k] * slopes[SLOPE.rate_by_state, k]
             )
@@ -233,14 +233,14 @@ def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
         position[i] += inverse
     # Gains multiply dq = (r_q + dv) / g and dv.
     for s in states:
-        own, row = linear.state_gain[s], solution[2 * whole + s]
+        state_gain, row = linear.state_gain[s], solution[2 * whole + s]
         for c in range(width):
-            row[c] = own[c] * inverse
+            row[c] = state_gain[c] * inverse
             row[width + c] = 0.0
         for c in range(2 * width, wide):
-            row[c] = own[c]
+            row[c] = state_gain[c]
         for j in range(width):
-            factor = own[j] * inverse + own[width + j]
+            factor = state_gain[j] * inverse + state_gain[width + j]
             if factor != 0.0:
                 for c in range(wide):
                     row[c] += factor * velocity[j, c]

@@ -77,19 +77,19 @@ def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear,
     inverse = 1.0 / (a * d - b * c)
     for i in range(2):
         by_first, by_second = (inverse * d, -inverse * b) if i == 0 else (-inverse * c, inverse * a)
-        own = linear.state_gain[first if i == 0 else second]
+        state_gain = linear.state_gain[first if i == 0 else second]
         # Those of states that rows read, too: other blocks may have had their columns there.
         for column in range(wide + tables.read_states.size):
-            own[column] = 0.0
+            state_gain[column] = 0.0
         weights = (
             by_first * slopes[AT.rate_by_gap, k + 1] + by_second * slopes[AT.rate_by_gap, k + 2],
             by_first * slopes[AT.rate_by_speed, k + 1] + by_second * slopes[AT.rate_by_speed, k + 2],
             by_first * slopes[AT.rate_by_slip_1, k + 1] + by_second * slopes[AT.rate_by_slip_1, k + 2],
             by_first * slopes[AT.rate_by_slip_2, k + 1] + by_second * slopes[AT.rate_by_slip_2, k + 2],
         )
-        _add_inputs(tables, k, weights, linear, width, own)
-        own[2 * width + state_place[first]] += by_first
-        own[2 * width + state_place[second]] += by_second
+        _add_inputs(tables, k, weights, linear, width, state_gain)
+        state_gain[2 * width + state_place[first]] += by_first
+        state_gain[2 * width + state_place[second]] += by_second
     for m in range(3):
         row = linear.gain[k + m]
         of_first, of_second = slopes[AT.force_by_state_1, k + m], slopes[AT.force_by_state_2, k + m]
@@ -126,10 +126,10 @@ def add_pushes(address: int, row: float) -> int:
     """Add to the change of a row's load that of the forces of the closed contacts of its block on its pin."""
     model = unpack(address, MODEL)
     tables, work, linear, k = model.tables, model.work, model.linear, int(row)
-    paths, own, blocks, load = tables.paths, work.paths, linear.blocks, linear.load
+    paths, pieces, blocks, load = tables.paths, work.paths, linear.blocks, linear.load
     _, wide = extent(blocks, blocks.current[0])
-    for index in range(own.closed_count[0]):
-        e = own.closed[index]
+    for index in range(pieces.closed_count[0]):
+        e = pieces.closed[index]
         passing = passes(paths, e, tables.joint_pin[k])
         if passing == 0.0 or work.rows[ROW.side, paths.row[e]] < 0.0:
             continue
@@ -137,7 +137,7 @@ def add_pushes(address: int, row: float) -> int:
         for m in range(3):
             share = 0.0
             for r in range(3):
-                share += passing * work.pull[k, r] * own.wrench[e, m, 3 + r] / size
+                share += passing * work.pull[k, r] * pieces.wrench[e, m, 3 + r] / size
             for c in range(wide):
                 load[c] += share * linear.gain[paths.row[e] + m, c]
     return 1

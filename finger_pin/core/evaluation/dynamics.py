@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.buffers import Work
-from finger_pin.core.evaluation.inputs import inputs, tip_forces
+from finger_pin.core.evaluation.input_values import inputs, tip_forces
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import passes
-from finger_pin.core.evaluation.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
+from finger_pin.core.evaluation.rigid_body_dynamics import (
+    factorise_mass,
+    inverse_dynamics,
+    mass_matrix,
+    move,
+    solve_mass,
+)
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL

@@ -23,7 +23,7 @@ from finger_pin.laws.law import ContactLaw, Law, Row, Touch
 
 
 class RowColumns(NamedTuple):
-    """Columns of the table of rows: the arguments of a law, as in `Row`, its results, and where its signals begin."""
+    """Columns of the table of rows: the arguments of a law, as in `Row`, its results, and the first of its signals."""
 
     length: int
     speed: int
@@ -39,7 +39,7 @@ class RowColumns(NamedTuple):
 
 
 class SlopeColumns(NamedTuple):
-    """Columns of the table of slopes, in the order of `Law.slopes`; that by what a row reads is the last of each."""
+    """Columns of the table of slopes, in the order of `Law.slopes`; that by readings is the last of each."""
 
     force_by_length: int
     force_by_speed: int
@@ -175,20 +175,20 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
 
 
 @njit_inline
-def _seen(table: Pointer, stride: int, k: int) -> Row:
+def _row(table: Pointer, stride: int, k: int) -> Row:
     return Row(*_numbers(table, k, stride, _ARGUMENTS))
 
 
 def _value(table: Pointer, numbers: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end):
-        found = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
-        _put(table, ROW.force * stride + k, stride, found)
+        outputs = _law(_row(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
+        _put(table, ROW.force * stride + k, stride, outputs)
 
 
 def _slopes(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end):
         signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
-        of_force, of_rate = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), signals)
+        of_force, of_rate = _law(_row(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), signals)
         _put(filled, k, stride, of_force)
         _put(filled, SLOPE.rate_by_length * stride + k, stride, of_rate)
 
@@ -197,8 +197,8 @@ def _account(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, beg
     for k in range(begin, end):
         signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
         force, rate = _numbers(table, ROW.force * stride + k, stride, 2)
-        found = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), force, rate, signals)
-        _put(filled, k, stride, found)
+        terms = _law(_row(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), force, rate, signals)
+        _put(filled, k, stride, terms)
 
 
 @njit_inline
@@ -217,10 +217,10 @@ def _touched(table: Pointer, stride: int, k: int) -> Touch:
 
 def _contact_value(table: Pointer, numbers: Pointer, stride: int, begin: int, end: int) -> None:
     for k in range(begin, end, 3):
-        found = _law(_touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
-        _put(table, ROW.force * stride + k, 1, found[:3])
-        _put(table, ROW.rate * stride + k + 1, 1, found[3:5])
-        _put(table, ROW.signals * stride + k, stride, found[5:])
+        outputs = _law(_touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
+        _put(table, ROW.force * stride + k, 1, outputs[:3])
+        _put(table, ROW.rate * stride + k + 1, 1, outputs[3:5])
+        _put(table, ROW.signals * stride + k, stride, outputs[5:])
 
 
 def _contact_slopes(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
@@ -241,5 +241,5 @@ def _contact_account(table: Pointer, numbers: Pointer, filled: Pointer, stride: 
     for k in range(begin, end, 3):
         signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
         forces, rates = _numbers(table, ROW.force * stride + k, 1, 3), _numbers(table, ROW.rate * stride + k + 1, 1, 2)
-        touch, own = _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS)
-        _put(filled, k, stride, _law(touch, own, forces, rates, signals))
+        touch, parameters = _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS)
+        _put(filled, k, stride, _law(touch, parameters, forces, rates, signals))

@@ -1,9 +1,9 @@
-"""A base that moves, compiled: its motion, the power that it supplies, and what it adds to the linearisation."""
+"""A base that moves, compiled: its motion, the power that it supplies, and its part in the linearisation."""
 
 from __future__ import annotations
 
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.evaluation.rigid_body import inverse_dynamics
+from finger_pin.core.evaluation.rigid_body_dynamics import inverse_dynamics
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.evaluation.time_functions import SignalTable, signal_derivative
 from finger_pin.core.jit import CompiledFunction, njit_inline, unpack
@@ -34,7 +34,7 @@ def move_base(address: int, time: float) -> int:
         return 1
     place = _coordinates(control.palm, time, 0)
     turns = sine_cosine(place[3]) + sine_cosine(place[4]) + sine_cosine(place[5])
-    found = _base_motion(
+    motion = _base_motion(
         _coordinates(control.palm, time, 1),
         _coordinates(control.palm, time, 2),
         _coordinates(control.palm, time, 3),
@@ -42,10 +42,10 @@ def move_base(address: int, time: float) -> int:
         (tables.gravity[0], tables.gravity[1], tables.gravity[2]),
     )
     for k in range(6):
-        work.base_velocity[k] = found[k]
-        work.base_acceleration[k] = found[6 + k]
-        work.base_rate[0, k] = found[15 + k]
-        work.base_rate[1, k] = found[21 + k]
+        work.base_velocity[k] = motion[k]
+        work.base_acceleration[k] = motion[6 + k]
+        work.base_rate[0, k] = motion[15 + k]
+        work.base_rate[1, k] = motion[21 + k]
     # The world that the base sees goes back as the base goes on: first its angles, then its place.
     for i in range(work.guide.size):
         work.guide[i] = -signal_derivative(control.palm, (i + 3) % 6, time, 2)
@@ -80,12 +80,12 @@ def bias_rate(address: int, _time: float) -> int:
     velocity, size, change = model.state[width : 2 * width], tables.parents.size, work.base_rate[0]
     for i in range(size):
         parent = tables.parents[i]
-        own, force = work.spatial.axis_curve[i], work.spatial.force[i]
+        rate, force = work.spatial.axis_curve[i], work.spatial.force[i]
         above = work.base_rate[1] if parent < 0 else work.spatial.axis_curve[parent]
         motion_cross(change, work.spatial.axis[i], work.vectors[0])
         for k in range(6):
-            own[k] = above[k] + work.vectors[0][k] * velocity[i]
-        apply_inertia(work.inertia[i], own, force)
+            rate[k] = above[k] + work.vectors[0][k] * velocity[i]
+        apply_inertia(work.inertia[i], rate, force)
         apply_inertia(work.inertia[i], work.spatial.motion[i], work.vectors[0])
         add_force_cross(change, work.vectors[0], force)
         apply_inertia(work.inertia[i], change, work.vectors[0])

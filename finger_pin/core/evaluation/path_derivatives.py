@@ -9,6 +9,7 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.blocks import partition
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
+from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
@@ -43,27 +44,27 @@ def _changed(slopes: Vector, first: int, dy: Vector, rotation: Matrix, out: Vect
 @njit_inline
 def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
     """Fill the derivatives of a piece's wrenches and turn by the coordinates that move it."""
-    own = work.paths
-    rotation, ends, columns, slopes = own.frame[e], own.ends[e], paths.columns[e], own.slopes
+    pieces = work.paths
+    rotation, ends, columns, slopes = pieces.frame[e], pieces.ends[e], paths.columns[e], pieces.slopes
     dy, moved, point = work.vectors[0], work.vectors[1], work.centre
-    call_shape(paths.slopes[e], own.seen[e], paths.parameters[e], slopes)
-    turn_out(rotation, own.out[e], 4, point)
+    call_shape(paths.slopes[e], pieces.local_points[e], paths.parameters[e], slopes)
+    turn_out(rotation, pieces.out[e], GAP_OUT.point, point)
     for r in range(3):
-        point[r] += own.origin[e, r]
+        point[r] += pieces.origin[e, r]
     for s in range(paths.start[e], paths.start[e + 1]):
         axis, moves = work.spatial.axis[paths.at[s]], paths.moves[s]
         for p in range(2):
             weight = 1.0 * (moves[p] - moves[PIECE.frame])
             _seen_from(axis, rotation, ends[3 * p : 3 * p + 3], weight, dy[3 * p : 3 * p + 3])
         for m in range(columns):
-            wrench, out = own.wrench[e, m], own.wrench_slope[s, m]
+            wrench, out = pieces.wrench[e, m], pieces.wrench_slope[s, m]
             for i in range(WRENCH):
                 out[i] = 0.0
             if columns == 1:
                 turn = 0.0
                 for c in range(6):
                     turn += slopes[c] * dy[c]
-                own.turn_slope[s] = turn
+                pieces.turn_slope[s] = turn
                 for p in range(2):
                     force = out[6 * p + 3 : 6 * p + 6]
                     _changed(slopes, 6 + 18 * p, dy, rotation, force)
@@ -84,27 +85,27 @@ def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
 @njit_always_inline
 def _add_turns(tables: Tables, work: Work, linear: Linear, index: int) -> None:
     """Add the derivatives of the angle by which a row's path turns."""
-    paths, own = tables.paths, work.paths
-    k, gather = paths.rows[index], own.gather
+    paths, pieces = tables.paths, work.paths
+    k, gather = paths.rows[index], pieces.gather
     for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
         e = paths.piece[leg]
         if not paths.bends[leg]:
             continue
         for s in range(paths.start[e], paths.start[e + 1]):
-            gather[paths.at[s]] += own.turn_slope[s]
+            gather[paths.at[s]] += pieces.turn_slope[s]
         if not paths.follows[leg]:
             continue
         before = paths.piece[leg - 1]
-        incoming, outgoing = own.wrench[before, 0, 9:12], own.wrench[e, 0, 3:6]
+        incoming, outgoing = pieces.wrench[before, 0, 9:12], pieces.wrench[e, 0, 3:6]
         _, sine = angle_between(incoming, outgoing)
         # A straight corner is a kink, as |q| is at 0.
         inverse = 1.0 / sine if sine > 1e-12 else 0.0
         for s in range(paths.start[e], paths.start[e + 1]):
-            change = own.wrench_slope[s, 0]
+            change = pieces.wrench_slope[s, 0]
             for r in range(3):
                 gather[paths.at[s]] += inverse * incoming[r] * change[3 + r]
         for s in range(paths.start[before], paths.start[before + 1]):
-            change = own.wrench_slope[s, 0]
+            change = pieces.wrench_slope[s, 0]
             for r in range(3):
                 gather[paths.at[s]] += inverse * change[9 + r] * outgoing[r]
     for b in range(tables.bend_start[k], tables.bend_start[k + 1]):
@@ -116,10 +117,10 @@ def _add_turns(tables: Tables, work: Work, linear: Linear, index: int) -> None:
 @njit_always_inline
 def _turn_pushes(tables: Tables, work: Work, k: int, by_position: Vector) -> None:
     """Add to a pin's load the change from contacts that turn with the posture at constant forces."""
-    paths, own = tables.paths, work.paths
+    paths, pieces = tables.paths, work.paths
     size = max(work.rows[ROW.load, k], 1e-100)
-    for index in range(own.closed_count[0]):
-        e = own.closed[index]
+    for index in range(pieces.closed_count[0]):
+        e = pieces.closed[index]
         share = passes(paths, e, tables.joint_pin[k]) / size
         if share == 0.0:
             continue
@@ -127,7 +128,7 @@ def _turn_pushes(tables: Tables, work: Work, k: int, by_position: Vector) -> Non
             for m in range(3):
                 force = share * work.rows[ROW.force, paths.row[e] + m]
                 for r in range(3):
-                    by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
+                    by_position[paths.at[s]] += force * work.pull[k, r] * pieces.wrench_slope[s, m, 3 + r]
 
 
 @CompiledFunction
@@ -136,14 +137,19 @@ def linearise_paths(address: int, _time: float) -> int:
     model = unpack(address, MODEL)
     tables, work, linear = model.tables, model.work, model.linear
     velocity = model.state[work.torque.size : 2 * work.torque.size]
-    paths, own, closed, touching = tables.paths, work.paths, COLUMNS * work.paths.closed_count[0], tables.contact_rows
-    for index in range(own.closed_count[0]):
-        _slopes_of_piece(paths, own.closed[index], work)
+    paths, pieces, closed, touching = (
+        tables.paths,
+        work.paths,
+        COLUMNS * work.paths.closed_count[0],
+        tables.contact_rows,
+    )
+    for index in range(pieces.closed_count[0]):
+        _slopes_of_piece(paths, pieces.closed[index], work)
     for e in range(touching // COLUMNS, paths.columns.size):
         _slopes_of_piece(paths, e, work)
-    axes, gather, net, crossed = work.spatial.axis, own.gather, work.vectors[0], work.vectors[1]
+    axes, gather, net, crossed = work.spatial.axis, pieces.gather, work.vectors[0], work.vectors[1]
     for at in range(closed + paths.rows.size - touching):
-        index = paths.row[own.closed[at // COLUMNS]] + at % COLUMNS if at < closed else at - closed + touching
+        index = paths.row[pieces.closed[at // COLUMNS]] + at % COLUMNS if at < closed else at - closed + touching
         k = paths.rows[index]
         if k >= touching:
             _add_turns(tables, work, linear, index)
@@ -156,12 +162,12 @@ def linearise_paths(address: int, _time: float) -> int:
                 i, turning = paths.at[r], 0.0
                 for s in range(begin, end):
                     j = paths.at[s]
-                    net_wrench(paths.moves[s], own.wrench_slope[r, m], net)
+                    net_wrench(paths.moves[s], pieces.wrench_slope[r, m], net)
                     slope = dot(axes[j], net)
                     if paths.carries[i, j]:
                         # A joint nearer to the base turns the axes of those that it carries.
                         motion_cross(axes[i], axes[j], crossed)
-                        net_wrench(paths.moves[s], own.wrench[e, m], net)
+                        net_wrench(paths.moves[s], pieces.wrench[e, m], net)
                         slope += dot(crossed, net)
                     linear.by_position[j, i] -= force * slope
                     turning += slope * velocity[j]

@@ -6,7 +6,8 @@ import numpy as np
 
 from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import ROW
-from finger_pin.core.evaluation.rigid_body import move
+from finger_pin.core.evaluation.rigid_body_dynamics import move
+from finger_pin.core.evaluation.shape_code import GAP_OUT, SPAN_OUT
 from finger_pin.core.evaluation.spatial import dot
 from finger_pin.core.jit import (
     CompiledFunction,
@@ -34,8 +35,8 @@ def add_moment(point: Vector, force: Vector, out: Vector) -> None:
 @njit_always_inline
 def _frame(paths: Paths, e: int, work: Work) -> None:
     """Place a piece's frame and its points, and express its points in the frame."""
-    own = work.paths
-    rotation, origin, ends = own.frame[e], own.origin[e], own.ends[e]
+    pieces = work.paths
+    rotation, origin, ends = pieces.frame[e], pieces.origin[e], pieces.ends[e]
     body = paths.bodies[e, PIECE.frame]
     if body >= 0:
         above = work.rotation[body]
@@ -58,9 +59,9 @@ def _frame(paths: Paths, e: int, work: Work) -> None:
                 for i in range(3):
                     ends[3 * p + r] += work.rotation[body, r, i] * paths.points[e, 3 * p + i]
         for c in range(3):
-            own.seen[e, 3 * p + c] = 0.0
+            pieces.local_points[e, 3 * p + c] = 0.0
             for r in range(3):
-                own.seen[e, 3 * p + c] += rotation[r, c] * (ends[3 * p + r] - origin[r])
+                pieces.local_points[e, 3 * p + c] += rotation[r, c] * (ends[3 * p + r] - origin[r])
 
 
 @njit_inline
@@ -73,16 +74,16 @@ def turn_out(rotation: Matrix, out: Vector, first: int, vector: Vector) -> None:
 @njit_inline
 def _look(paths: Paths, e: int, work: Work) -> bool:
     """Fill value and wrenches of a piece between placed bodies; return false if it is out of reach."""
-    own = work.paths
+    pieces = work.paths
     _frame(paths, e, work)
-    out, y = own.out[e], own.seen[e]
+    out, y = pieces.out[e], pieces.local_points[e]
     beyond = 0.0
     for c in range(3):
         middle = 0.5 * (y[c] + y[3 + c])
         beyond += middle * middle
     beyond = np.sqrt(beyond) - paths.reach[e]
     if beyond > 0.0:
-        out[0] = beyond
+        out[GAP_OUT.gap] = beyond
     else:
         call_shape(paths.value[e], y, paths.parameters[e], out)
     return not beyond > 0.0
@@ -91,28 +92,28 @@ def _look(paths: Paths, e: int, work: Work) -> bool:
 @njit_inline
 def _measure(paths: Paths, e: int, work: Work) -> None:
     """Fill the value of a piece, and its wrenches."""
-    own = work.paths
+    pieces = work.paths
     _look(paths, e, work)
-    out, columns = own.out[e], paths.columns[e]
-    own.active[e] = 1 if columns == 1 or out[0] < 0.0 or work.rows[ROW.side, paths.row[e]] > 0.0 else 0
-    rotation, ends, point = own.frame[e], own.ends[e], work.centre
-    if own.active[e] == 0:
+    out, columns = pieces.out[e], paths.columns[e]
+    pieces.active[e] = 1 if columns == 1 or out[GAP_OUT.gap] < 0.0 or work.rows[ROW.side, paths.row[e]] > 0.0 else 0
+    rotation, ends, point = pieces.frame[e], pieces.ends[e], work.centre
+    if pieces.active[e] == 0:
         return
     for m in range(columns):
         for i in range(WRENCH):
-            own.wrench[e, m, i] = 0.0
+            pieces.wrench[e, m, i] = 0.0
     if columns == 1:
-        wrench = own.wrench[e, 0]
+        wrench = pieces.wrench[e, 0]
         for p in range(2):
-            turn_out(rotation, out, 2 + 3 * p, wrench[6 * p + 3 : 6 * p + 6])
+            turn_out(rotation, out, SPAN_OUT.first_force + 3 * p, wrench[6 * p + 3 : 6 * p + 6])
             add_moment(ends[3 * p : 3 * p + 3], wrench[6 * p + 3 : 6 * p + 6], wrench[6 * p : 6 * p + 3])
     else:
-        turn_out(rotation, out, 4, point)
+        turn_out(rotation, out, GAP_OUT.point, point)
         for r in range(3):
-            point[r] += own.origin[e, r]
+            point[r] += pieces.origin[e, r]
         for m in range(3):
-            wrench = own.wrench[e, m]
-            turn_out(rotation, out, 1 if m == 0 else 4 + 3 * m, wrench[3:6])
+            wrench = pieces.wrench[e, m]
+            turn_out(rotation, out, GAP_OUT.normal if m == 0 else GAP_OUT.tangents + 3 * (m - 1), wrench[3:6])
             add_moment(point, wrench[3:6], wrench[:3])
 
 
@@ -146,25 +147,25 @@ def look(address: int, piece: float) -> int:
 @njit_always_inline
 def measure_paths(tables: Tables, work: Work) -> None:
     """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if active."""
-    paths, own, first = tables.paths, work.paths, tables.contact_rows
+    paths, pieces, first = tables.paths, work.paths, tables.contact_rows
     closed = 0
-    for index in range(own.active_pair_count[0]):
-        e = own.active_pairs[index]
+    for index in range(pieces.active_pair_count[0]):
+        e = pieces.active_pairs[index]
         _measure(paths, e, work)
-        if own.active[e]:
-            own.closed[closed] = e
+        if pieces.active[e]:
+            pieces.closed[closed] = e
             closed += 1
         else:
-            own.length[paths.row[e]] = own.out[e, 0]
-    own.closed_count[0] = closed
+            pieces.length[paths.row[e]] = pieces.out[e, GAP_OUT.gap]
+    pieces.closed_count[0] = closed
     for e in range(first // COLUMNS, paths.columns.size):
         _measure(paths, e, work)
-    axes, gather, net = work.spatial.axis, own.gather, work.vectors[0]
+    axes, gather, net = work.spatial.axis, pieces.gather, work.vectors[0]
     for at in range(COLUMNS * closed + paths.rows.size - first):
         # The rows of contacts are their places, too.
         index = at - COLUMNS * closed + first
         if at < COLUMNS * closed:
-            index = paths.row[own.closed[at // COLUMNS]] + at % COLUMNS
+            index = paths.row[pieces.closed[at // COLUMNS]] + at % COLUMNS
         k = paths.rows[index]
         length, turn = 0.0, 0.0
         begin, end = tables.arm_start[k], tables.arm_start[k + 1]
@@ -174,36 +175,36 @@ def measure_paths(tables: Tables, work: Work) -> None:
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
             if m == 0:
-                length += paths.length_weight[leg] * own.out[e, 0]
-            if own.active[e] == 0:
+                length += paths.length_weight[leg] * pieces.out[e, SPAN_OUT.length]
+            if pieces.active[e] == 0:
                 continue
             if paths.bends[leg] and paths.columns[e] == 1:
-                turn += own.out[e, 1]
+                turn += pieces.out[e, SPAN_OUT.turn]
             if paths.bends[leg] and paths.follows[leg]:
                 before = paths.piece[leg - 1]
-                cosine, sine = angle_between(own.wrench[before, 0, 9:12], own.wrench[e, 0, 3:6])
+                cosine, sine = angle_between(pieces.wrench[before, 0, 9:12], pieces.wrench[e, 0, 3:6])
                 turn += np.arctan2(sine, cosine)
             for r in range(paths.start[e], paths.start[e + 1]):
-                net_wrench(paths.moves[r], own.wrench[e, m], net)
+                net_wrench(paths.moves[r], pieces.wrench[e, m], net)
                 gather[paths.at[r]] = dot(axes[paths.at[r]], net)
             for a in range(begin, end):
                 j = tables.arm_at[a]
                 work.arm[a] += paths.arm_weight[leg] * gather[j]
                 work.gradient[a] += paths.length_weight[leg] * gather[j]
                 gather[j] = 0.0
-        own.length[k], own.turn[k] = length, turn
+        pieces.length[k], pieces.turn[k] = length, turn
 
 
 @njit_always_inline
 def push(tables: Tables, work: Work) -> None:
     """Fill the forces of all contacts, after their law."""
-    paths, own = tables.paths, work.paths
-    for index in range(own.closed_count[0]):
-        e = own.closed[index]
+    paths, pieces = tables.paths, work.paths
+    for index in range(pieces.closed_count[0]):
+        e = pieces.closed[index]
         for r in range(3):
-            own.push[e, r] = 0.0
+            pieces.push[e, r] = 0.0
             for m in range(3):
-                own.push[e, r] += work.rows[ROW.force, paths.row[e] + m] * own.wrench[e, m, 3 + r]
+                pieces.push[e, r] += work.rows[ROW.force, paths.row[e] + m] * pieces.wrench[e, m, 3 + r]
 
 
 @njit_inline

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 from finger_pin.core.buffers import Work
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
-from finger_pin.core.evaluation.inputs import inputs
-from finger_pin.core.evaluation.signals import exert_alone, fill_base_power, fill_energy_terms
+from finger_pin.core.evaluation.input_values import inputs
+from finger_pin.core.evaluation.state_batches import exert_alone, fill_base_power, fill_energy_terms
 from finger_pin.core.jit import (
     CompiledFunction,
     Matrix,

@@ -1,4 +1,4 @@
-"""What rows read of states, in the systems of `condensation`: the changes of these states are unknowns of their own."""
+"""Readings of states by rows, in the systems of `condensation`: the changes of these states are unknowns too."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from finger_pin.core.tables import Tables
 
 @njit_inline
 def add_readings(tables: Tables, k: int, slope: float, wide: int, out: Vector) -> None:
-    """Add a slope by what a row reads of states."""
+    """Add a slope by a row's readings of states."""
     for e in range(tables.read_start[k], tables.read_start[k + 1]):
         out[wide + tables.read_place[tables.read_at[e]]] += slope * tables.read_weight[e]
 
@@ -26,11 +26,11 @@ def resolve_readings(tables: Tables, linear: Linear, b: int, width: int, wide: i
     solved[:, :wide] = 0.0
     for s in states:
         if tables.read_place[s] >= 0:
-            p, own = tables.read_place[s], linear.state_gain[s]
+            p, state_gain = tables.read_place[s], linear.state_gain[s]
             for c in range(reads):
-                matrix[p, c] -= own[wide + c]
+                matrix[p, c] -= state_gain[wide + c]
             for c in range(wide):
-                solved[p, c] = own[c]
+                solved[p, c] = state_gain[c]
     if not factorise(matrix, reads, linear.read_pivots):
         return False
     substitute(matrix, reads, linear.read_pivots, solved, wide)

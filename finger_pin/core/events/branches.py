@@ -32,14 +32,14 @@ _MAX_END_TRIALS = 6
 
 @CompiledFunction
 def release(address: int, _time: float) -> int:
-    """Let the branches of all rows follow the motion, or freeze those that are given to an `Integration`."""
+    """Let the branches of all rows follow the motion, or freeze them on the kinks of a repeated `Integration`."""
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
-    tables, rows, given = model.tables, model.work.rows, integration.memory.frozen[0] > 0.0
+    tables, rows, frozen = model.tables, model.work.rows, integration.memory.frozen[0] > 0.0
     for g in range(tables.groups.first.size):
         if tables.groups.kink[g] >= 0:
             for k in range(tables.groups.first[g], tables.groups.end[g]):
-                rows[ROW.side, k] = np.sign(integration.kinks[k]) if given else 0.0
+                rows[ROW.side, k] = np.sign(integration.kinks[k]) if frozen else 0.0
     return 1
 
 

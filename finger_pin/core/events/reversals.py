@@ -51,15 +51,15 @@ def before_reversal(integration: Integration, model: Model, h: float) -> float:
             # Behind the first reversal it grows as the square, and more where others follow.
             way = np.sqrt((_TARGET_REVERSAL_ERROR - below) / (cost - below)) if trial <= _SQUARE_LAW_TRIALS else 0.5
             share = low + way * (high - low)
-        found, turned = _misled(integration, model, h, share)
-        if found > _MAX_REVERSAL_ERROR:
-            high, cost = share, found
+        error, turned = _misled(integration, model, h, share)
+        if error > _MAX_REVERSAL_ERROR:
+            high, cost = share, error
             if trial == 0:
                 low = turned
-        elif trial == 0 or found >= _MIN_REVERSAL_ERROR:
+        elif trial == 0 or error >= _MIN_REVERSAL_ERROR:
             break
         else:
-            low, below = share, found
+            low, below = share, error
     return share
 
 
@@ -116,11 +116,11 @@ def _way_back(integration: Integration, model: Model, k: int, share: float) -> A
 @njit_always_inline
 def _more(tables: Tables, rows: Matrix, g: int, k: int, speed: float) -> float:
     """Return the rate of a row's state at a speed, held on the other side, less that on this side."""
-    branch, own, more = rows[ROW.side, k], rows[ROW.speed, k], 0.0
+    branch, row_speed, more = rows[ROW.side, k], rows[ROW.speed, k], 0.0
     # As it is held, on the other side, and at last as it was.
     for weight in (-1.0, 1.0, 0.0):
         rows[ROW.side, k] = -branch if weight > 0.0 else branch
-        rows[ROW.speed, k] = speed if weight != 0.0 else own
+        rows[ROW.speed, k] = speed if weight != 0.0 else row_speed
         call_value(tables.groups.value[g], rows, tables.parameters, k, k + 1)
         more += weight * rows[ROW.rate, k]
     return more

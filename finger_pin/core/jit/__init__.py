@@ -28,8 +28,8 @@ from finger_pin.core.jit.functions import (
     njit_inline,
     njit_reassociate,
 )
+from finger_pin.core.jit.struct_packing import Block, call, copied, indices, nothing, pack, refuse_copy
 from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, Pointer, StructType, Vector, unpack
-from finger_pin.core.jit.tables import Block, call, copied, indices, nothing, pack, refuse_copy
 
 __all__ = [
     "Block",

@@ -35,9 +35,9 @@ def _call(_typing: Any, function: types.Type, words: types.Type) -> _Generated:
     """Call the function at an address with some words: addresses of numbers, and numbers of rows."""
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
-        given = [builder.extract_value(arguments[1], index) for index in range(signature.args[1].count)]
-        kind = ir.FunctionType(ir.VoidType(), [each.type for each in given])
-        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), given)
+        words_read = [builder.extract_value(arguments[1], index) for index in range(signature.args[1].count)]
+        kind = ir.FunctionType(ir.VoidType(), [each.type for each in words_read])
+        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), words_read)
         return context.get_dummy_value()
 
     return types.void(types.int64, words), generate
@@ -68,11 +68,11 @@ def numbers(
     """Return a tuple of numbers of a table, ``stride`` apart; their count is a constant."""
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
-        found, place = ir.Constant(context.get_value_type(signature.return_type), ir.Undefined), arguments[1]
+        values, place = ir.Constant(context.get_value_type(signature.return_type), ir.Undefined), arguments[1]
         for index in range(signature.return_type.count):
-            found = builder.insert_value(found, builder.load(builder.gep(arguments[0], [place])), index)
+            values = builder.insert_value(values, builder.load(builder.gep(arguments[0], [place])), index)
             place = builder.add(place, arguments[2])
-        return found
+        return values
 
     return types.UniTuple(types.float64, count.literal_value)(table, types.int64, types.int64, count), generate
 

@@ -82,9 +82,9 @@ def _syntax(text: bytes) -> str:
 def _drop_docstrings(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> None:
     strings = [each for each in node.body if isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant)]
     node.body = [each for each in node.body if each not in strings]
-    for each in node.body:
-        if isinstance(each, ast.ClassDef | ast.FunctionDef):
-            _drop_docstrings(each)
+    for statement in node.body:
+        if isinstance(statement, ast.ClassDef | ast.FunctionDef):
+            _drop_docstrings(statement)
 
 
 def _hashed(text: str) -> str:
@@ -115,13 +115,13 @@ def _code(code: CodeType) -> str:
 
 def _names(code: CodeType) -> Iterator[str]:
     yield from code.co_names
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            yield from _names(each)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
 
 
 def _values(function: FunctionType, names: frozenset[str]) -> Iterator[tuple[str, Any]]:
-    """Give the closure, the defaults and the globals of a function, but for what the package's files say."""
+    """Yield the closure, the defaults and the globals of a function, but for what the package's files say."""
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         yield name, cell.cell_contents
     yield "defaults", (function.__defaults__, function.__kwdefaults__)
@@ -139,8 +139,8 @@ def _is_ours(value: object) -> bool:
 def _described(value: Any, names: frozenset[str], above: tuple[FunctionType, ...]) -> str:
     """Return a text that differs for constants that differ; of a module, for the attributes of some names."""
 
-    def described(each: object) -> str:
-        return _described(each, names, above)
+    def described(part: object) -> str:
+        return _described(part, names, above)
 
     if isinstance(value, _PLAIN):
         return repr(value)

@@ -86,7 +86,7 @@ class CompiledFunction:
 
     @property
     def kept(self) -> bool:
-        """Whether it is found on disk."""
+        """Return whether its compiled code is on disk."""
         named = _named(self._function)
         return named is not None and _is_kept(named)
 

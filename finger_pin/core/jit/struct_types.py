@@ -57,12 +57,14 @@ class StructType(types.Record, Generic[_Table]):  # type: ignore[misc]
         fields: list[Any] = []
         words = 0
         for name, hint in get_type_hints(table, include_extras=True).items():
-            own = StructType(hint) if hasattr(hint, "_fields") else hint
-            if not (own in _SCALARS or isinstance(own, StructType)):
-                own = hint.__metadata__[0]
-            self.kinds[name] = own
-            fields.append((name, {"type": own if isinstance(own, StructType) else types.int64, "offset": WORD * words}))
-            words += own.size // WORD if isinstance(own, StructType) else 1 + getattr(own, "dimensions", 0)
+            kind = StructType(hint) if hasattr(hint, "_fields") else hint
+            if not (kind in _SCALARS or isinstance(kind, StructType)):
+                kind = hint.__metadata__[0]
+            self.kinds[name] = kind
+            fields.append(
+                (name, {"type": kind if isinstance(kind, StructType) else types.int64, "offset": WORD * words})
+            )
+            words += kind.size // WORD if isinstance(kind, StructType) else 1 + getattr(kind, "dimensions", 0)
         super().__init__(fields, size=WORD * words, aligned=True)
         # Tables of the same layout stay apart.
         self.name = f"{table.__module__}.{table.__qualname__}"
@@ -84,7 +86,7 @@ register_model(StructType)(models.OpaqueModel)
 @lower_getattr_generic(StructType)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: ir.IRBuilder, table: StructType[Any], value: ir.Value, name: str) -> ir.Value:
     """Load a field marked as constant, so that the optimiser loads it once."""
-    kind, place, found = table.kinds[name], table.offset(name), table.typeof(name)
+    kind, place, numba_type = table.kinds[name], table.offset(name), table.typeof(name)
     integer = context.get_value_type(types.int64)
 
     def at(offset: int) -> ir.Value:
@@ -98,8 +100,8 @@ def _field(context: Any, builder: ir.IRBuilder, table: StructType[Any], value: i
     if isinstance(kind, StructType):
         return at(place)
     if not isinstance(kind, Numbers):
-        return load(place, context.get_value_type(found))
-    array = context.make_array(found)(context, builder)
+        return load(place, context.get_value_type(numba_type))
+    array = context.make_array(numba_type)(context, builder)
     count, shape, strides = integer(1), array.shape, array.strides
     for axis in reversed(range(kind.dimensions)):
         size = load(place + WORD * (1 + axis), integer)

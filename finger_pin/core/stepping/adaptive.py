@@ -125,23 +125,23 @@ def _pace(integration: Integration, h: float, error: float, final: bool, clipped
 @njit_always_inline
 def accept_step(args: AdvanceArgs, integration: Integration, model: Model, time: float) -> None:
     """Move to the end of an accepted step, and store the step if there is a record."""
-    x, attitude, taken = integration.x, integration.attitude, args.taken[0]
+    x, attitude, row = integration.x, integration.attitude, args.record_range[0]
     if integration.events.settle:
         call_at(integration.events.settle, args.integration, 0.0)
     copy(model.state, x)
     integration.memory.time[0] = time
-    if taken < args.times.size:
-        args.times[taken] = time
-        copy_matrix(integration.dense, args.dense[taken])
-        copy(x, args.states[taken])
-        copy(integration.kinks, args.branches[taken])
-        args.shares[taken] = integration.memory.taken_share[0]
+    if row < args.times.size:
+        args.times[row] = time
+        copy_matrix(integration.dense, args.dense[row])
+        copy(x, args.states[row])
+        copy(integration.kinks, args.branches[row])
+        args.shares[row] = integration.memory.taken_share[0]
     rechart(model.tables, x, attitude)
-    if taken < args.times.size:
+    if row < args.times.size:
         for f in range(attitude.shape[0]):
             for c in range(4):
-                args.attitudes[taken, f, c] = attitude[f, c]
-        args.taken[0] += 1
+                args.attitudes[row, f, c] = attitude[f, c]
+        args.record_range[0] += 1
 
 
 @CompiledFunction
@@ -155,7 +155,7 @@ def advance(address: int, end: float) -> int:
         status = _stop_status(integration, model.linear.mass.shape[0])
         if status != at.DONE:
             return status
-        if args.times.size > 0 and args.taken[0] == args.taken[1]:
+        if args.times.size > 0 and args.record_range[0] == args.record_range[1]:
             memory.continued[0] = 1.0
             return at.FULL
         time, h = memory.time[0], memory.step_size[0]

@@ -83,7 +83,7 @@ class StepMemory(NamedTuple):
 
 
 class Events(NamedTuple):
-    """What a model does about the steps of an integrator: addresses of functions of that of the `Integration`.
+    """Hooks of a model into an integrator's steps: addresses of functions of the address of the `Integration`.
 
     Attributes:
         release: Before the start of a step is evaluated: lets all branches follow the motion, or freezes those given.
@@ -154,7 +154,7 @@ class AdvanceArgs(NamedTuple):
         dense: Interpolants of the steps, shape (m, rows of the tableau's dense, size).
         shares: Of the length that was tried the share that was taken, shape (m,).
         branches: Where each row was between the sides of its kink at the start of each step, shape (m, K).
-        taken: Number of steps recorded so far, and that at which to stop, shape (2,).
+        record_range: Number of recorded steps so far, and the one at which to stop, shape (2,).
     """
 
     integration: int
@@ -164,7 +164,7 @@ class AdvanceArgs(NamedTuple):
     dense: Layers
     shares: Vector
     branches: Matrix
-    taken: Indices
+    record_range: Indices
 
 
 INTEGRATION, ADVANCE_ARGS = StructType(Integration), StructType(AdvanceArgs)

@@ -28,7 +28,7 @@ _ROOM = 8192
 _SLICES = 200
 
 
-class Held(Protocol):
+class SampledController(Protocol):
     """Controller that sets tensions at sample times and holds them in between."""
 
     @property
@@ -54,7 +54,7 @@ class _Recorder:
         part = self.part
         self.start = (part.time, part.x.copy(), part.attitude.copy())
         self.room, self._chunk = part.room(_ROOM), chunk
-        self.taken = 0
+        self.step_count = 0
         self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
         # Compiling is no part of an integration's cost.
         part.ready(self.room)[1].compile()
@@ -63,11 +63,12 @@ class _Recorder:
         """Go to a time, or until some chunks are full; return the status."""
         part = self.part
         while chunks != 0:
-            if self.taken == len(self.room.times):
+            if self.step_count == len(self.room.times):
                 self.room = self.room.doubled()
-            status, self.taken = part.advance(end, self.room, slice(self.taken, self.taken + self._chunk))
+            rows = slice(self.step_count, self.step_count + self._chunk)
+            status, self.step_count = part.advance(end, self.room, rows)
             chunks -= 1
-            if status != core.FULL or self.taken >= self.most:
+            if status != core.FULL or self.step_count >= self.most:
                 return status
         return core.DONE
 
@@ -80,13 +81,13 @@ class _Recorder:
         """Return the reason not to go on after a status, empty if there is none; ``names`` are those of the state."""
         if status > core.FULL:
             return failure(self.part, status, [names[at] for at in self._stepper.places(self.part.island)])
-        if self.taken >= self.most and self.part.time < duration:
-            return f"after {self.taken} steps the trajectory has reached the most that is kept in memory"
+        if self.step_count >= self.most and self.part.time < duration:
+            return f"after {self.step_count} steps the trajectory has reached the most that is kept in memory"
         return ""
 
     def steps(self) -> IslandMotion:
         """Return the steps that were taken."""
-        return IslandMotion(self._stepper.mechanism, self.part, *self.start, self.room.first(self.taken))
+        return IslandMotion(self._stepper.mechanism, self.part, *self.start, self.room.first(self.step_count))
 
 
 def integrate_compiled(
@@ -94,7 +95,7 @@ def integrate_compiled(
     duration: float,
     names: tuple[str, ...],
     *,
-    held: Held | None = None,
+    controller: SampledController | None = None,
     knots: Array | None = None,
     watch: Watch | None = None,
     chunk: int = 256,
@@ -107,7 +108,7 @@ def integrate_compiled(
         stepper: State to start from, method and tolerances.
         duration: Time of the end, s.
         names: Names of the numbers of the state, for messages.
-        held: A controller that holds its tensions in between.
+        controller: Controller that holds its tensions between sample times.
         knots: Times at which an input bends or jumps, in order, s: steps end there.
         watch: Called with the simulated time that all have reached and the state after every chunk of steps.
         chunk: Most steps between two calls.
@@ -118,14 +119,14 @@ def integrate_compiled(
     if knots is not None:
         stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
     # Of a controller that acts in between, the linearised flow knows nothing.
-    known = held is None and not stepper.driven
+    known = controller is None and not stepper.driven
     recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     began = time.perf_counter()
     alone = len(recorders) == 1
     reason, interrupted = "", False
     while stepper.time < duration and not reason and not interrupted:
         sliced = together and not alone
-        end, chunks = _next_end(stepper, duration, held, sliced), -1 if sliced else 1
+        end, chunks = _next_end(stepper, duration, controller, sliced), -1 if sliced else 1
         statuses = in_threads(partial(_Recorder.advance, end=end, chunks=chunks), recorders)
         for recorder, status in zip(recorders, statuses, strict=True):
             reason = reason or recorder.reason(status, duration, names)
@@ -136,41 +137,42 @@ def integrate_compiled(
     ends = np.unique(np.concatenate([each.times for each in steps]))
     return Trajectory(
         breakpoints=ends[ends <= stepper.time],
-        interpolate=joined(stepper, steps),
+        interpolate=packed_interpolant(stepper, steps),
         statistics=_statistics(recorders, time.perf_counter() - began),
         failure=reason,
         interrupted=interrupted,
         # Inputs that are held in between are not the core's own.
-        islands=() if not known or stepper.held else tuple(steps),
+        islands=() if not known or stepper.holds_inputs else tuple(steps),
         steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),
     )
 
 
-def _next_end(stepper: Stepper, duration: float, held: Held | None, sliced: bool) -> float:
+def _next_end(stepper: Stepper, duration: float, controller: SampledController | None, sliced: bool) -> float:
     """Return the time at which islands wait for each other, after a controller that is due has acted."""
-    if held is None:
+    if controller is None:
         return min(duration, stepper.time + duration / _SLICES) if sliced else duration
-    if stepper.time >= held.instant:
-        stepper.hold(held.act(stepper.x))
-    return min(duration, held.instant)
+    if stepper.time >= controller.instant:
+        stepper.hold(controller.act(stepper.x))
+    return min(duration, controller.instant)
 
 
 def _statistics(recorders: Sequence[_Recorder], wall_time: float) -> Statistics:
     """Return the statistics of all islands together."""
-    steps, memories = sum(recorder.taken for recorder in recorders), [recorder.part.memory for recorder in recorders]
+    steps = sum(recorder.step_count for recorder in recorders)
+    memories = [recorder.part.memory for recorder in recorders]
     evaluations = int(sum(each.evaluations[0] for each in memories))
     jacobians = int(sum(each.jacobians[0] for each in memories))
     factorisations = int(sum(each.factorisations[0] for each in memories))
     return Statistics(steps, evaluations, jacobians, factorisations, wall_time)
 
 
-def joined(stepper: Stepper, steps: Sequence[Moving]) -> Callable[[Array], Array]:
+def packed_interpolant(stepper: Stepper, steps: Sequence[Moving]) -> Callable[[Array], Array]:
     """Return the function from times to packed states, from the steps of all islands."""
 
     def interpolate(at: Array) -> Array:
-        found = [each.interpolate(at) for each in steps]
-        if len(steps) == 1 and not found[0][1].size:
-            return found[0][0]
-        return stepper.joined([state for state, _ in found], [attitude for _, attitude in found])
+        motions = [each.interpolate(at) for each in steps]
+        if len(steps) == 1 and not motions[0][1].size:
+            return motions[0][0]
+        return stepper.to_packed([state for state, _ in motions], [attitude for _, attitude in motions])
 
     return interpolate

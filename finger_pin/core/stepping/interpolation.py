@@ -34,7 +34,7 @@ class Between(NamedTuple):
         width: Number of coordinates.
         before: Scratch, the state at the begin of a step, shape (size,).
         times: Shape (k,), s; in order they are found soonest.
-        found: Filled with states, shape (k, size).
+        interpolated: Filled with states, shape (k, size).
         turned: Filled with the quaternions from which angles count, shape (k, f, 4).
     """
 
@@ -49,7 +49,7 @@ class Between(NamedTuple):
     width: int
     before: Vector
     times: Vector
-    found: Matrix
+    interpolated: Matrix
     turned: Layers
 
 
@@ -63,7 +63,7 @@ def interpolate_many(address: int, _time: float) -> int:
     step = -1
     for k in range(b.times.size):
         step = step_at(b, b.times[k], step)
-        within(b, step, b.times[k], b.found[k])
+        within(b, step, b.times[k], b.interpolated[k])
         for f in range(b.charts.size):
             for c in range(4):
                 b.turned[k, f, c] = b.attitude[f, c] if step == 0 else b.attitudes[step - 1, f, c]

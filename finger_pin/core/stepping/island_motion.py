@@ -51,8 +51,8 @@ class IslandMotion:
         if len(self.record.times):
             call(interpolate_many, between, BETWEEN)
         else:
-            between.found[:], between.turned[:] = self.start, self.attitude
-        return between.found, between.turned
+            between.interpolated[:], between.turned[:] = self.start, self.attitude
+        return between.interpolated, between.turned
 
     def _between(self, times: Array, kept: int = 0) -> Between:
         """Return the steps and times with a buffer for m states."""
@@ -69,7 +69,7 @@ class IslandMotion:
             width=len(tables.prescribed),
             before=np.zeros_like(self.start),
             times=times,
-            found=np.empty((kept, len(self.start))),
+            interpolated=np.empty((kept, len(self.start))),
             turned=np.empty((kept, *self.attitude.shape)),
         )
 
@@ -82,19 +82,19 @@ class IslandMotion:
             times: Shape (m,), s; there must be a step.
         """
         energies, count = self.mechanism.energies, len(times)
-        found = np.empty((count, len(energies.powers) + 1))
+        powers = np.empty((count, len(energies.powers) + 1))
         parts = 1 if count < FEW else min(2, threads())
         while len(self._models) < parts:
             self._models.append(self._bound())
 
         def fill(thread: int) -> None:
-            own = slice(thread * count // parts, (thread + 1) * count // parts)
-            between = self._between(np.array(times[own]))
+            part = slice(thread * count // parts, (thread + 1) * count // parts)
+            between = self._between(np.array(times[part]))
             energy_terms = np.zeros(len(energies.stored) + len(energies.powers))
-            call(power_many, Powers(self._models[thread].address, between, energy_terms, found[own]), POWERS)
+            call(power_many, Powers(self._models[thread].address, between, energy_terms, powers[part]), POWERS)
 
         in_threads(fill, range(parts))
-        return found
+        return powers
 
     def _bound(self) -> BoundModel:
         """Return a further model of the island with its inputs."""

@@ -49,8 +49,8 @@ class Record:
     branches: Array
 
     @classmethod
-    def of(cls, count: int, size: int, free: int, rows: int, kinks: int) -> Record:
-        """Return an empty record."""
+    def from_sizes(cls, count: int, size: int, free: int, rows: int, kinks: int) -> Record:
+        """Return an empty record of `count` steps."""
         shapes = (), (size,), (free, 4), (rows, size), (), (kinks,)
         return cls(*(np.empty((count, *shape)) for shape in shapes))
 
@@ -127,7 +127,7 @@ class IslandIntegrator:
         self.tables, self.control, self.tableau = tables, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, self._bound.memory
         self._memory = memory
-        self._nothing, self._taken = self.room(0), np.zeros(2, dtype=np.int64)
+        self._nothing, self._record_range = self.room(0), np.zeros(2, dtype=np.int64)
         # A record, loops, knots and steps that compiled code was given last; and the blocks that hold them, what they
         # are for last.
         self._placed: tuple[Record | None, Drives | None, Array, Steps | None] = (None, None, self.knots, None)
@@ -136,7 +136,9 @@ class IslandIntegrator:
 
     def room(self, count: int) -> Record:
         """Return a buffer for m steps."""
-        return Record.of(count, len(self.x), len(self.attitude), len(self.tableau.dense), len(self._bound.kinks))
+        return Record.from_sizes(
+            count, len(self.x), len(self.attitude), len(self.tableau.dense), len(self._bound.kinks)
+        )
 
     @property
     def rtol(self) -> float:
@@ -151,13 +153,13 @@ class IslandIntegrator:
     def advance(self, end: float, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, int]:
         """Integrate to a time, or until rows of a record are full; return the status and the row after the last one."""
         block, unit = self.ready(record, rows)
-        return unit(block, end), int(self._taken[0])
+        return unit(block, end), int(self._record_range[0])
 
     def ready(self, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, CompiledFunction]:
         """Return the address of the `AdvanceArgs` to be advanced, and the unit that does it; into a record if given."""
-        own = self._nothing if record is None else record
-        self._taken[:] = rows.indices(len(own.times))[:2]
-        self._place(own)
+        target = self._nothing if record is None else record
+        self._record_range[:] = rows.indices(len(target.times))[:2]
+        self._place(target)
         return self._blocks[-1].address, self._advance
 
     def _place(self, record: Record) -> None:
@@ -166,7 +168,7 @@ class IslandIntegrator:
         if before is record and drives is self.drives and knots is self.knots and steps is self.steps:
             return
         room = record.times, record.states, record.attitudes, record.dense, record.shares, record.branches
-        args = pack(core.AdvanceArgs(self._block.address, *room, self._taken), core.ADVANCE_ARGS)
+        args = pack(core.AdvanceArgs(self._block.address, *room, self._record_range), core.ADVANCE_ARGS)
         self._placed, self._blocks, self._advance = (record, self.drives, self.knots, self.steps), [args], advance
         if self.steps is not None:
             repetition = RepeatStepsArgs(self.steps, np.zeros(1, dtype=np.int64), args.address)
@@ -177,8 +179,8 @@ class IslandIntegrator:
             self._blocks.append(pack(driven, ADVANCE_DRIVEN_ARGS))
             self._advance = advance_driven
         if len(self.knots):
-            passed, given = np.zeros(1, dtype=np.int64), self._blocks[-1].address
-            knotted = AdvanceKnottedArgs(self.knots, passed, args.address, self._advance.address, given)
+            passed, inner_args = np.zeros(1, dtype=np.int64), self._blocks[-1].address
+            knotted = AdvanceKnottedArgs(self.knots, passed, args.address, self._advance.address, inner_args)
             self._blocks.append(pack(knotted, ADVANCE_KNOTTED_ARGS))
             self._advance = advance_knotted
 
@@ -188,18 +190,18 @@ class IslandIntegrator:
         self.forget()
         place_all(self.tables, self.attitude)
         memory = self.memory
-        for each in (memory.last_step_size, memory.last_error, memory.rejected, memory.limiting_state):
-            each[0] = 0.0
+        for entry in (memory.last_step_size, memory.last_error, memory.rejected, memory.limiting_state):
+            entry[0] = 0.0
         memory.held_step_size[0] = memory.continued[0] = 0.0
         memory.step_size[0] = FIRST_STEP
         if time is not None:
             # Steps are counted from here on, for those that creep.
             memory.time[0], memory.window_start[0], memory.window_end[0] = time, 0.0, 0.0
             if self.drives is not None:
-                self.drives.taken[0] = math.ceil((time - self.drives.first) / self.drives.period * (1.0 - 1e-12))
+                self.drives.sample_count[0] = math.ceil((time - self.drives.first) / self.drives.period * (1.0 - 1e-12))
 
     def forget(self) -> None:
-        """Forget which contact pairs were far apart, as where the state is another."""
+        """Activate all contact pairs, as for a new state."""
         if self.tables.contact_rows:
             activate_contacts(self._block.address)
 

@@ -18,15 +18,15 @@ class AdvanceKnottedArgs(NamedTuple):
         knots: Positive, in order, s.
         passed: Memory, how many are behind, shape (1,).
         args: Address of the bound `AdvanceArgs`.
-        inner: Address of what is called to advance, and is given ``given``.
-        given: Address of a block.
+        inner: Address of what is called to advance, with the block at ``inner_args``.
+        inner_args: Address of a block.
     """
 
     knots: Vector
     passed: Indices
     args: int
     inner: int
-    given: int
+    inner_args: int
 
 
 ADVANCE_KNOTTED_ARGS = StructType(AdvanceKnottedArgs)
@@ -45,12 +45,12 @@ def advance_knotted(address: int, end: float) -> int:
         while passed[0] < knots.size and knots[passed[0]] <= memory.time[0]:
             passed[0] += 1
         if passed[0] == knots.size or knots[passed[0]] > end:
-            last: int = call_at(knotted.inner, knotted.given, end)
+            last: int = call_at(knotted.inner, knotted.inner_args, end)
             return last
         knot = knots[passed[0]]
-        status: int = call_at(knotted.inner, knotted.given, knot * _BEFORE)
+        status: int = call_at(knotted.inner, knotted.inner_args, knot * _BEFORE)
         if status != DONE:
             return status
         memory.time[0] = knot
-        if args.taken[0] == args.taken[1] and args.times.size > 0 and knot < end:
+        if args.record_range[0] == args.record_range[1] and args.times.size > 0 and knot < end:
             return FULL

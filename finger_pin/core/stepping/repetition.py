@@ -15,7 +15,7 @@ from finger_pin.typing import Array
 
 
 class Steps(NamedTuple):
-    """The m steps of an island, and what was frozen within each.
+    """The m steps of an island, and the branches frozen within each.
 
     Attributes:
         ends: Shape (m,), s.
@@ -28,8 +28,8 @@ class Steps(NamedTuple):
     branches: Matrix
 
     @classmethod
-    def whole(cls, ends: Array) -> Steps:
-        """Return steps with these ends, s, taken whole."""
+    def from_ends(cls, ends: Array) -> Steps:
+        """Return uncut steps with these ends, s."""
         return cls(np.array(ends, dtype=float), np.ones(len(ends)), np.zeros((len(ends), 0)))
 
 
@@ -58,7 +58,7 @@ def repeat_steps(address: int, end: float) -> int:
     integration = unpack(args.integration, at.INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
     while memory.time[0] < end:
-        if args.times.size > 0 and args.taken[0] == args.taken[1]:
+        if args.times.size > 0 and args.record_range[0] == args.record_range[1]:
             return at.FULL
         time = memory.time[0]
         while passed[0] < steps.ends.size - 1 and steps.ends[passed[0]] <= time:

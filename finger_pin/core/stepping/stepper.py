@@ -61,29 +61,30 @@ class Stepper:
             time: When, s.
         """
         tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
-        self._charts, self._width = Charts.of(mechanism), mechanism.coordinates
+        self._charts, self._width = Charts.from_mechanism(mechanism), mechanism.coordinates
         selected = selections(tables, control)
-        self._free = [np.isin(tables.charts, each.island.coordinates) for each in selected]
+        self._free = [np.isin(tables.charts, selection.island.coordinates) for selection in selected]
         self._made_of = mechanism, control, x, tableau, rtol, atol, force, time
         self.mechanism, self.parts = mechanism, list[IslandIntegrator]()
         forces = np.zeros((len(mechanism.body.tips), 3))
         forces[:] = 0.0 if force is None else force
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
-        for each, free in zip(selected, self._free, strict=True):
+        for selection, free in zip(selected, self._free, strict=True):
             memory = np.zeros(len(core.StepMemory._fields))
             named = core.StepMemory.from_vector(memory)
             named.time[0], named.step_size[0] = time, FIRST_STEP
-            inputs, pushed, at = copied(each.control(control)), forces[each.island.tips], self._places(each.island)
+            inputs, pushed = copied(selection.control(control)), forces[selection.island.tips]
+            at = self._places(selection.island)
             # An island that nothing pushes computes as it does alone.
             loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
-            own = copied(each.tables(tables)._replace(tip_force=pushed, has_tip_force=loaded))
+            island_tables = copied(selection.tables(tables)._replace(tip_force=pushed, has_tip_force=loaded))
             begun = inputs, start[at], attitude[free], tableau, float(rtol), tolerances[at], memory
-            followed = [laws[group] for group in each.of_groups]
-            self.parts.append(IslandIntegrator(each.island, followed, own, *begun))
+            followed = [laws[group] for group in selection.of_groups]
+            self.parts.append(IslandIntegrator(selection.island, followed, island_tables, *begun))
 
     @classmethod
-    def of(
+    def from_finger(
         cls,
         finger: Finger,
         control: InputTable,
@@ -118,17 +119,17 @@ class Stepper:
 
     @property
     def driven(self) -> bool:
-        """Whether loops of motors run."""
+        """Return whether any island has running motor loops."""
         return any(part.drives is not None for part in self.parts)
 
     @property
-    def held(self) -> bool:
-        """Whether inputs are held."""
+    def holds_inputs(self) -> bool:
+        """Return whether any island has constant inputs."""
         return any(part.control.kind == HELD for part in self.parts)
 
     @property
     def time(self) -> float:
-        """Time that all have reached, s."""
+        """Time that all islands have reached, s."""
         return min([part.time for part in self.parts])
 
     @property
@@ -136,16 +137,16 @@ class Stepper:
         """The packed state, shape (mechanism.size,); a copy."""
         if len(self.parts) == 1 and not len(self.parts[0].attitude):
             return self.parts[0].x.copy()
-        return self.joined([part.x for part in self.parts], [part.attitude for part in self.parts])
+        return self.to_packed([part.x for part in self.parts], [part.attitude for part in self.parts])
 
-    def joined(self, states: list[Array], attitudes: list[Array]) -> Array:
+    def to_packed(self, states: list[Array], attitudes: list[Array]) -> Array:
         """Return packed states of the whole from those of the islands, shapes (..., size) and (..., f, 4)."""
         lead = states[0].shape[:-1]
         whole = np.zeros((*lead, 2 * self._width + self.mechanism.state_count))
         attitude = np.zeros((*lead, len(self._free[0]), 4))
-        for part, state, own, free in zip(self.parts, states, attitudes, self._free, strict=True):
+        for part, state, quaternions, free in zip(self.parts, states, attitudes, self._free, strict=True):
             whole[..., self._places(part.island)] = state
-            attitude[..., free, :] = own
+            attitude[..., free, :] = quaternions
         return self._charts.to_packed(whole, attitude)
 
     def restart(self, x: Array, time: float | None = None) -> None:
@@ -163,9 +164,9 @@ class Stepper:
                     motors=motors,
                     places=np.searchsorted(part.island.coordinates, drives.places),
                     channels=np.searchsorted(part.island.channels, drives.channels),
-                    taken=drives.taken.copy(),
+                    sample_count=drives.sample_count.copy(),
                 )
-                if drives.taken[0]:
+                if drives.sample_count[0]:
                     part.control.tension[part.drives.channels[motors]] = drives.voltages[0, motors]
 
     def end_steps_at(self, knots: Array) -> None:
@@ -177,18 +178,18 @@ class Stepper:
         """Repeat given steps from now on in each island, regardless of errors."""
         if len(steps) != len(self.parts):
             # Parameters that join what moved apart, or part it, leave the steps of all to each.
-            steps = [Steps.whole(np.unique(np.concatenate([each.ends for each in steps])))] * len(self.parts)
-        for part, own in zip(self.parts, steps, strict=True):
-            part.repeat(own)
+            steps = [Steps.from_ends(np.unique(np.concatenate([each.ends for each in steps])))] * len(self.parts)
+        for part, island_steps in zip(self.parts, steps, strict=True):
+            part.repeat(island_steps)
 
     def hold(self, inputs: Array) -> None:
         """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""
         for part in self.parts:
-            held, running = inputs[part.island.channels], part.drives
+            island_inputs, running = inputs[part.island.channels], part.drives
             if running is not None:
                 driven = running.channels[running.motors]
-                held[driven] = part.control.tension[driven]
-            part.control.tension[:] = held
+                island_inputs[driven] = part.control.tension[driven]
+            part.control.tension[:] = island_inputs
 
     def load(self, force: Array) -> None:
         """Set the forces at the tips, shape (3,) or (t, 3), N, base frame."""
@@ -235,10 +236,10 @@ class Stepper:
             part = self.parts[index]
             part.drives, part.knots = drives, knots
             part.forget()
-            for own, other in zip(part.state_snapshot, arrays, strict=True):
-                own[...] = other
+            for array, saved in zip(part.state_snapshot, arrays, strict=True):
+                array[...] = saved
 
     def failure(self, status: int, names: tuple[str, ...]) -> str:
         """Return a status in words, with a name for every number of the state; empty if nothing failed."""
-        part = min(self.parts, key=lambda each: each.time)
+        part = min(self.parts, key=lambda island: island.time)
         return failure(part, status, [names[at] for at in self.places(part.island)])

@@ -73,21 +73,21 @@ def nothing(table: type[_Table]) -> _Table:
     """Return a table whose arrays are empty, and whose numbers are zero."""
     fields = []
     for hint in get_type_hints(table, include_extras=True).values():
-        own = getattr(hint, "__metadata__", (hint,))[0]
-        shape = (0,) * getattr(own, "dimensions", 0)
-        fields.append(nothing(hint) if hasattr(hint, "_fields") else np.zeros(shape, own.dtype) if shape else own())
+        kind = getattr(hint, "__metadata__", (hint,))[0]
+        shape = (0,) * getattr(kind, "dimensions", 0)
+        fields.append(nothing(hint) if hasattr(hint, "_fields") else np.zeros(shape, kind.dtype) if shape else kind())
     return table(*fields)
 
 
 def indices(table: tuple[Any, ...]) -> bytes:
     """Return all arrays of integers of a table, one after the other."""
-    found = []
+    chunks = []
     for value in table:
         if isinstance(value, tuple):
-            found.append(indices(value))
+            chunks.append(indices(value))
         elif isinstance(value, np.ndarray) and value.dtype == np.int64:
-            found.append(value.tobytes())
-    return b"".join(found)
+            chunks.append(value.tobytes())
+    return b"".join(chunks)
 
 
 def _copied(value: Any) -> Any:
@@ -108,17 +108,17 @@ def _address(array: Any) -> int:
 
 
 def _write(table: tuple[Any, ...], kind: StructType[Any], words: list[int]) -> None:
-    for value, own in zip(table, kind.kinds.values(), strict=True):
-        if isinstance(own, Numbers):
-            fitting = isinstance(value, np.ndarray) and value.ndim == own.dimensions and value.flags.c_contiguous
-            if not fitting or value.dtype != _DTYPES[own.dtype]:
-                raise TypeError(f"{value!r} cannot be packed as {own}")
+    for value, field_kind in zip(table, kind.kinds.values(), strict=True):
+        if isinstance(field_kind, Numbers):
+            fitting = isinstance(value, np.ndarray) and value.ndim == field_kind.dimensions and value.flags.c_contiguous
+            if not fitting or value.dtype != _DTYPES[field_kind.dtype]:
+                raise TypeError(f"{value!r} cannot be packed as {field_kind}")
             words += (_address(value), *value.shape)
-        elif isinstance(own, StructType):
-            _write(value, own, words)
-        elif isinstance(value, bool | int) and own in (int, bool):
+        elif isinstance(field_kind, StructType):
+            _write(value, field_kind, words)
+        elif isinstance(value, bool | int) and field_kind in (int, bool):
             words.append(int(value))
-        elif isinstance(value, float) and own is float:
+        elif isinstance(value, float) and field_kind is float:
             words.append(int(np.float64(value).view(np.int64)))
         else:
-            raise TypeError(f"{value!r} cannot be packed as {own}")
+            raise TypeError(f"{value!r} cannot be packed as {field_kind}")

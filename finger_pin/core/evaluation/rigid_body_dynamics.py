@@ -120,11 +120,11 @@ def inverse_dynamics(
     size = tables.parents.size
     for i in range(size):
         parent = tables.parents[i]
-        own = acceleration[i] if moving else 0.0
+        joint_acceleration = acceleration[i] if moving else 0.0
         for k in range(6):
             above = work.base_acceleration[k] if parent < 0 else work.spatial.acceleration[parent, k]
             work.spatial.acceleration[i, k] = (
-                above + work.spatial.axis[i, k] * own + work.spatial.axis_rate[i, k] * velocity[i]
+                above + work.spatial.axis[i, k] * joint_acceleration + work.spatial.axis_rate[i, k] * velocity[i]
             )
         if _massless(tables, i):
             work.spatial.force[i] = 0.0
@@ -133,8 +133,10 @@ def inverse_dynamics(
         apply_inertia(work.inertia[i], work.spatial.motion[i], work.vectors[0])
         add_force_cross(work.spatial.motion[i], work.vectors[0], work.spatial.force[i])
     for i in range(size - 1, -1, -1):
-        own = acceleration[i] if moving else 0.0
-        torque[i] = dot(work.spatial.axis[i], work.spatial.force[i]) + tables.bodies[i, BODY.armature] * own
+        joint_acceleration = acceleration[i] if moving else 0.0
+        torque[i] = (
+            dot(work.spatial.axis[i], work.spatial.force[i]) + tables.bodies[i, BODY.armature] * joint_acceleration
+        )
         if tables.parents[i] >= 0:
             for k in range(6):
                 work.spatial.force[tables.parents[i], k] += work.spatial.force[i, k]

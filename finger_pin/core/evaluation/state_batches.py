@@ -10,7 +10,8 @@ from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_s
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import turn_out
-from finger_pin.core.evaluation.rigid_body import move
+from finger_pin.core.evaluation.rigid_body_dynamics import move
+from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import (
     CompiledFunction,
     Layers,
@@ -125,20 +126,20 @@ def fill_energy_terms(tables: Tables, work: Work, totals: Vector) -> None:
 @njit_always_inline
 def _touch(paths: Paths, work: Work, out: Matrix) -> None:
     """Fill the forces of contacts on the second body, the points, and the normals; zero for open ones."""
-    own = work.paths
-    for index in range(own.closed_count[0]):
-        e = own.closed[index]
+    pieces = work.paths
+    for index in range(pieces.closed_count[0]):
+        e = pieces.closed[index]
         k = paths.row[e]
         if work.rows[ROW.force, k] == 0.0:
             continue
         # Contacts come before all other rows.
         touch = out[k // COLUMNS]
-        turn_out(own.frame[e], own.out[e], 4, touch[3:6])
+        turn_out(pieces.frame[e], pieces.out[e], GAP_OUT.point, touch[3:6])
         for r in range(3):
-            touch[3 + r] += own.origin[e, r]
-            touch[6 + r] = own.wrench[e, 0, 3 + r]
+            touch[3 + r] += pieces.origin[e, r]
+            touch[6 + r] = pieces.wrench[e, 0, 3 + r]
             for i in range(3):
-                touch[r] -= work.rows[ROW.force, k + i] * own.wrench[e, i, 3 + r]
+                touch[r] -= work.rows[ROW.force, k + i] * pieces.wrench[e, i, 3 + r]
 
 
 @njit_always_inline
