@@ -15,8 +15,8 @@ except ImportError:
     raise InputError("mujoco", f"is not installed: {installing('mujoco')}") from None
 
 from finger_pin.exchange.mujoco_overlay import add_tendons
+from finger_pin.mujoco.friction_signals import Signals, friction
 from finger_pin.mujoco.self_test import try_self_test
-from finger_pin.mujoco.signals import Signals, friction
 from finger_pin.mujoco.specification import MujocoWarning, add_friction
 
 try_self_test()

@@ -40,16 +40,16 @@ def write_rows(m: int, d: int, at: Model, of: Data, kinds: Kinds, rows: Pointer,
             continue
         speed = number_in(d, of.qvel, row) if of_dof else number_in(d, of.ten_velocity, which[r])
         before, stiff = resistance[r], rows[terms + TERM.damp] * dt
-        held = 1.0 / stiff
-        aref[r] = -speed / dt - held * rows[terms + TERM.pull]
-        resistance[r], weight[r] = held, stiff
+        compliance = 1.0 / stiff
+        aref[r] = -speed / dt - compliance * rows[terms + TERM.pull]
+        resistance[r], weight[r] = compliance, stiff
         most[r] = max(rows[terms + TERM.limit], _NOTHING)
         if islands:
             s = integer_in(d, of.map_efc2iefc, r)
-            numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = held, stiff
+            numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = compliance, stiff
             numbers(d, of.iefc_frictionloss)[s] = most[r]
         if dual:
-            numbers(d, of.efc_AR)[_diagonal(m, d, at, of, kinds, r, nefc)] += held - before
+            numbers(d, of.efc_AR)[_diagonal(m, d, at, of, kinds, r, nefc)] += compliance - before
 
 
 @njit_inline
@@ -66,10 +66,10 @@ def _diagonal(m: int, d: int, at: Model, of: Data, kinds: Kinds, r: int, nefc: i
 
 
 @njit_inline
-def row_forces(m: int, d: int, at: Model, of: Data, kinds: Kinds, width: int, found: Pointer) -> None:
+def row_forces(m: int, d: int, at: Model, of: Data, kinds: Kinds, width: int, forces: Pointer) -> None:
     """Record the forces of the solver's rows of friction, by degree of freedom and tendon."""
     ne = integer(d, of.ne)
     for r in range(ne, ne + integer(d, of.nf)):
         row = integer_in(d, of.efc_id, r)
         row += 0 if integer_in(d, of.efc_type, r) == kinds.friction_dof else width
-        found[row] = -numbers(d, of.efc_force)[r]
+        forces[row] = -numbers(d, of.efc_force)[r]

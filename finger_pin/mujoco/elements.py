@@ -18,8 +18,8 @@ from finger_pin.mujoco.memory import integer_in, integers, number_in, numbers
 _delivered = inlined(delivered)
 
 
-class Seen(NamedTuple):
-    """What the law of a friction reads; ``most`` is the largest friction."""
+class LawInputs(NamedTuple):
+    """Inputs of a friction's law; ``most`` is the largest friction."""
 
     speed: float
     load: float
@@ -37,28 +37,30 @@ def tendon(
     kinds: Kinds,
     e: int,
     force: float,
-    held: float,
+    constraint_tension: float,
     along: Pointer,
     about: Pointer,
     reactions: Pointer,
-) -> Seen:
+) -> LawInputs:
     """Return speed, tension, normal force, largest friction and turn of a tendon: (14)."""
     p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
     first = HEAD
     pull = along[tendon] + spring(m, d, at, of, tendon)
     if int(p[ELEMENT.kind]) == BRANCH:
-        # A part of what its tendon's friction has left, which ``held`` is here.
+        # A part of what its tendon's friction has left, which ``constraint_tension`` is here.
         first, trunk = HEAD + 1, objects[HEAD]
         pull = along[trunk] + spring(m, d, at, of, trunk)
-        left = _delivered(pull, abs(pull), held, p[ELEMENT.viscous], number_in(d, of.ten_velocity, trunk))[1]
-        pull, held = (p[HEAD] if pull > 0.0 else -p[HEAD]) * left, 0.0
+        left = _delivered(
+            pull, abs(pull), constraint_tension, p[ELEMENT.viscous], number_in(d, of.ten_velocity, trunk)
+        )[1]
+        pull, constraint_tension = (p[HEAD] if pull > 0.0 else -p[HEAD]) * left, 0.0
     if int(p[ELEMENT.kind]) == LINK:
         drive = about[integer_in(m, at.jnt_dofadr, row)] * (
             abs(p[ELEMENT.share]) if p[ELEMENT.ratio] > 0.0 else -abs(p[ELEMENT.share])
         )
         pull += drive if p[ELEMENT.share] > 0.0 else min(drive, 0.0)
-    tension = abs(pull) + held
+    tension = abs(pull) + constraint_tension
     speed = number_in(d, of.ten_velocity, tendon)
     loss, left = _delivered(pull, tension, force, p[ELEMENT.viscous], speed)
     bend, pressing = 0.0, tension + left
@@ -68,7 +70,7 @@ def tendon(
         reactions[integers(m, at.jnt_dofadr)[objects[k]]] += left
     # What holds the tendon back takes no more than there is.
     most = tension + p[ELEMENT.drag] + p[ELEMENT.floor] if loss > 0.0 else np.inf
-    return Seen(speed, tension, pressing, most, p[ELEMENT.curvature_offset] + bend)
+    return LawInputs(speed, tension, pressing, most, p[ELEMENT.curvature_offset] + bend)
 
 
 @njit_inline
@@ -76,16 +78,16 @@ def _turn(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, tendon: int
     """Return the angle by which a path turns besides its offset, (15) or along its points: see `turn_of_path`."""
     if tendon >= 0 and integer_in(d, of.ten_wrapnum, tendon) > 0:
         return turn_of_path(d, of, tendon)
-    p, objects, found = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e), 0.0
+    p, objects, turn = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e), 0.0
     places, types = integers(m, at.jnt_qposadr), integers(m, at.tuple_objtype, e)
     for k in range(HEAD, int(p[ELEMENT.length])):
         if types[k] == kinds.of_joint:
-            found += p[k] * abs(numbers(d, of.qpos)[places[objects[k]]])
-    return found
+            turn += p[k] * abs(numbers(d, of.qpos)[places[objects[k]]])
+    return turn
 
 
 @njit_inline
-def mass(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, reactions: Pointer) -> Seen:
+def mass(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, reactions: Pointer) -> LawInputs:
     """Return speed, load, normal force, largest friction and turn of a slide that is a passive tendon's mass: (14c)."""
     p, objects, types = (
         numbers(m, at.tuple_objprm, e),
@@ -102,29 +104,29 @@ def mass(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, reactions: P
             # The joints that the half just named crosses.
             reactions[dofs[objects[k]]] += tension
     bend = p[ELEMENT.curvature_offset] + _turn(m, d, at, of, kinds, e, -1)
-    return Seen(speed, load, load, np.inf, bend)
+    return LawInputs(speed, load, load, np.inf, bend)
 
 
 @njit_inline
-def pin(m: int, d: int, at: Model, of: Data, e: int, held: int, reactions: Pointer) -> Seen:
+def pin(m: int, d: int, at: Model, of: Data, e: int, load_at: int, reactions: Pointer) -> LawInputs:
     """Return speed, load, normal force, largest friction and turn of a joint's pin: (17)."""
     joint = integer_in(m, at.tuple_objid, e)
     dof = integer_in(m, at.jnt_dofadr, joint)
     speed, load = number_in(d, of.qvel, dof), reactions[dof]
-    outside = numbers(d, of.act, held)
+    outside = numbers(d, of.act, load_at)
     x, y, z = outside[0], outside[1], outside[2]
     if x * x + y * y + z * z > 0.0:
         ex, ey, ez = _proximal(m, d, at, of, joint)
         load = math.sqrt((x - load * ex) ** 2 + (y - load * ey) ** 2 + (z - load * ez) ** 2)
-    return Seen(speed, load, load, np.inf, 0.0)
+    return LawInputs(speed, load, load, np.inf, 0.0)
 
 
 @njit_inline
 def _proximal(m: int, d: int, at: Model, of: Data, joint: int) -> tuple[float, float, float]:
     """Return e_j: from the joint before to this one, or the x axis of its carrier."""
     parent, joints, count = integers(m, at.body_parentid), integers(m, at.body_jntadr), integers(m, at.body_jntnum)
-    anchor, own = numbers(d, of.xanchor), integer_in(m, at.jnt_bodyid, joint)
-    body = parent[own]
+    anchor, carrier = numbers(d, of.xanchor), integer_in(m, at.jnt_bodyid, joint)
+    body = parent[carrier]
     while body > 0:
         if count[body] > 0:
             other = joints[body] + count[body] - 1
@@ -133,5 +135,5 @@ def _proximal(m: int, d: int, at: Model, of: Data, joint: int) -> tuple[float, f
             if away > 1e-6:
                 return x / away, y / away, z / away
         body = parent[body]
-    frame = numbers(d, of.xmat, 9 * parent[own])
+    frame = numbers(d, of.xmat, 9 * parent[carrier])
     return frame[0], frame[3], frame[6]

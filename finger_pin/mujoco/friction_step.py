@@ -67,10 +67,10 @@ def level_of(
 ) -> float:
     """Return the level of friction, F^n M + drag, by (9b), (16): the ``static`` of a tendon is a ratio."""
     kinetic = coulomb if of_pin else capstan(coulomb, turn)
-    found = coefficient(speed, kinetic, static if of_pin else static * kinetic, stribeck, exponent)
+    sliding_coefficient = coefficient(speed, kinetic, static if of_pin else static * kinetic, stribeck, exponent)
     # The drag of a pin lets go at M^c / M^d of it.
-    drag_share = found / kinetic if of_pin and kinetic > 0.0 else 1.0
-    return max(pressing * found + drag * drag_share, floor)
+    drag_share = sliding_coefficient / kinetic if of_pin and kinetic > 0.0 else 1.0
+    return max(pressing * sliding_coefficient + drag * drag_share, floor)
 
 
 def exerted(

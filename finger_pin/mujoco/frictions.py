@@ -20,7 +20,7 @@ _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 # Fixed tendons whose coefficients agree to this share are parallel.
 _PARALLEL = 1e-9
 # Coefficients that settings of tendons and of joints both state as they are.
-_ALIKE = ("coulomb", "viscous", "stribeck_velocity", "stribeck_exponent", "micro_damping")
+_SAME_KEYS = ("coulomb", "viscous", "stribeck_velocity", "stribeck_exponent", "micro_damping")
 
 
 def frictions(
@@ -37,10 +37,10 @@ def frictions(
     Raises:
         InputError: If nothing pulls a tendon that was named, or a named joint neither turns nor slides.
     """
-    found: list[PluginFriction] = []
+    plugin_frictions: list[PluginFriction] = []
     first: list[tuple[str, Array]] = []
     for name, (law, named) in tendons.items():
-        if not _held(model, model.tendon(name).id) and not _share(model, model.tendon(name).id, list(tendons)):
+        if not _is_pulled(model, model.tendon(name).id) and not _share(model, model.tendon(name).id, list(tendons)):
             if named:
                 raise InputError(
                     f"tendons.{name}", "nothing pulls it: no actuator, spring, limit or equality of tendons"
@@ -52,20 +52,22 @@ def frictions(
         numbers = _tendon_law(model, name, law)
         # What neither bends it nor has a pin that it loads would be passed over at every step.
         crossed = tuple(each for each in _crossed(model, name, law) if each[2] or each[1] in joints)
-        held = _limited_or_coupled(model, model.tendon(name).id)
-        found.append(PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio), held))
+        constrained = _limited_or_coupled(model, model.tendon(name).id)
+        plugin_frictions.append(
+            PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio), constrained)
+        )
         # Drag and what the model does not show count once.
         behind = numbers._replace(drag=0.0, curvature_offset=0.0)
         for number, (branch, part) in enumerate(branches.get(name, []), start=1):
             crossed = tuple(each for each in _crossed(model, branch, law) if each[1] in joints)
             more = ((False, name, part), *crossed)
-            found.append(PluginFriction(BRANCH, branch, branch, False, 1.0, behind, more, float(number)))
+            plugin_frictions.append(PluginFriction(BRANCH, branch, branch, False, 1.0, behind, more, float(number)))
     for name, (law, named) in joints.items():
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
             stiffness, hardening = _bristles(law, loss)
             numbers = Coefficients(
-                **{key: getattr(law, key) for key in _ALIKE},
+                **{key: getattr(law, key) for key in _SAME_KEYS},
                 stiction=law.stiction,
                 stiffness=stiffness,
                 floor=max(law.floor, loss),
@@ -73,10 +75,10 @@ def frictions(
                 curvature_offset=0.0,
                 hardening=hardening,
             )
-            found.append(PluginFriction(PIN, name, name, True, 1.0, numbers))
+            plugin_frictions.append(PluginFriction(PIN, name, name, True, 1.0, numbers))
         elif named:
             raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")
-    return _with_loss(model, found)
+    return _with_loss(model, plugin_frictions)
 
 
 def add_branches(
@@ -87,7 +89,7 @@ def add_branches(
     Returns:
         By tendon, the names of its branches, each with one over its divisor.
     """
-    kinds, found = mujoco.mjtWrap, dict[str, list[tuple[str, float]]]()
+    kinds, branches = mujoco.mjtWrap, dict[str, list[tuple[str, float]]]()
     for name in names:
         branch, made = None, list[tuple[str, float]]()
         for k in _pieces(model, model.tendon(name).id):
@@ -101,29 +103,29 @@ def add_branches(
                 side = int(model.wrap_prm[k])
                 branch.wrap_geom(model.geom(at).name, model.site(side).name if side >= 0 else "")
         if made:
-            found[name] = made
-    return found
+            branches[name] = made
+    return branches
 
 
-def _with_loss(model: mujoco.MjModel, found: list[PluginFriction]) -> list[PluginFriction]:
+def _with_loss(model: mujoco.MjModel, plugin_frictions: list[PluginFriction]) -> list[PluginFriction]:
     """Return frictions, the constant one of a joint in whose row tendons act as the drag of the first of these."""
-    rows = {each.row for each in found if each.kind == PIN}
+    rows = {friction.row for friction in plugin_frictions if friction.kind == PIN}
     kept = []
-    for each in found:
-        if each.row_of_joint and not each.of_joint and each.row not in rows:
-            rows.add(each.row)
-            loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(each.row).id]]) / abs(each.ratio)
-            each = replace(each, law=each.law._replace(drag=each.law.drag + loss))
-        kept.append(each)
+    for friction in plugin_frictions:
+        if friction.row_of_joint and not friction.of_joint and friction.row not in rows:
+            rows.add(friction.row)
+            loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(friction.row).id]]) / abs(friction.ratio)
+            friction = replace(friction, law=friction.law._replace(drag=friction.law.drag + loss))
+        kept.append(friction)
     return kept
 
 
 def pulled(model: mujoco.MjModel, names: Iterable[str]) -> list[str]:
     """Return the tendons among some that an actuator, a spring, a limit or an equality pulls."""
-    return [name for name in names if _held(model, model.tendon(name).id)]
+    return [name for name in names if _is_pulled(model, model.tendon(name).id)]
 
 
-def _held(model: mujoco.MjModel, tendon: int) -> bool:
+def _is_pulled(model: mujoco.MjModel, tendon: int) -> bool:
     """Return whether a tendon has an actuator, a spring, a limit or an equality of its own."""
     kinds = mujoco.mjtTrn
     driven = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
@@ -132,8 +134,8 @@ def _held(model: mujoco.MjModel, tendon: int) -> bool:
 
 def _limited_or_coupled(model: mujoco.MjModel, tendon: int) -> bool:
     coupled = model.eq_type == mujoco.mjtEq.mjEQ_TENDON
-    held = coupled & ((model.eq_obj1id == tendon) | (model.eq_obj2id == tendon))
-    return bool(held.any() or model.tendon_limited[tendon])
+    couplings = coupled & ((model.eq_obj1id == tendon) | (model.eq_obj2id == tendon))
+    return bool(couplings.any() or model.tendon_limited[tendon])
 
 
 def _share(model: mujoco.MjModel, tendon: int, names: list[str]) -> float:
@@ -151,17 +153,17 @@ def _share(model: mujoco.MjModel, tendon: int, names: list[str]) -> float:
         return 0.0
     others = [_coefficients(model, model.tendon(name).id) for name in names]
     arms = [each[joint] for each in others if np.count_nonzero(each) == 1 and each[joint]]
-    alike = sum(arm * over[joint] > 0.0 for arm in arms)
-    return float((1.0 if alike == len(arms) else -1.0) / alike)
+    agreeing = sum(arm * over[joint] > 0.0 for arm in arms)
+    return float((1.0 if agreeing == len(arms) else -1.0) / agreeing)
 
 
 def _coefficients(model: mujoco.MjModel, tendon: int) -> Array:
     """Return the coefficients of a fixed tendon, shape (joints,); zeros of a spatial one."""
-    found = np.zeros(model.njnt)
+    coefficients = np.zeros(model.njnt)
     for k in _pieces(model, tendon):
         if model.wrap_type[k] == mujoco.mjtWrap.mjWRAP_JOINT:
-            found[model.wrap_objid[k]] += model.wrap_prm[k]
-    return found
+            coefficients[model.wrap_objid[k]] += model.wrap_prm[k]
+    return coefficients
 
 
 def _pieces(model: mujoco.MjModel, tendon: int) -> range:
@@ -187,7 +189,7 @@ def _tendon_law(model: mujoco.MjModel, name: str, law: Any) -> Coefficients:
     drag = law.drag or float(model.tendon_frictionloss[model.tendon(name).id])
     stiffness, hardening = _bristles(law, drag)
     return Coefficients(
-        **{key: getattr(law, key) for key in _ALIKE},
+        **{key: getattr(law, key) for key in _SAME_KEYS},
         stiction=law.stiction_ratio,
         stiffness=stiffness,
         floor=law.floor,
@@ -206,7 +208,7 @@ def _bristles(law: JointFrictionSettings | TendonFrictionSettings, level: float)
 def _crossed(model: mujoco.MjModel, name: str, law: RoutedFriction) -> tuple[tuple[bool, str, float], ...]:
     """Return the joints that a tendon crosses before its first pulley, with 1 for those that bend a fixed one."""
     tendon, movers = model.tendon(name).id, None
-    found = dict.fromkeys(np.flatnonzero(_coefficients(model, tendon)), 1.0)
+    weights = dict.fromkeys(np.flatnonzero(_coefficients(model, tendon)), 1.0)
     for k in _pieces(model, tendon):
         kind, at = model.wrap_type[k], model.wrap_objid[k]
         if kind == mujoco.mjtWrap.mjWRAP_PULLEY:
@@ -214,25 +216,25 @@ def _crossed(model: mujoco.MjModel, name: str, law: RoutedFriction) -> tuple[tup
         if kind != mujoco.mjtWrap.mjWRAP_JOINT:
             body = model.site_bodyid[at] if kind == mujoco.mjtWrap.mjWRAP_SITE else model.geom_bodyid[at]
             before, movers = movers, _movers(model, int(body))
-            found |= dict.fromkeys(sorted(movers ^ before) if before is not None else (), 0.0)
-    names = {int(j): model.joint(int(j)).name for j in found}
+            weights |= dict.fromkeys(sorted(movers ^ before) if before is not None else (), 0.0)
+    names = {int(j): model.joint(int(j)).name for j in weights}
     bends = set(names.values()) if law.bends is None else set(law.bends)
     for joint in law.bends or ():
         if joint not in names.values():
             raise InputError(f"tendons.{name}.bends", f"must be joints of it: {', '.join(names.values())}", joint)
     turns = {j: model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE for j in names}
     return tuple(
-        (True, names[j], one * float(turns[j] and names[j] in bends))
-        for j, one in ((int(j), one) for j, one in found.items())
+        (True, names[j], weight * float(turns[j] and names[j] in bends))
+        for j, weight in ((int(j), weight) for j, weight in weights.items())
         if int(model.jnt_type[j]) in _SINGLE
     )
 
 
 def _movers(model: mujoco.MjModel, body: int) -> set[int]:
     """Return the joints that move a body."""
-    found = set[int]()
+    joints = set[int]()
     while body:
         first = int(model.body_jntadr[body])
-        found |= set(range(first, first + int(model.body_jntnum[body])))
+        joints |= set(range(first, first + int(model.body_jntnum[body])))
         body = int(model.body_parentid[body])
-    return found
+    return joints

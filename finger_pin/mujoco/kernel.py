@@ -15,7 +15,7 @@ from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import Pointer, njit_inline, scratch
 from finger_pin.exchange.mujoco_friction import BRANCH, ELEMENT, MASS, PIN, SIGNAL, SIGNALS
 from finger_pin.mujoco.constraint_rows import TERM, TERMS, row_forces, write_rows
-from finger_pin.mujoco.elements import Seen, mass, pin, tendon
+from finger_pin.mujoco.elements import LawInputs, mass, pin, tendon
 from finger_pin.mujoco.friction_step import NUMERICAL_FLOOR, exerted, level_of, slide
 from finger_pin.mujoco.layout import Contact, Data, Kinds, Model
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
@@ -46,12 +46,12 @@ def instance_of(m: int, instance: int, at: Model, kinds: Kinds) -> tuple[int, in
     for a in range(size(m, at.nactuator)):
         if plugin[a] != instance:
             continue
-        own = integer_in(m, at.name_actuatoradr, a)
+        name = integer_in(m, at.name_actuatoradr, a)
         for t in range(size(m, at.ntuple)):
             other, k = integer_in(m, at.name_tupleadr, t), 0
-            while names[own + k] == names[other + k] and names[own + k] != 0:
+            while names[name + k] == names[other + k] and names[name + k] != 0:
                 k += 1
-            if names[own + k] == names[other + k]:
+            if names[name + k] == names[other + k]:
                 return a, t
     return -1, -1
 
@@ -107,23 +107,23 @@ def compute(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) ->
     while e < end:
         kind, loads, row = int(values[e + ELEMENT.kind]), int(values[e + ELEMENT.loads]), objects[e + 1]
         if kind == PIN:
-            seen = pin(m, d, at, of, e, x, reactions)
+            inputs = pin(m, d, at, of, e, x, reactions)
         elif kind == MASS:
-            seen = mass(m, d, at, of, kinds, e, reactions)
+            inputs = mass(m, d, at, of, kinds, e, reactions)
         else:
-            held = act[x] if loads > 0 else 0.0
+            constraint_tension = act[x] if loads > 0 else 0.0
             if kind == BRANCH:
-                held = act[z - int(values[e + ELEMENT.share])]
-            seen = tendon(m, d, at, of, kinds, e, act[z], held, along, about, reactions)
+                constraint_tension = act[z - int(values[e + ELEMENT.share])]
+            inputs = tendon(m, d, at, of, kinds, e, act[z], constraint_tension, along, about, reactions)
         row = TERMS * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
-        level, pull, damp, limit = _exerted(numbers(m, at.tuple_objprm, e), kind == PIN, seen, act[z], dt)
+        level, pull, damp, limit = _exerted(numbers(m, at.tuple_objprm, e), kind == PIN, inputs, act[z], dt)
         rows[row + TERM.pull] += pull
         rows[row + TERM.damp] += damp
         rows[row + TERM.limit] += limit
         states[place + SIGNAL.level], states[place + SIGNAL.load], states[place + SIGNAL.turn] = (
             level,
-            seen.load,
-            seen.turn,
+            inputs.load,
+            inputs.turn,
         )
         # `advance` moves the bristles, with the speed that the step ends with.
         rate[z] = 0.0
@@ -134,9 +134,9 @@ def compute(m: int, d: int, instance: int, at: Model, of: Data, kinds: Kinds) ->
 
 
 @njit_inline
-def _exerted(p: Pointer, of_pin: bool, seen: Seen, force: float, dt: float) -> tuple[float, float, float, float]:
+def _exerted(p: Pointer, of_pin: bool, inputs: LawInputs, force: float, dt: float) -> tuple[float, float, float, float]:
     """Return the level by (9b), (16), and a friction's part of its row: F - x, c + b, and the most that it exerts."""
-    speed, tension, pressing, most, turn = seen
+    speed, tension, pressing, most, turn = inputs
     level = _level(
         of_pin,
         p[ELEMENT.coulomb],
@@ -181,8 +181,8 @@ def advance(m: int, d: int, instance: int, at: Model, of: Data, contact: Contact
     states, act = numbers(d, of.plugin_state), numbers(d, of.act)
     dt, count = number(m, at.timestep), width + size(m, at.ntendon)
     room, pins = zeros(scratch(2 * count), 2 * count), False
-    forces, places, held = numbers_at(room), numbers_at(room + 8 * count), numbers_at(room + 8 * (count + width))
-    held_tensions(m, d, at, of, kinds, held)
+    forces, places, tensions = numbers_at(room), numbers_at(room + 8 * count), numbers_at(room + 8 * (count + width))
+    held_tensions(m, d, at, of, kinds, tensions)
     row_forces(m, d, at, of, kinds, width, forces)
     while e < end:
         kind, loads, row, bristle = (
@@ -204,7 +204,7 @@ def advance(m: int, d: int, instance: int, at: Model, of: Data, contact: Contact
             places[objects[e]], pins = x, True
             act[x], act[x + 1], act[x + 2] = 0.0, 0.0, 0.0
         elif loads > 0:
-            act[x] = held[objects[e]]
+            act[x] = tensions[objects[e]]
         e, z, x, place = e + int(values[e + ELEMENT.length]), z + 1, x + loads, place + SIGNALS
     if pins:
         contact_loads(m, d, at, of, contact, kinds, places, act)
@@ -216,8 +216,8 @@ def _speed(m: int, d: int, at: Model, of: Data, element: int, is_joint: bool) ->
     speeds = numbers(d, of.qvel)
     if is_joint:
         return speeds[integer_in(m, at.jnt_dofadr, element)]
-    arms, columns, found = numbers(d, of.ten_J), integers(m, at.ten_J_colind), 0.0
+    arms, columns, speed = numbers(d, of.ten_J), integers(m, at.ten_J_colind), 0.0
     first = integer_in(m, at.ten_J_rowadr, element)
     for k in range(first, first + integer_in(m, at.ten_J_rownnz, element)):
-        found += arms[k] * speeds[columns[k]]
-    return found
+        speed += arms[k] * speeds[columns[k]]
+    return speed

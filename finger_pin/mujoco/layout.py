@@ -74,10 +74,10 @@ def _type(declared: Any) -> Any:
     if kind == "PointerType":
         return ctypes.c_void_p
     if kind == "ArrayType":
-        found = _type(declared.inner_type)
+        array_type = _type(declared.inner_type)
         for size in reversed(declared.extents):
-            found *= int(size)
-        return found
+            array_type *= int(size)
+        return array_type
     if kind == "AnonymousStructDecl":
         return _made("anonymous", declared)
     name = declared.name.removeprefix("struct ").rstrip("_")
@@ -160,8 +160,8 @@ def _disagreements(at: Model, of: Data, contact: Contact) -> list[str]:
                 continue
             wrong += [] if same else [name]
     first = ctypes.c_size_t.from_address(data._address + of.contact).value
-    seen = data.contact
+    contacts = data.contact
     for name in ("frame", "friction", "geom"):
-        wrong += [] if getattr(seen, name).ctypes.data == first + getattr(contact, name) else [f"contact.{name}"]
-    wrong += [] if seen.dim.strides[0] in (contact.size, 4) else ["contact"]
+        wrong += [] if getattr(contacts, name).ctypes.data == first + getattr(contact, name) else [f"contact.{name}"]
+    wrong += [] if contacts.dim.strides[0] in (contact.size, 4) else ["contact"]
     return wrong

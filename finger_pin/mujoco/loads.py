@@ -87,17 +87,17 @@ def turn_of_path(d: int, of: Data, tendon: int) -> float:
 
 
 @njit_inline
-def held_tensions(m: int, d: int, at: Model, of: Data, kinds: Kinds, found: Pointer) -> None:
+def held_tensions(m: int, d: int, at: Model, of: Data, kinds: Kinds, tensions: Pointer) -> None:
     """Add the forces of limits and equalities along tendons, N, by the solver's last forces."""
     kind, which, force = integers(d, of.efc_type), integers(d, of.efc_id), numbers(d, of.efc_force)
     couples, first, second = integers(m, at.eq_type), integers(m, at.eq_obj1id), integers(m, at.eq_obj2id)
     for r in range(integer(d, of.nefc)):
         if kind[r] == kinds.limit_tendon:
-            found[which[r]] += abs(force[r])
+            tensions[which[r]] += abs(force[r])
         elif kind[r] == kinds.equality and couples[which[r]] == kinds.eq_tendon:
-            found[first[which[r]]] += abs(force[r])
+            tensions[first[which[r]]] += abs(force[r])
             if second[which[r]] >= 0:
-                found[second[which[r]]] += abs(force[r])
+                tensions[second[which[r]]] += abs(force[r])
 
 
 @njit_inline
@@ -118,11 +118,11 @@ def contact_loads(
             sign, body = 2.0 * side - 1.0, carrier[geoms[side]] if geoms[side] >= 0 else 0
             while body > 0:
                 for j in range(joints[body], joints[body] + count[body]):
-                    own = int(place[j])
-                    if own > 0:
-                        act[own] += sign * x
-                        act[own + 1] += sign * y
-                        act[own + 2] += sign * z
+                    index = int(place[j])
+                    if index > 0:
+                        act[index] += sign * x
+                        act[index + 1] += sign * y
+                        act[index + 2] += sign * z
                 body = parent[body]
 
 

@@ -26,18 +26,18 @@ TENDON_KEYS, JOINT = RoutedFriction, JointFrictionSettings
 
 
 def choose(
-    given: Mapping[str, Mapping[str, Any]] | None, names: list[str], entry: str, kind: type[Description]
+    patterns: Mapping[str, Mapping[str, Any]] | None, names: list[str], entry: str, kind: type[Description]
 ) -> dict[str, tuple[Any, bool]]:
-    """Return, by name, checked numbers and whether the name itself was given, in place of one with stars.
+    """Return the checked keys of every name that matches, and whether it was written without stars.
 
     Raises:
         InputError: If a name matches nothing, or a key or number is not allowed.
     """
     tables: dict[str, dict[str, Any]] = {}
     named = set()
-    if not isinstance(given or {}, Mapping):
-        raise InputError(entry, "must be a table of names, with keys for each", given)
-    for pattern, keys in (given or {}).items():
+    if not isinstance(patterns or {}, Mapping):
+        raise InputError(entry, "must be a table of names, with keys for each", patterns)
+    for pattern, keys in (patterns or {}).items():
         if not isinstance(keys, Mapping):
             raise InputError(f"{entry}.{pattern}", "must be a table of keys", keys)
         matching = [name for name in names if fnmatchcase(name, pattern)]

@@ -7,7 +7,7 @@ import math
 import mujoco
 
 from finger_pin.exceptions import InputError
-from finger_pin.mujoco.signals import friction
+from finger_pin.mujoco.friction_signals import friction
 from finger_pin.mujoco.specification import add_friction
 
 #: A slider on a tendon, which a motor pulls, and another motor on its joint.
@@ -29,8 +29,8 @@ def try_self_test() -> None:
     try:
         model = spec.compile()
     except ValueError as error:
-        told = " ".join(str(error).split())
-        raise InputError(f"mujoco {mujoco.__version__}", f"friction needs MuJoCo 3.12 or later: {told}") from None
+        message = " ".join(str(error).split())
+        raise InputError(f"mujoco {mujoco.__version__}", f"friction needs MuJoCo 3.12 or later: {message}") from None
     tension, borne = 10.0, 10.0 * (1.0 - math.exp(-0.3))
     data, moved = mujoco.MjData(model), []
     for share in (0.8, 1.1):

@@ -68,26 +68,26 @@ def add_friction(spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys 
     branches = add_branches(spec, model, pulled(model, rubbing))
     if branches:
         model = spec.compile()
-    found = frictions(model, rubbing, turning, branches)
-    if not found:
+    plugin_frictions = frictions(model, rubbing, turning, branches)
+    if not plugin_frictions:
         raise InputError("spec", "nothing pulls the tendons, and no joints are named: there is no friction to add")
-    warn_if_stiff(model, found, "spec.option.timestep")
-    _write(spec, model, found)
+    warn_if_stiff(model, plugin_frictions, "spec.option.timestep")
+    _write(spec, model, plugin_frictions)
 
 
 def warn_if_noslip(option: Any, entry: str) -> None:
     """Warn of iterations that take the bristles away."""
     if option.noslip_iterations:
-        told = "they take the bristles away, so that friction creeps"
-        warnings.warn(MujocoWarning(f"{entry}.noslip_iterations: {told}"), stacklevel=3)
+        reason = "they take the bristles away, so that friction creeps"
+        warnings.warn(MujocoWarning(f"{entry}.noslip_iterations: {reason}"), stacklevel=3)
 
 
-def warn_if_stiff(model: mujoco.MjModel, found: list[PluginFriction], entry: str) -> None:
+def warn_if_stiff(model: mujoco.MjModel, plugin_frictions: list[PluginFriction], entry: str) -> None:
     """Warn where dampers or servos are stiff for the step."""
-    stiff = sorted({each.row for each in found if _damping(model, each) > _STIFF})
+    stiff = sorted({each.row for each in plugin_frictions if _damping(model, each) > _STIFF})
     if stiff:
-        told = "a step is long for the dampers or servos there, and friction stops too little: take shorter steps"
-        warnings.warn(MujocoWarning(f"{entry}: {', '.join(stiff)}: {told}"), stacklevel=3)
+        reason = "a step is long for the dampers or servos there, and friction stops too little: take shorter steps"
+        warnings.warn(MujocoWarning(f"{entry}: {', '.join(stiff)}: {reason}"), stacklevel=3)
 
 
 def _damping(model: mujoco.MjModel, friction: PluginFriction) -> float:
@@ -118,23 +118,23 @@ def name_all(spec: mujoco.MjSpec) -> None:
     """Name unnamed elements for the table and branches."""
     named = {"tendon": spec.tendons, "joint": spec.joints, "site": spec.sites, "geom": spec.geoms}
     for what, elements in named.items():
-        for index, each in enumerate(elements):
-            each.name = each.name or f"{what}_{index}"
+        for index, element in enumerate(elements):
+            element.name = element.name or f"{what}_{index}"
 
 
-def _write(spec: mujoco.MjSpec, model: mujoco.MjModel, found: list[PluginFriction]) -> None:
+def _write(spec: mujoco.MjSpec, model: mujoco.MjModel, plugin_frictions: list[PluginFriction]) -> None:
     """Add actuator, tuple and plugin, and prepare the rows."""
-    elements = [element for each in found for element in each.elements()]
+    elements = [element for each in plugin_frictions for element in each.elements()]
     kinds, names, values = zip(*elements, strict=True)
     types = {"joint": mujoco.mjtObj.mjOBJ_JOINT, "tendon": mujoco.mjtObj.mjOBJ_TENDON}
     spec.add_tuple(name=NAME, objtype=[types[each] for each in kinds], objname=list(names), objprm=list(values))
-    states = sum(each.states for each in found)
+    states = sum(each.states for each in plugin_frictions)
     for key in spec.keys:
         if len(key.act):
             key.act = np.append(np.array(key.act), np.zeros(states))
     spec.activate_plugin(PLUGIN)
     plugin = spec.add_plugin(name=NAME, plugin_name=PLUGIN, active=True)
-    plugin.config = {COUNT: str(len(found))}
+    plugin.config = {COUNT: str(len(plugin_frictions))}
     # In a class of its own, so that XML keeps what makes it an actuator without an input; no default of the model acts.
     default, plain = spec.add_default(NAME, spec.default), mujoco.MjSpec()
     for field in _OF_DEFAULTS:
@@ -142,20 +142,20 @@ def _write(spec: mujoco.MjSpec, model: mujoco.MjModel, found: list[PluginFrictio
         if hasattr(plain.default.actuator, field):
             setattr(default.actuator, field, getattr(plain.default.actuator, field))
     default.actuator.gaintype, default.actuator.ctrlspec = mujoco.mjtGain.mjGAIN_DCMOTOR, NO_INPUT
-    target, kind = _target(spec, found)
+    target, kind = _target(spec, plugin_frictions)
     actuator = spec.add_actuator(default, name=NAME, trntype=kind, target=target, actdim=states)
     actuator.gaintype, actuator.ctrlspec = mujoco.mjtGain.mjGAIN_DCMOTOR, NO_INPUT
     actuator.dyntype, actuator.biastype = mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtBias.mjBIAS_NONE
     actuator.gear, actuator.group, actuator.plugin = np.zeros(6), GROUP, plugin
-    for each in found:
-        row = spec.joint(each.row) if each.row_of_joint else spec.tendon(each.row)
-        row.frictionloss = max(float(row.frictionloss), abs(each.ratio) * each.least, LEAST_LOSS)
+    for friction in plugin_frictions:
+        row = spec.joint(friction.row) if friction.row_of_joint else spec.tendon(friction.row)
+        row.frictionloss = max(float(row.frictionloss), abs(friction.ratio) * friction.least, LEAST_LOSS)
 
 
-def _target(spec: mujoco.MjSpec, found: list[PluginFriction]) -> tuple[str, mujoco.mjtTrn]:
+def _target(spec: mujoco.MjSpec, plugin_frictions: list[PluginFriction]) -> tuple[str, mujoco.mjtTrn]:
     """Return a harmless target for the actuator: a driven element of an active tree."""
-    for each in spec.actuators:
-        if each.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_TENDON):
-            return each.target, each.trntype
-    kind = mujoco.mjtTrn.mjTRN_JOINT if found[0].of_joint else mujoco.mjtTrn.mjTRN_TENDON
-    return found[0].name, kind
+    for actuator in spec.actuators:
+        if actuator.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_TENDON):
+            return actuator.target, actuator.trntype
+    kind = mujoco.mjtTrn.mjTRN_JOINT if plugin_frictions[0].of_joint else mujoco.mjtTrn.mjTRN_TENDON
+    return plugin_frictions[0].name, kind

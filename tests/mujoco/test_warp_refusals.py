@@ -15,8 +15,8 @@ import finger_pin as fp
 from finger_pin.laws.bristle import friction_coefficient, friction_level
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mujoco import friction_step
-from finger_pin.mujoco.warp import functions, self_test
-from finger_pin.mujoco.warp.friction import attach_friction
+from finger_pin.mujoco.warp import callback_self_test, kernel_functions
+from finger_pin.mujoco.warp.friction_callbacks import attach_friction
 
 ROPE = {"rope": {"curvature_offset": 1.0}}
 
@@ -121,7 +121,7 @@ def test_a_version_that_calls_back_at_another_time_is_refused_in_one_line(monkey
     monkeypatch.setattr(mjw, "step", other)
     monkeypatch.setattr(fp.mujoco.warp.Friction, "_check", lambda *_: None)
     with pytest.raises(fp.InputError, match=r"^mujoco_warp .*: friction gives a wrong answer"):
-        self_test.try_self_test.__wrapped__("cpu", attach_friction)
+        callback_self_test.try_self_test.__wrapped__("cpu", attach_friction)
 
 
 def test_the_law_s_text_is_the_laws():
@@ -146,9 +146,9 @@ def test_the_law_s_text_is_the_laws():
 @wp.kernel
 def _slid(force: wp.array[float], moved: wp.array[float], level: wp.array[float], found: wp.array2d[float]):
     i = wp.tid()
-    change, _left = functions.slide(force[i], moved[i], level[i])
+    change, _left = kernel_functions.slide(force[i], moved[i], level[i])
     found[i, 0] = change
-    found[i, 1] = functions.capstan(0.1, wp.abs(moved[i]))
+    found[i, 1] = kernel_functions.capstan(0.1, wp.abs(moved[i]))
 
 
 def test_single_precision_keeps_the_digits_of_small_changes():

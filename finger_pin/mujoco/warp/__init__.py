@@ -8,7 +8,7 @@ try:
 except ImportError:
     raise InputError("mujoco_warp", f"is not installed: {installing('warp')}") from None
 
-from finger_pin.mujoco.warp.friction import Friction, add_friction
+from finger_pin.mujoco.warp.friction_callbacks import Friction, add_friction
 from finger_pin.mujoco.warp.names import add_branches
 
 __all__ = ["Friction", "add_branches", "add_friction"]

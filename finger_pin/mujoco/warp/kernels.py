@@ -8,7 +8,7 @@ import warp as wp
 
 from finger_pin.exchange import mujoco_friction as table
 from finger_pin.mujoco.friction_step import NUMERICAL_FLOOR
-from finger_pin.mujoco.warp import functions
+from finger_pin.mujoco.warp import kernel_functions
 from finger_pin.mujoco.warp.structures import (
     LAW,
     MEMORIES,
@@ -56,9 +56,9 @@ def finish(t: Table, s: State, x: TendonInputs) -> None:
             bristle, speed = float(0.0), float(0.0)
         dt = x.timestep[w % x.timestep.shape[0]]
         stiffness = s.law[LAW.stiffness, w, f] + s.law[LAW.hardening, w, f] * wp.abs(bristle)
-        change, _left = functions.slide(bristle, stiffness * dt * speed * t.ratio[f], level)
+        change, _left = kernel_functions.slide(bristle, stiffness * dt * speed * t.ratio[f], level)
         s.memory[w, f, MEMORY.bristle] = bristle + change
-        for k in range(MEMORY.held, _MEMORIES):
+        for k in range(MEMORY.constraint_tension, _MEMORIES):
             s.memory[w, f, k] = s.following[w, f, k]
 
 
@@ -76,10 +76,10 @@ def forget(s: State, mask: wp.array[bool]) -> None:
 
 
 @wp.func
-def _write_terms(t: Table, s: State, w: int, f: int, seen: wp.vec4, most: float, turn: float, dt: float) -> None:
-    """Write level, load and turn, and a friction's part of its row; seen are speed, load, normal force, bristles."""
+def _write_terms(t: Table, s: State, w: int, f: int, inputs: wp.vec4, most: float, turn: float, dt: float) -> None:
+    """Write level, load and turn, and a friction's part of its row; inputs are speed, load, normal force, bristles."""
     law = s.law
-    level = functions.level_of(
+    level = kernel_functions.level_of(
         t.kind[f] == _PIN,
         law[LAW.coulomb, w, f],
         law[LAW.stiction, w, f],
@@ -87,16 +87,24 @@ def _write_terms(t: Table, s: State, w: int, f: int, seen: wp.vec4, most: float,
         law[LAW.stribeck_exponent, w, f],
         law[LAW.floor, w, f],
         law[LAW.drag, w, f],
-        seen[0],
-        seen[2],
+        inputs[0],
+        inputs[2],
         turn,
     )
-    stiffness = law[LAW.stiffness, w, f] + law[LAW.hardening, w, f] * wp.abs(seen[3])
-    pull, damp, limit = functions.exerted(
-        level, stiffness, law[LAW.viscous, w, f], law[LAW.micro_damping, w, f], seen[0], seen[1], most, seen[3], dt
+    stiffness = law[LAW.stiffness, w, f] + law[LAW.hardening, w, f] * wp.abs(inputs[3])
+    pull, damp, limit = kernel_functions.exerted(
+        level,
+        stiffness,
+        law[LAW.viscous, w, f],
+        law[LAW.micro_damping, w, f],
+        inputs[0],
+        inputs[1],
+        most,
+        inputs[3],
+        dt,
     )
     s.signals[SIGNAL.level, w, f] = level
-    s.signals[SIGNAL.load, w, f] = seen[1]
+    s.signals[SIGNAL.load, w, f] = inputs[1]
     s.signals[SIGNAL.turn, w, f] = turn
     ratio = t.ratio[f]
     s.terms[w, f, TERM.pull] = ratio * pull
@@ -107,14 +115,14 @@ def _write_terms(t: Table, s: State, w: int, f: int, seen: wp.vec4, most: float,
 @wp.func
 def _drawn(t: Table, w: int, f: int, x: TendonInputs) -> float:
     """Return what actuators exert along a tendon, or of a link on its joint, within their limits."""
-    found = float(0.0)
+    force = float(0.0)
     for k in range(t.actuators_first[f], t.actuators_first[f + 1]):
         a = t.actuators[k]
         exerted, within = float(x.actuator_force[w, a]), x.actuator_forcerange[w % x.actuator_forcerange.shape[0], a]
         if x.actuator_forcelimited[a]:
             exerted = wp.clamp(exerted, within[0], within[1])
-        found += x.actuator_gear[w % x.actuator_gear.shape[0], a][0] * exerted
-    return found
+        force += x.actuator_gear[w % x.actuator_gear.shape[0], a][0] * exerted
+    return force
 
 
 @wp.kernel
@@ -125,34 +133,35 @@ def tendons(t: Table, s: State, x: TendonInputs) -> None:
     tendon, kind, trunk = t.element[f], t.kind[f], t.trunk[f]
     puller = t.element[trunk]
     pull = _drawn(t, w, f, x)
-    bristle, held, speed = s.memory[w, f, MEMORY.bristle], float(s.memory[w, f, MEMORY.held]), x.ten_velocity[w, tendon]
+    bristle, speed = s.memory[w, f, MEMORY.bristle], x.ten_velocity[w, tendon]
+    constraint_tension = float(s.memory[w, f, MEMORY.constraint_tension])
     if kind == _LINK:
         drive = pull * wp.abs(t.share[f]) * wp.sign(t.ratio[f])
         pull = wp.where(t.share[f] > 0.0, drive, wp.min(drive, 0.0))
     elif x.tendon_actfrclimited[puller]:
         within = x.tendon_actfrcrange[w % x.tendon_actfrcrange.shape[0], puller]
         pull = wp.clamp(pull, within[0], within[1])
-    pull += functions.spring(w, puller, x)
+    pull += kernel_functions.spring(w, puller, x)
     if kind == _BRANCH:
         # A part of what its tendon's friction has left.
-        _lost, left = functions.delivered(
+        _lost, left = kernel_functions.delivered(
             pull, wp.abs(pull), s.memory[w, trunk, MEMORY.bristle], s.law[LAW.viscous, w, f], x.ten_velocity[w, puller]
         )
-        pull, held = wp.where(pull > 0.0, t.share[f], -t.share[f]) * left, float(0.0)
-    tension = wp.abs(pull) + held
-    loss, left = functions.delivered(pull, tension, bristle, s.law[LAW.viscous, w, f], speed)
+        pull, constraint_tension = wp.where(pull > 0.0, t.share[f], -t.share[f]) * left, float(0.0)
+    tension = wp.abs(pull) + constraint_tension
+    loss, left = kernel_functions.delivered(pull, tension, bristle, s.law[LAW.viscous, w, f], speed)
     s.delivered[w, f] = left
     turn = float(s.law[LAW.curvature_offset, w, f])
     if tension + left > 0.0:
         if x.ten_wrapnum[w, tendon] > 0:
-            turn += functions.turn_of_path(w, tendon, x)
+            turn += kernel_functions.turn_of_path(w, tendon, x)
         else:
             for k in range(t.bends_first[f], t.bends_first[f + 1]):
                 turn += t.weights[k] * wp.abs(x.qpos[w, x.jnt_qposadr[t.bends[k]]])
     # What holds the tendon back takes no more than there is.
     most = wp.where(loss > 0.0, tension + s.law[LAW.drag, w, f] + s.law[LAW.floor, w, f], _MOST)
-    seen = wp.vec4(speed, tension, tension + left, bristle)
-    _write_terms(t, s, w, f, seen, most, turn, x.timestep[w % x.timestep.shape[0]])
+    inputs = wp.vec4(speed, tension, tension + left, bristle)
+    _write_terms(t, s, w, f, inputs, most, turn, x.timestep[w % x.timestep.shape[0]])
     if t.row[f] >= x.nv:
         first = x.ten_J_rowadr[t.row[f] - x.nv]
         for k in range(first, first + x.ten_J_rownnz[t.row[f] - x.nv]):
@@ -171,7 +180,7 @@ def pins(t: Table, s: State, x: PinInputs) -> None:
         s.memory[w, f, MEMORY.contact_x], s.memory[w, f, MEMORY.contact_y], s.memory[w, f, MEMORY.contact_z]
     )
     if wp.length_sq(outside) > 0.0:
-        way = functions.proximal(w, t.element[f], x)
+        way = kernel_functions.proximal(w, t.element[f], x)
         load = wp.length(outside - load * way)
-    seen = wp.vec4(x.qvel[w, t.row[f]], load, load, s.memory[w, f, MEMORY.bristle])
-    _write_terms(t, s, w, f, seen, _MOST, 0.0, x.timestep[w % x.timestep.shape[0]])
+    inputs = wp.vec4(x.qvel[w, t.row[f]], load, load, s.memory[w, f, MEMORY.bristle])
+    _write_terms(t, s, w, f, inputs, _MOST, 0.0, x.timestep[w % x.timestep.shape[0]])

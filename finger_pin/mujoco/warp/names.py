@@ -64,7 +64,7 @@ def branches_of(model: NamedModel, names: list[str]) -> dict[str, list[tuple[str
     Raises:
         InputError: If a tendon has a pulley, but its branches are no tendons.
     """
-    found: dict[str, list[tuple[str, float]]] = {}
+    branches: dict[str, list[tuple[str, float]]] = {}
     for name in names:
         first, count = (int(each[model.tendon(name).id]) for each in (model.tendon_adr, model.tendon_num))
         divisors = model.wrap_prm[first : first + count][
@@ -72,8 +72,8 @@ def branches_of(model: NamedModel, names: list[str]) -> dict[str, list[tuple[str
         ]
         made = [(f"{name}_branch_{k}", 1.0 / float(each)) for k, each in enumerate(np.asarray(divisors), start=1)]
         if any(branch not in model.tendons for branch, _ in made):
-            told = "has a pulley, behind which each branch rubs: fp.mujoco.warp.add_branches(spec) before compiling"
-            raise InputError(f"tendons.{name}", told)
+            reason = "has a pulley, behind which each branch rubs: fp.mujoco.warp.add_branches(spec) before compiling"
+            raise InputError(f"tendons.{name}", reason)
         if made:
-            found[name] = made
-    return found
+            branches[name] = made
+    return branches

@@ -4,7 +4,7 @@ import mujoco
 import warp as wp
 
 from finger_pin.exchange.mujoco_friction import PIN
-from finger_pin.mujoco.warp import functions
+from finger_pin.mujoco.warp import kernel_functions
 from finger_pin.mujoco.warp.structures import MEMORY, SIGNAL, TERM, ForceInputs, RowInputs, State, Table
 
 wp.set_module_options({"enable_backward": False})
@@ -55,32 +55,32 @@ def write_rows(t: Table, s: State, x: RowInputs) -> None:
 @wp.func
 def _limits_and_equalities(w: int, tendon: int, end: int, x: ForceInputs) -> float:
     """Return the forces of limits and equalities along a tendon, N."""
-    found = float(0.0)
+    tension = float(0.0)
     for r in range(end):
         i = x.id[w, r]
         if x.type[w, r] == _LIMIT_TENDON and i == tendon:
-            found += wp.abs(x.force[w, r])
+            tension += wp.abs(x.force[w, r])
         elif x.type[w, r] == _EQUALITY and x.eq_type[i] == _EQ_TENDON:
             if x.eq_obj1id[i] == tendon or x.eq_obj2id[i] == tendon:
-                found += wp.abs(x.force[w, r])
-    return found
+                tension += wp.abs(x.force[w, r])
+    return tension
 
 
 @wp.kernel
 def record(t: Table, s: State, x: ForceInputs) -> None:
-    """Record the solver's force of each friction, and what its forces load next: limits, equalities and contacts."""
+    """Record the solver's force of each friction, and the next step's loads: limits, equalities and contacts."""
     w, f = wp.tid()
     row = s.address[w, t.row_of[t.row[f]]]
     s.signals[SIGNAL.force, w, f] = 0.0
     if row >= 0:
         s.signals[SIGNAL.force, w, f] = -x.force[w, row] / t.ratio[f]
     end = wp.min(x.nefc[w], x.njmax)
-    if t.held[f] > 0:
+    if t.constrained[f] > 0:
         tendon = t.element[f]
-        s.following[w, f, MEMORY.held] = _limits_and_equalities(w, tendon, end, x)
+        s.following[w, f, MEMORY.constraint_tension] = _limits_and_equalities(w, tendon, end, x)
     if t.kind[f] != _PIN:
         return
-    found = wp.vec3(0.0, 0.0, 0.0)
+    contact_load = wp.vec3(0.0, 0.0, 0.0)
     for r in range(end):
         c = x.id[w, r]
         if x.type[w, r] >= _LEAST_CONTACT and x.efc_address[c, 0] == r:
@@ -93,6 +93,6 @@ def record(t: Table, s: State, x: ForceInputs) -> None:
                     side += 2.0 * float(k) - 1.0
             if side != 0.0 and x.efc_address[c, last - 1] >= 0:
                 elliptic = x.type[w, r] == _ELLIPTIC
-                found += side * functions.contact_force(w, r, elliptic, x)
+                contact_load += side * kernel_functions.contact_force(w, r, elliptic, x)
     for k in range(3):
-        s.following[w, f, MEMORY.contact_x + k] = found[k]
+        s.following[w, f, MEMORY.contact_x + k] = contact_load[k]

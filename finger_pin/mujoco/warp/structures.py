@@ -1,4 +1,4 @@
-"""Arrays of the frictions on the device: what does not change, and what a step changes."""
+"""Arrays of the frictions on the device: the constant ones, and those that a step changes."""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ class MemoryColumns(NamedTuple):
     """Columns of `State.memory`: the bristles' force, that of limits and equalities, and that of contacts."""
 
     bristle: int
-    held: int
+    constraint_tension: int
     contact_x: int
     contact_y: int
     contact_z: int
@@ -32,7 +32,7 @@ NEVER = -1e30
 
 @wp.struct
 class Table:
-    """Frictions as `PluginFriction` has them; lists of each stand one after the other, and ``*_first`` where.
+    """Frictions as `PluginFriction` has them; lists stand one after the other, each from its ``*_first`` on.
 
     Attributes:
         kind: Of the friction.
@@ -41,7 +41,7 @@ class Table:
         row: Degree of freedom, or nv plus tendon.
         ratio: Its speed over the row's.
         share: Of a link its tension over the joint's drive, of a branch the part of the cord's tension.
-        held: Whether limits or equalities pull it too.
+        constrained: Whether limits or equalities pull it too.
         tendons: Frictions of tendons.
         pins: Frictions of joints.
         actuators: Those that pull it, by friction.
@@ -57,7 +57,7 @@ class Table:
     row: wp.array[int]
     ratio: wp.array[float]
     share: wp.array[float]
-    held: wp.array[int]
+    constrained: wp.array[int]
     tendons: wp.array[int]
     pins: wp.array[int]
     actuators_first: wp.array[int]
@@ -74,7 +74,7 @@ class Table:
 
 @wp.struct
 class State:
-    """What a step changes; worlds, then frictions.
+    """Arrays that a step changes; worlds, then frictions.
 
     Attributes:
         law: Coefficients, first axis `LAW`.
@@ -101,7 +101,7 @@ class State:
 
 @wp.struct
 class TendonInputs:
-    """What frictions of tendons read of MuJoCo's model and data, under its names."""
+    """Fields of MuJoCo's model and data that frictions of tendons read, under its names."""
 
     nv: int
     timestep: wp.array[float]
@@ -132,7 +132,7 @@ class TendonInputs:
 
 @wp.struct
 class PinInputs:
-    """What frictions of joints read likewise."""
+    """Fields that frictions of joints read, likewise."""
 
     timestep: wp.array[float]
     body_parentid: wp.array[int]
@@ -146,7 +146,7 @@ class PinInputs:
 
 @wp.struct
 class RowInputs:
-    """What the solver's rows of friction are written from, and the rows: ``type`` to ``frictionloss`` of ``efc``."""
+    """Inputs of the solver's rows of friction, and the rows: ``type`` to ``frictionloss`` of ``efc``."""
 
     nv: int
     timestep: wp.array[float]
@@ -164,7 +164,7 @@ class RowInputs:
 
 @wp.struct
 class ForceInputs:
-    """The solver's rows with their forces, of ``efc``, and what says whose they are."""
+    """The solver's rows with their forces, of ``efc``, and the elements that they belong to."""
 
     nefc: wp.array[int]
     njmax: int

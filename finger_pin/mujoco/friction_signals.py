@@ -66,24 +66,24 @@ def friction(model: mujoco.MjModel, data: mujoco.MjData) -> Signals:
     register()
     if int(model.opt.integrator) == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1)):
         raise InputError("model.opt.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
-    own = [i for i in range(model.nactuator) if model.actuator_plugin[i] >= 0 and _table(model, i) is not None]
-    if not own:
+    actuators = [i for i in range(model.nactuator) if model.actuator_plugin[i] >= 0 and _table(model, i) is not None]
+    if not actuators:
         raise InputError("model", "has no friction: add_friction(spec, ...) before compiling it")
-    found = [_signals(model, data, i) for i in own]
-    if len(found) == 1:
-        return found[0]
+    signals = [_signals(model, data, i) for i in actuators]
+    if len(signals) == 1:
+        return signals[0]
     arrays = {
-        name: np.concatenate([getattr(each, name) for each in found])
+        name: np.concatenate([getattr(each, name) for each in signals])
         for name in Signals.__annotations__
         if name != "names"
     }
-    return Signals(tuple(name for each in found for name in each.names), **arrays)
+    return Signals(tuple(name for each in signals for name in each.names), **arrays)
 
 
 def _table(model: mujoco.MjModel, actuator: int) -> int | None:
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) or ""
-    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TUPLE, name)
-    return found if found >= 0 and name.endswith(NAME) else None
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TUPLE, name)
+    return index if index >= 0 and name.endswith(NAME) else None
 
 
 def _signals(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Signals:

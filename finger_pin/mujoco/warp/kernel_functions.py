@@ -1,4 +1,4 @@
-"""Functions of the kernels: the law's text compiled by Warp, and what loads and bends frictions."""
+"""Functions of the kernels: the law's text compiled by Warp, and the loads and turns of frictions."""
 
 from collections.abc import Callable
 from types import FunctionType
@@ -69,16 +69,16 @@ def turn_of_path(w: int, tendon: int, x: TendonInputs) -> float:
 def proximal(w: int, joint: int, x: PinInputs) -> wp.vec3:
     """Return e_j: from the joint before to this one, or the x axis of its carrier."""
     carrier = x.body_parentid[x.jnt_bodyid[joint]]
-    found = wp.vec3(x.xmat[w, carrier][0, 0], x.xmat[w, carrier][1, 0], x.xmat[w, carrier][2, 0])
+    direction = wp.vec3(x.xmat[w, carrier][0, 0], x.xmat[w, carrier][1, 0], x.xmat[w, carrier][2, 0])
     body = int(carrier)
     while body > 0:
         if x.body_jntnum[body] > 0:
             way = x.xanchor[w, joint] - x.xanchor[w, x.body_jntadr[body] + x.body_jntnum[body] - 1]
             if wp.length(way) > 1e-6:
-                found = wp.normalize(way)
+                direction = wp.normalize(way)
                 body = 0
         body = x.body_parentid[body]
-    return found
+    return direction
 
 
 @wp.func

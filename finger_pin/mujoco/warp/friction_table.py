@@ -19,29 +19,29 @@ from finger_pin.typing import Array
 _ROWS = {mujoco.mjtEq.mjEQ_CONNECT: 3, mujoco.mjtEq.mjEQ_WELD: 6}
 
 
-def build_table(model: NamedModel, found: list[PluginFriction]) -> Table:
+def build_table(model: NamedModel, plugin_frictions: list[PluginFriction]) -> Table:
     """Return the table of frictions on the present device."""
-    places = {(each.of_joint, each.name): f for f, each in enumerate(found)}
-    rows = [_row(model, each) for each in found]
+    places = {(each.of_joint, each.name): f for f, each in enumerate(plugin_frictions)}
+    rows = [_row(model, each) for each in plugin_frictions]
     numbered = {row: k for k, row in enumerate(dict.fromkeys(rows))}
-    trunks = [places[False, each.more[0][1]] if each.kind == BRANCH else f for f, each in enumerate(found)]
+    trunks = [places[False, each.more[0][1]] if each.kind == BRANCH else f for f, each in enumerate(plugin_frictions)]
     t = Table()
-    t.kind, t.row, t.trunk = _ints(each.kind for each in found), _ints(rows), _ints(trunks)
-    t.element = _ints((model.joint if each.of_joint else model.tendon)(each.name).id for each in found)
-    t.ratio = wp.array([each.ratio for each in found], dtype=float)
-    shares = [each.more[0][2] if each.kind == BRANCH else each.share for each in found]
-    t.share, t.held = wp.array(shares, dtype=float), _ints(each.held for each in found)
-    t.tendons = _ints(f for f, each in enumerate(found) if not each.of_joint)
-    t.pins = _ints(f for f, each in enumerate(found) if each.of_joint)
-    t.actuators_first, t.actuators = _lists(_actuators(model, found[trunk]) for trunk in trunks)
-    crossed = [[each for each in friction.more if each[0]] for friction in found]
+    t.kind, t.row, t.trunk = _ints(each.kind for each in plugin_frictions), _ints(rows), _ints(trunks)
+    t.element = _ints((model.joint if each.of_joint else model.tendon)(each.name).id for each in plugin_frictions)
+    t.ratio = wp.array([each.ratio for each in plugin_frictions], dtype=float)
+    shares = [each.more[0][2] if each.kind == BRANCH else each.share for each in plugin_frictions]
+    t.share, t.constrained = wp.array(shares, dtype=float), _ints(each.held for each in plugin_frictions)
+    t.tendons = _ints(f for f, each in enumerate(plugin_frictions) if not each.of_joint)
+    t.pins = _ints(f for f, each in enumerate(plugin_frictions) if each.of_joint)
+    t.actuators_first, t.actuators = _lists(_actuators(model, plugin_frictions[trunk]) for trunk in trunks)
+    crossed = [[each for each in friction.more if each[0]] for friction in plugin_frictions]
     t.bends_first, t.bends = _lists([model.joint(name).id for _, name, _ in each] for each in crossed)
     t.weights = wp.array(np.array([weight for each in crossed for *_, weight in each], np.float32), dtype=float)
     loads = [
         [f for f, each in enumerate(crossed) if any(name == friction.name for _, name, _ in each)]
         if friction.kind == PIN
         else []
-        for friction in found
+        for friction in plugin_frictions
     ]
     t.loads_first, t.loads = _lists(loads)
     t.sharing_first, t.sharing = _lists([f for f, row in enumerate(rows) if row == one] for one in numbered)
@@ -77,12 +77,12 @@ def _actuators(model: NamedModel, friction: PluginFriction) -> list[int]:
     return [int(each) for each in np.flatnonzero(acting)]
 
 
-def losses(model: NamedModel, found: list[PluginFriction]) -> tuple[Array, Array]:
+def losses(model: NamedModel, plugin_frictions: list[PluginFriction]) -> tuple[Array, Array]:
     """Return the least friction losses of degrees of freedom, shape (nv,), and tendons, by which they have rows."""
     least = np.zeros(model.nv + model.ntendon)
-    for each in found:
-        row = _row(model, each)
-        least[row] = max(least[row], abs(each.ratio) * each.least, LEAST_LOSS)
+    for friction in plugin_frictions:
+        row = _row(model, friction)
+        least[row] = max(least[row], abs(friction.ratio) * friction.least, LEAST_LOSS)
     return least[: model.nv], least[model.nv :]
 
 
@@ -102,5 +102,5 @@ def check_rows(model: NamedModel, data: Any, of_dofs: Array, of_tendons: Array) 
         needed["njmax_nnz"] = fixed + int(model.ten_J_rownnz[rubbing].sum() + model.ten_J_rownnz[limited].sum())
     for name, least in needed.items():
         if getattr(data, name) < least:
-            told = f"must be at least {least}, for rows of equalities, frictions and limits, and more for contacts"
-            raise InputError(f"d.{name}", told, getattr(data, name))
+            reason = f"must be at least {least}, for rows of equalities, frictions and limits, and more for contacts"
+            raise InputError(f"d.{name}", reason, getattr(data, name))

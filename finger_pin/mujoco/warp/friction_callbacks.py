@@ -12,13 +12,14 @@ import warp as wp
 
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import SIGNAL, Coefficients, PluginFriction
+from finger_pin.mujoco.friction_signals import place_of
 from finger_pin.mujoco.frictions import frictions, pulled
 from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose
-from finger_pin.mujoco.signals import place_of
 from finger_pin.mujoco.specification import Keys, warn_if_noslip, warn_if_stiff
 from finger_pin.mujoco.warp import kernels, row_kernels
+from finger_pin.mujoco.warp.callback_self_test import try_self_test
+from finger_pin.mujoco.warp.friction_table import build_table, check_rows, losses
 from finger_pin.mujoco.warp.names import NamedModel, branches_of
-from finger_pin.mujoco.warp.self_test import try_self_test
 from finger_pin.mujoco.warp.structures import (
     LAWS,
     MEMORIES,
@@ -29,7 +30,6 @@ from finger_pin.mujoco.warp.structures import (
     TendonInputs,
     allocate,
 )
-from finger_pin.mujoco.warp.tables import build_table, check_rows, losses
 
 _DISCRETE = int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1))
 #: Switches that must stay as they are, with what they are for.
@@ -66,23 +66,26 @@ class Friction:
         turn: phi, rad, of a tendon.
     """
 
-    def __init__(self, m: Any, d: Any, model: NamedModel, found: list[PluginFriction]) -> None:
+    def __init__(self, m: Any, d: Any, model: NamedModel, plugin_frictions: list[PluginFriction]) -> None:
         """Make the arrays, and set the callbacks of ``m``; see `add_friction`."""
-        self.names = tuple(each.name for each in found)
+        self.names = tuple(each.name for each in plugin_frictions)
         self._data, self._device = d, d.qpos.device
         self._model = m
         with wp.ScopedDevice(self._device):
-            self._table = build_table(model, found)
+            self._table = build_table(model, plugin_frictions)
             rows = self._table.sharing_first.shape[0] - 1
-            self._arrays = s = allocate(d.nworld, len(found), rows, d.ten_J.shape[1])
-            law = np.array([each.law for each in found], np.float32).T[:, None]
-            s.law.assign(np.broadcast_to(law, (LAWS, d.nworld, len(found))).copy())
+            self._arrays = s = allocate(d.nworld, len(plugin_frictions), rows, d.ten_J.shape[1])
+            law = np.array([each.law for each in plugin_frictions], np.float32).T[:, None]
+            s.law.assign(np.broadcast_to(law, (LAWS, d.nworld, len(plugin_frictions))).copy())
             self._every = wp.full((d.nworld,), True, dtype=bool)
-        views = Coefficients(*(s.law[k] for k in range(LAWS)))
-        self.coulomb, self.stiction, self.stiffness, self.viscous = views[:4]
-        self.stribeck_velocity, self.floor, self.stribeck_exponent = views[4:7]
-        self.micro_damping, self.drag, self.curvature_offset, self.hardening = views[7:]
-        self.level, self.friction, self.tension, self.turn = (s.signals[k] for k in SIGNAL)
+        columns = Coefficients(*(s.law[k] for k in range(LAWS)))
+        self.coulomb, self.stiction = columns.coulomb, columns.stiction
+        self.stiffness, self.viscous = columns.stiffness, columns.viscous
+        self.stribeck_velocity, self.stribeck_exponent = columns.stribeck_velocity, columns.stribeck_exponent
+        self.floor, self.micro_damping, self.drag = columns.floor, columns.micro_damping, columns.drag
+        self.curvature_offset, self.hardening = columns.curvature_offset, columns.hardening
+        self.level, self.friction = s.signals[SIGNAL.level], s.signals[SIGNAL.force]
+        self.tension, self.turn = s.signals[SIGNAL.load], s.signals[SIGNAL.turn]
         self._inputs: dict[Any, tuple[list[Any], Any]] = {}
         self._before, self._sensors = m.callback.act_bias, m.callback.sensor
         m.callback.act_bias, m.callback.sensor = self._act_bias, self._sensor
@@ -107,13 +110,11 @@ class Friction:
 
     @state.setter
     def state(self, value: Any) -> None:
-        shape, given = (
-            self._arrays.memory.shape,
-            value if isinstance(value, wp.array) else np.asarray(value, np.float32),
-        )
-        if tuple(given.shape) != tuple(shape):
-            raise InputError("state", f"must have the shape (worlds, frictions, {MEMORIES}), {shape}", given.shape)
-        self._arrays.memory.assign(given)
+        shape = self._arrays.memory.shape
+        values = value if isinstance(value, wp.array) else np.asarray(value, np.float32)
+        if tuple(values.shape) != tuple(shape):
+            raise InputError("state", f"must have the shape (worlds, frictions, {MEMORIES}), {shape}", values.shape)
+        self._arrays.memory.assign(values)
         self._arrays.clock.fill_(NEVER)
 
     def reset(self, mask: Any = None) -> None:
@@ -189,10 +190,10 @@ def check_options(option: Any, entry: str) -> None:
     """
     if int(option.integrator) == _DISCRETE:
         raise InputError(f"{entry}.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
-    for bit, told in _NEEDED.items():
+    for bit, purpose in _NEEDED.items():
         if int(option.disableflags) & int(bit):
             name = bit.name.removeprefix("mjDSBL_").lower()
-            raise InputError(f"{entry}.disableflags", f"friction needs what it disables: {told}", name)
+            raise InputError(f"{entry}.disableflags", f"friction needs what it disables: {purpose}", name)
 
 
 def add_friction(
@@ -240,13 +241,13 @@ def attach_friction(m: Any, d: Any, mjm: mujoco.MjModel, tendons: Keys | None, j
     model = NamedModel(mjm)
     rubbing = choose(tendons, model.tendons, "tendons", TENDON_KEYS)
     turning = choose(joints, model.joints, "joints", JOINT)
-    found = frictions(model, rubbing, turning, branches_of(model, pulled(model, rubbing)))
-    if not found:
+    plugin_frictions = frictions(model, rubbing, turning, branches_of(model, pulled(model, rubbing)))
+    if not plugin_frictions:
         raise InputError("mjm", "nothing pulls the tendons, and no joints are named: there is no friction to add")
-    warn_if_stiff(model, found, "mjm.opt.timestep")
-    of_dofs, of_tendons = losses(model, found)
+    warn_if_stiff(model, plugin_frictions, "mjm.opt.timestep")
+    of_dofs, of_tendons = losses(model, plugin_frictions)
     check_rows(model, d, of_dofs, of_tendons)
     for array, least in ((m.dof_frictionloss, of_dofs), (m.tendon_frictionloss, of_tendons)):
         if array.size:
             array.assign(np.maximum(array.numpy(), least).astype(np.float32))
-    return Friction(m, d, model, found)
+    return Friction(m, d, model, plugin_frictions)
