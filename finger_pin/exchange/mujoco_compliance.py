@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 
+from scipy.optimize import brentq
+
 from finger_pin.exchange.mujoco_names import Table
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
 
 # Between these MuJoCo keeps the impedance.
 _IMPEDANCES = 1e-4, 0.9999
+# Speed of an impact that contacts throw back alike, m/s, and the least share of it.
+_IMPACT, _LEAST_SHARE = 0.1, 0.05
 # What descriptions have at most, N/m or N m/rad.
 _STIFFEST = 1e7
 
@@ -42,9 +46,43 @@ def soft_spring(
     return spring, min(damper, _STIFFEST)
 
 
-def contact_stiffness(read: ElementReader, solref: Array, solimp: Array, mobility: float) -> float:
-    """Return the stiffness of a contact without friction, N/m, as that of `soft_spring`."""
-    return min(_unbounded(read, solref, solimp, mobility)[0], _STIFFEST)
+def contact_numbers(read: ElementReader, solref: Array, solimp: Array, mobility: float) -> tuple[float, float]:
+    """Return the stiffness of a contact without friction, N/m, as that of `soft_spring`, and its damping, s/m.
+
+    Damping grows with the depth here, and does not in MuJoCo: an impact at 0.1 m/s is thrown back at the same speed.
+    """
+    spring, _, stiffness, damping = _unbounded(read, solref, solimp, mobility)
+    share = restitution(0.5 * damping / math.sqrt(stiffness))
+    return spring, impact_damping(max(share, _LEAST_SHARE)) / _IMPACT
+
+
+def restitution(ratio: float) -> float:
+    """Return the share of its speed that a spring and damper throw back, at a damping ratio, as they never pull.
+
+    The solution of x'' + 2 ratio x' + x = 0 until x'' = 0 (Schwager and Poeschel, Granular Matter 9, 2007).
+    """
+    if abs(ratio - 1.0) < 1e-6:
+        return math.exp(-2.0)
+    root = math.sqrt(abs(1.0 - ratio**2))
+    if ratio < 1.0:
+        phase = math.pi - math.atan2(2.0 * ratio * root, 1.0 - 2.0 * ratio**2)
+        return math.exp(-ratio * phase / root) * (ratio / root * math.sin(phase) - math.cos(phase))
+    phase = math.atanh(2.0 * ratio * root / (2.0 * ratio**2 - 1.0))
+    return math.exp(-ratio * phase / root) * (ratio / root * math.sinh(phase) - math.cosh(phase))
+
+
+def impact_damping(share: float) -> float:
+    """Return c v of a Hunt-Crossley contact that throws back a share e of the speed v of an impact.
+
+    c v (1 + e) = log((1 + c v) / (1 - e c v)), from the integral of m v' = -k d^p (1 + c v).
+    """
+    if share > 0.999:
+        return 1.5 * (1.0 - share)
+
+    def gap(speed: float) -> float:
+        return speed * (1.0 + share) - math.log((1.0 + speed) / (1.0 - share * speed))
+
+    return float(brentq(gap, 1e-6, (1.0 - 1e-15) / share))
 
 
 def _unbounded(read: ElementReader, solref: Array, solimp: Array, mobility: float) -> tuple[float, float, float, float]:

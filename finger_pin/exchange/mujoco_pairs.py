@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from finger_pin.description.surface import Surface
-from finger_pin.exchange.mujoco_compliance import contact_stiffness
+from finger_pin.exchange.mujoco_compliance import contact_numbers
 from finger_pin.exchange.mujoco_names import Table, model_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.typing import Array
@@ -59,17 +59,18 @@ class Pairs(ElementReader):
         return _kept(int(np.max(dims)), np.maximum(model.geom_friction[a], model.geom_friction[b]))
 
     def surfaces(self, met: dict[Pair, Array]) -> dict[int, Table]:
-        """Return the sliding friction and the stiffness of each geom, of which the smaller of two is their pair's.
+        """Return the sliding friction, stiffness and damping of each geom, of which the smaller of two is their pair's.
 
         No other numbers do if these do not; the pairs of which a number is greater than in MuJoCo are listed.
         """
         friction = self._shared("friction", {pair: float(numbers[0]) for pair, numbers in met.items()})
-        pressing = {pair: self._stiffness(pair, numbers) for pair, numbers in met.items()}
-        stiffness = self._shared("stiffness, N/m,", pressing, moves=False)
+        pressing = {pair: self._pressing(pair, numbers) for pair, numbers in met.items()}
+        stiffness = self._shared("stiffness, N/m,", {pair: each[0] for pair, each in pressing.items()}, moves=False)
+        damping = self._shared("damping, s/m,", {pair: each[1] for pair, each in pressing.items()}, moves=False)
         turning = [self._pair(pair) for pair, numbers in met.items() if numbers[1:].any()]
         if turning:
             self.rest.add(f"torsional and rolling friction (condim 4 and 6) of geoms: {_few(turning)}")
-        return {i: {"friction": friction[i], "stiffness": stiffness[i]} for i in friction}
+        return {i: {"friction": friction[i], "stiffness": stiffness[i], "damping": damping[i]} for i in friction}
 
     def _shared(self, what: str, wanted: dict[Pair, float], moves: bool = True) -> dict[int, float]:
         """Return the least number of each geom with which no pair has less than it is to have; list those with more."""
@@ -87,20 +88,20 @@ class Pairs(ElementReader):
             self.rest.add(f"{what} of pairs of geoms, which is greater here: {_few(wrong)}", moves)
         return found
 
-    def _stiffness(self, pair: Pair, friction: Array) -> float:
-        """Return the stiffness of a contact of two geoms at one point, N/m.
+    def _pressing(self, pair: Pair, friction: Array) -> tuple[float, float]:
+        """Return the stiffness of a contact of two geoms at one point, N/m, and its damping, s/m.
 
         In a pyramid of friction, edges of slope mu share the load: of n directions 2 n, of 2 mu^2 (1 + mu^2) R each.
         """
         model, bodies = self.model, self.model.geom_bodyid[[*pair]]
         mobility = float(np.sum(model.body_invweight0[bodies, 0]))
         if not mobility:
-            return Surface().stiffness
-        stiffness = contact_stiffness(self, *self._softness(pair), mobility)
+            return Surface().stiffness, Surface().damping
+        stiffness, damping = contact_numbers(self, *self._softness(pair), mobility)
         if model.opt.cone == self.mujoco.mjtCone.mjCONE_PYRAMIDAL and friction[0]:
             directions = 2 + np.count_nonzero(friction[[1, 2, 2]])
             stiffness *= float(model.opt.impratio) * directions / (friction[0] ** 2 * (1.0 + friction[0] ** 2))
-        return float(stiffness)
+        return float(stiffness), damping
 
     def _softness(self, pair: Pair) -> tuple[Array, Array]:
         """Return solref and solimp of a pair, mixed as `mj_contactParam` does."""
