@@ -72,7 +72,8 @@ BALL = """<mujoco><option timestep="1e-3" cone="CONE" gravity="0 0 -200"/><world
 )
 def test_contacts_give_as_in_mujoco_under_a_load(cone, dim, soft):
     text = BALL.replace("CONE", cone).replace("DIM", str(dim)).replace("SOFT", soft)
-    data, result = both(text, 1.0)
+    # Deep contacts settle with the time constant c d, 0.3 s here.
+    data, result = both(text, 2.5)
     # Deeper than the width of solimp, within which MuJoCo's give more.
     assert data.contact.dist[0] < -1e-3
     assert float(result.object_position[-1, 0, 2]) - 0.01 == pytest.approx(data.contact.dist[0], rel=0.01)
