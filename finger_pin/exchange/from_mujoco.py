@@ -71,7 +71,7 @@ def from_mujoco(
     if isinstance(model, str | Path | mujoco.MjSpec):
         try:
             spec = model.copy() if isinstance(model, mujoco.MjSpec) else mujoco.MjSpec.from_file(str(model))
-            plugins = [each.plugin_name for each in spec.plugins]
+            plugins = [plugin.plugin_name for plugin in spec.plugins]
             if tendons is not None:
                 add_tendons(spec, tendons)
             model = spec.compile()
@@ -84,10 +84,10 @@ def from_mujoco(
     if not isinstance(model, mujoco.MjModel):
         raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
     reader = _Reader(mujoco, model, plugins)
-    found = validate(FingerDescription, reader.table(name), ("finger",))
+    description = validate(FingerDescription, reader.table(name), ("finger",))
     if moving := reader.rest.moving():
         warnings.warn(LeftOutWarning(f"{name}: not carried over: {'; '.join(moving)}"), stacklevel=2)
-    return found
+    return description
 
 
 class _Reader:
@@ -96,7 +96,7 @@ class _Reader:
     def __init__(self, mujoco: Any, model: Any, plugins: list[str]) -> None:
         self.mujoco, self.model = mujoco, apply_flags(mujoco, model)
         model = self.model
-        self.rest, self.names = Rest(mujoco, model), Names.of(model, plugins)
+        self.rest, self.names = Rest(mujoco, model), Names.from_model(model, plugins)
         self._read = ElementReader(mujoco, model, self.names, self.rest)
         self.shapes = Shapes(self._read)
         kinds = mujoco.mjtJoint
@@ -116,7 +116,7 @@ class _Reader:
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self._bodies()
         actuators, pulled = self.actuators.table(), self.actuators.pulled()
-        taken = {*tendons, *pulled}
+        used = {*tendons, *pulled}
         couplings, loops, differences = read_equalities(self._read)
         joints, moving, loss = self._joints()
         stops = read_stops(self._read, joints)
@@ -134,7 +134,7 @@ class _Reader:
             "tree": {
                 "bodies": self._still() | {self.names.bodies[i]: self._body(i) for i in bodies},
                 "joints": moving,
-                "tendons": tendons | {free_name(name, taken, "equality"): each for name, each in differences.items()},
+                "tendons": tendons | {free_name(name, used, "equality"): each for name, each in differences.items()},
                 "couplings": couplings,
                 "loops": loops,
                 "actuators": actuators,
@@ -152,7 +152,7 @@ class _Reader:
         model, types = self.model, self.mujoco.mjtWrap
         sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE]
         wraps = model.wrap_objid[self._wraps()]
-        return {int(each) for each in (*model.site_bodyid[sites], *model.geom_bodyid[wraps])}
+        return {int(body) for body in (*model.site_bodyid[sites], *model.geom_bodyid[wraps])}
 
     def _joints(self) -> tuple[Table, Table, list[float]]:
         """Return the joints of the finger, those of its tree, and their losses by friction, in the bodies' order."""
@@ -173,12 +173,12 @@ class _Reader:
         model = self.model
         # What lies around does not carry a tip.
         needed = self._passed() | {self._tip_body()[0]} | self.shapes.still() | linked_bodies(self.mujoco, model)
-        sides = [int(each) for each in model.wrap_prm[self._wraps()] if each >= 0]
-        needed |= {int(each) for each in model.site_bodyid[sides]}
+        sides = [int(site) for site in model.wrap_prm[self._wraps()] if site >= 0]
+        needed |= {int(body) for body in model.site_bodyid[sides]}
         moved: set[int] = set()
         for i in range(1, model.nbody):
-            own = any(model.jnt_bodyid[j] == i for j in (*self.kept_joints, *self.free.kept))
-            if own or int(model.body_parentid[i]) in moved:
+            has_joints = any(model.jnt_bodyid[j] == i for j in (*self.kept_joints, *self.free.kept))
+            if has_joints or int(model.body_parentid[i]) in moved:
                 moved.add(i)
         needed |= moved
         for i in range(model.nbody - 1, 0, -1):
@@ -209,37 +209,37 @@ class _Reader:
 
     def _solids(self, body: int) -> Table:
         """Return the visible geoms of a body, or all if none is; meshes of moving bodies only."""
-        model, kinds, found = self.model, self.mujoco.mjtGeom, {}
-        own = np.flatnonzero(model.geom_bodyid == body)
-        shown = own[model.geom_group[own] < _HIDDEN]
-        for i in shown if len(shown) else own:
+        model, kinds, solids = self.model, self.mujoco.mjtGeom, {}
+        geoms = np.flatnonzero(model.geom_bodyid == body)
+        shown = geoms[model.geom_group[geoms] < _HIDDEN]
+        for i in shown if len(shown) else geoms:
             kind, size = model.geom_type[i], model.geom_size[i]
             place = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
             radius, length = float(size[0]), 2.0 * float(size[1])
             if kind == kinds.mjGEOM_SPHERE:
-                found[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+                solids[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
             elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
                 name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
-                found[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+                solids[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
             elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
-                found[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+                solids[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
             elif kind == kinds.mjGEOM_MESH and model.body_weldid[body]:
                 # A forearm that stands still would be in the way.
                 name = self.names.meshes[model.geom_dataid[i]]
-                found[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **place}
-        return found
+                solids[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **place}
+        return solids
 
     def _meshes(self, bodies: list[int]) -> Table:
         """Return the meshes that the solids of bodies are made of."""
         model, names = self.model, self.names.meshes
         used = {solid.get("mesh") for i in bodies for solid in self._solids(i).values()}
-        found = {}
+        meshes = {}
         for i in range(model.nmesh):
             points = slice(model.mesh_vertadr[i], model.mesh_vertadr[i] + model.mesh_vertnum[i])
             faces = slice(model.mesh_faceadr[i], model.mesh_faceadr[i] + model.mesh_facenum[i])
             if names[i] in used:
-                found[names[i]] = Mesh.packed(model.mesh_vert[points], model.mesh_face[faces])
-        return found
+                meshes[names[i]] = Mesh.packed(model.mesh_vert[points], model.mesh_face[faces])
+        return meshes
 
     def _joint(self, i: int) -> Table:
         model = self.model
@@ -282,10 +282,10 @@ class _Reader:
 
     def _moved_by_joints(self) -> set[int]:
         """Return the bodies that joints move which turn or slide."""
-        parents, found = self.model.body_parentid, {int(self.model.jnt_bodyid[j]) for j in self.kept_joints}
+        parents, bodies = self.model.body_parentid, {int(self.model.jnt_bodyid[j]) for j in self.kept_joints}
         for i in range(1, self.model.nbody):
-            found |= {i} if int(parents[i]) in found else set()
-        return found
+            bodies |= {i} if int(parents[i]) in bodies else set()
+        return bodies
 
     def _wraps(self) -> NDArray[np.bool_]:
         """Return a mask of the pieces of tendons' paths that are wraps."""

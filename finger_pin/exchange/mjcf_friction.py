@@ -33,51 +33,51 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
     if tendons.at_bends:
         allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
         raise InputError("finger.tendon_friction.place", allowed, description.tendon_friction.place)
-    found = [*_of_tendons(description, tendons, massless), *_of_joints(description, tendons)]
+    frictions = [*_of_tendons(description, tendons, massless), *_of_joints(description, tendons)]
     elements = {(each.tag, each.get("name")): each for kind in ("joint", "fixed") for each in root.iter(kind)}
-    for each in found:
-        owner = elements["joint" if each.of_joint else "fixed", each.name]
-        owner.set("frictionloss", repr(max(each.least, LEAST_LOSS)))
+    for friction in frictions:
+        owner = elements["joint" if friction.of_joint else "fixed", friction.name]
+        owner.set("frictionloss", repr(max(friction.least, LEAST_LOSS)))
         # Viscous friction is part of it; a joint's spring keeps its damping.
-        spring = description.joints[each.name].spring if each.kind == PIN else None
+        spring = description.joints[friction.name].spring if friction.kind == PIN else None
         owner.set("damping", repr(float(spring.damping) if spring else 0.0))
     default = ET.Element("default")
-    own = ET.SubElement(default, "default", {"class": NAME})
-    ET.SubElement(own, "general", gaintype="dcmotor", input="none")
+    friction_class = ET.SubElement(default, "default", {"class": NAME})
+    ET.SubElement(friction_class, "general", gaintype="dcmotor", input="none")
     root.insert(1, default)
     extension = ET.Element("extension")
     plugin = ET.SubElement(extension, "plugin", plugin=PLUGIN)
     instance = ET.SubElement(plugin, "instance", name=NAME)
-    ET.SubElement(instance, "config", key=COUNT, value=str(len(found)))
+    ET.SubElement(instance, "config", key=COUNT, value=str(len(frictions)))
     root.insert(2, extension)
     actuators = root.find("actuator")
     assert actuators is not None
-    place = {"tendon" if not found[0].of_joint else "joint": found[0].name, "instance": NAME, "class": NAME}
-    states = {"actdim": str(sum(each.states for each in found)), "group": str(GROUP), "gear": "0"}
+    place = {"tendon" if not frictions[0].of_joint else "joint": frictions[0].name, "instance": NAME, "class": NAME}
+    states = {"actdim": str(sum(friction.states for friction in frictions)), "group": str(GROUP), "gear": "0"}
     ET.SubElement(actuators, "plugin", {"name": NAME, **place, **states})
     table = ET.SubElement(ET.SubElement(root, "custom"), "tuple", name=NAME)
-    for each in found:
-        for kind, name, value in each.elements():
+    for friction in frictions:
+        for kind, name, value in friction.elements():
             ET.SubElement(table, "element", objtype=kind, objname=name, prm=repr(float(value)))
 
 
 def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool) -> list[PluginFriction]:
-    found = []
+    frictions = []
     for index, (name, tendon) in enumerate(description.tendons.items()):
         law = _coefficients(tendons, _TENDON, index, float(tendons.routing.curvature_offset[index]))
         crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
         if tendon.kind == "actuated":
-            found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
+            frictions.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
         elif massless:
             # Its viscous friction is left out with its mass.
             law = law._replace(viscous=0.0)
-            found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
+            frictions.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
         else:
             split, mass = tendon.proximal_crossings, f"{name}_mass"
             halves = [(False, f"{name}_{half}", 0.0) for half in ("proximal", "distal")]
             more = (halves[0], *crossed[:split], halves[1], *crossed[split:])
-            found.append(PluginFriction(MASS, mass, mass, True, 1.0, law, more))
-    return found
+            frictions.append(PluginFriction(MASS, mass, mass, True, 1.0, law, more))
+    return frictions
 
 
 # Coefficients that have other names in tendons and in joints, and those that have the same.
@@ -99,7 +99,7 @@ def _coefficients(
 
 def _of_joints(description: FingerDescription, tendons: Tendons) -> list[PluginFriction]:
     friction = JointFriction.from_description(description, tendons.routing.loads)
-    found = []
+    frictions = []
     for index, name in enumerate(description.joints):
-        found.append(PluginFriction(PIN, name, name, True, 1.0, _coefficients(friction, _JOINT, index, 0.0)))
-    return found
+        frictions.append(PluginFriction(PIN, name, name, True, 1.0, _coefficients(friction, _JOINT, index, 0.0)))
+    return frictions

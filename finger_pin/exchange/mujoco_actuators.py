@@ -30,15 +30,15 @@ class ActuatorReader(ElementReader):
     @cached_property
     def laws(self) -> dict[int, Table]:
         """Supported actuator laws as entries of a description; unsupported ones are listed."""
-        found = {}
+        laws = {}
         for i in range(getattr(self.model, "nactuator", self.model.nu)):
             why = is_disabled(self.mujoco, self.model, i) or self._foreign(i)
             law = self._law(i) if why is None else why
             if isinstance(law, str):
                 self._leave_out(i, law)
             else:
-                found[i] = law
-        return found
+                laws[i] = law
+        return laws
 
     @cached_property
     def pulling(self) -> list[int]:
@@ -47,48 +47,48 @@ class ActuatorReader(ElementReader):
 
     def table(self) -> Table:
         """Return all others, by name."""
-        model, found = self.model, {}
+        model, actuators = self.model, {}
         self._list_shared_limits()
         for i in self.laws:
             if i in self.pulling:
                 continue
             kind, at = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
             of_tendon = kind == self.mujoco.mjtTrn.mjTRN_TENDON
-            found[i] = {
+            actuators[i] = {
                 **({"tendon": self.names.tendons[at]} if of_tendon else {"joint": self.names.joints[at]}),
                 "gear": float(model.actuator_gear[i, 0]),
                 **self.laws[i],
             }
             if model.actuator_ctrllimited[self._control(i)]:
                 ends = model.actuator_ctrlrange[self._control(i)]
-                found[i]["input_range"] = (np.clip(ends, 0.0, 1.0) if "muscle" in found[i] else ends).tolist()
+                actuators[i]["input_range"] = (np.clip(ends, 0.0, 1.0) if "muscle" in actuators[i] else ends).tolist()
             bounds = self._bounds(i)
-            if np.isfinite(bounds).any() and "muscle" in found[i]:
+            if np.isfinite(bounds).any() and "muscle" in actuators[i]:
                 self._leave_out(i, "the limit on a muscle's force")
             elif np.isfinite(bounds).any():
-                found[i]["force_range"] = np.clip(bounds, -_LARGE, _LARGE).tolist()
-        return {self.names.actuators[i]: each for i, each in found.items()}
+                actuators[i]["force_range"] = np.clip(bounds, -_LARGE, _LARGE).tolist()
+        return {self.names.actuators[i]: actuator for i, actuator in actuators.items()}
 
     def inputs(self, controls: Array) -> dict[str, float]:
         """Return the inputs for a model's controls, by the names of actuators and of tendons that are pulled."""
-        found = {}
+        inputs = {}
         for i in sorted(self.laws, key=self.pulling.__contains__):
             value = float(controls[self._control(i)])
             pulls = -float(self.model.actuator_gear[i, 0]) * self.laws[i].get("gain", 0.0)
-            found[self._name(i)] = value * pulls if i in self.pulling else value
-        return found
+            inputs[self._name(i)] = value * pulls if i in self.pulling else value
+        return inputs
 
     def _leave_out(self, i: int, why: str) -> None:
         self.rest.add(f"actuator {model_name(self.model, 'actuator', i)}: {why}")
 
     def pulled(self) -> Table:
         """Return the tendons that motors pull, by the names of these."""
-        found = {}
+        tendons = {}
         for i in self.pulling:
             name, tendon = self._name(i), int(self.model.actuator_trnid[i, 0])
             same = name == self.names.tendons[tendon]
-            found[name] = self._route(tendon, same) | {"maximum_tension": float(max(self._ends(i)))}
-        return found
+            tendons[name] = self._route(tendon, same) | {"maximum_tension": float(max(self._ends(i)))}
+        return tendons
 
     def _name(self, i: int) -> str:
         """Return the name of an actuator; that of a motor which pulls is of no other tendon than its own."""
@@ -127,10 +127,10 @@ class ActuatorReader(ElementReader):
 
     def _drivers(self, what: str, at: int) -> list[int]:
         """Return the actuators that exert a force on a tendon, or on a joint by itself or by tendons."""
-        found = {(what, at)}
+        targets = {(what, at)}
         if what == "joint":
-            found |= {("tendon", i) for i, moved in enumerate(self._moved) if int(self.model.jnt_dofadr[at]) in moved}
-        return [i for i in self.laws if self._drives(i) in found]
+            targets |= {("tendon", i) for i, moved in enumerate(self._moved) if int(self.model.jnt_dofadr[at]) in moved}
+        return [i for i in self.laws if self._drives(i) in targets]
 
     @cached_property
     def _moved(self) -> list[set[int]]:
@@ -198,14 +198,14 @@ class ActuatorReader(ElementReader):
     def _muscle(self, i: int) -> Table | str:
         """Return the numbers of a muscle, or the reason for their lack."""
         model, gain = self.model, self.model.actuator_gainprm[i]
-        alike = np.array_equal(gain[:9], model.actuator_biasprm[i, :9])
+        same_bias = np.array_equal(gain[:9], model.actuator_biasprm[i, :9])
         whole = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_MUSCLE and model.actuator_actnum[i] == 1
-        if not (alike and whole and model.actuator_dyntype[i] == self.mujoco.mjtDyn.mjDYN_MUSCLE):
+        if not (same_bias and whole and model.actuator_dyntype[i] == self.mujoco.mjtDyn.mjDYN_MUSCLE):
             return "only a part of it is a muscle"
         if model.actuator_actlimited[i] and (model.actuator_actrange[i] != [0.0, 1.0]).any():
             return "the activation of a muscle is limited to other than 0 and 1"
         lengths, (rising, falling, smoothing) = model.actuator_lengthrange[i], model.actuator_dynprm[i, :3]
-        found: Table = {
+        muscle: Table = {
             "force": float(gain[2] if gain[2] >= 0.0 else gain[3] / model.actuator_acc0[i]),
             "length_range": lengths.tolist(),
             "range": gain[:2].tolist(),
@@ -214,11 +214,11 @@ class ActuatorReader(ElementReader):
             "smoothing": float(smoothing),
         }
         try:
-            Muscle.model_validate(found)
+            Muscle.model_validate(muscle)
         except ValidationError as error:
             first = error.errors()[0]
             return f"a muscle of other numbers ({'.'.join(map(str, first['loc']))}: {first['msg']})"
-        return {"muscle": found}
+        return {"muscle": muscle}
 
     def _state(self, i: int) -> Table | str:
         """Return the lag of an actuator, or that its input is a rate; nothing without a state."""
@@ -237,8 +237,8 @@ class ActuatorReader(ElementReader):
         """Return the law of MuJoCo's PID plugin, with the derivative of the length alone."""
         model, instance = self.model, int(self.model.actuator_plugin[i])
         first = int(model.plugin_attradr[instance])
-        given = bytes(model.plugin_attr)[first:].split(b"\0")[: len(_PID)]
-        numbers = {key: float(text) for key, text in zip(_PID, (each.decode() for each in given), strict=False) if text}
+        texts = bytes(model.plugin_attr)[first:].split(b"\0")[: len(_PID)]
+        numbers = {key: float(text) for key, text in zip(_PID, (each.decode() for each in texts), strict=False) if text}
         if self.names.plugins[instance : instance + 1] != ["mujoco.pid"]:
             return "a plugin computes it"
         if numbers.get("slewmax"):

@@ -18,12 +18,12 @@ _WELD = 1e-3
 
 def linked_bodies(mujoco: Any, model: Any) -> set[int]:
     """Return the bodies that connections and welds hold together, none that others lead, nor the world."""
-    found: set[int] = set()
+    linked: set[int] = set()
     for i in (int(each) for each in np.flatnonzero(model.eq_active0)):
         if model.eq_type[i] in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):
             bodies = _bodies(mujoco, model, i)
-            found |= set(bodies) if all(model.body_mocapid[each] < 0 for each in bodies) else set()
-    return found - {0}
+            linked |= set(bodies) if all(model.body_mocapid[each] < 0 for each in bodies) else set()
+    return linked - {0}
 
 
 def _bodies(mujoco: Any, model: Any, i: int) -> list[int]:
@@ -43,11 +43,11 @@ def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
         name = model_name(model, "equality", i)
         kind = mujoco.mjtEq(int(model.eq_type[i])).name.removeprefix("mjEQ_").lower()
         if kind in ("connect", "weld"):
-            found = _points(read, i)
-            if isinstance(found, str):
-                rest.add(f"equality {name}: {found}")
+            points = _points(read, i)
+            if isinstance(points, str):
+                rest.add(f"equality {name}: {points}")
             else:
-                loops |= {f"{name}_{k}" if len(found) > 1 else name: each for k, each in enumerate(found)}
+                loops |= {f"{name}_{k}" if len(points) > 1 else name: point for k, point in enumerate(points)}
         elif kind == "joint":
             couplings[name] = _coupling(read, i)
         elif kind != "tendon":
@@ -70,9 +70,9 @@ def _points(read: ElementReader, i: int) -> list[Table] | str:
         return "to a mocap body, which others lead"
     if not any(model.body_weldid[bodies]):
         return []  # Both stand still.
-    given = model.eq_data[i]
+    numbers = model.eq_data[i]
     if model.eq_type[i] == mujoco.mjtEq.mjEQ_CONNECT:
-        places = [model.site_pos[first], model.site_pos[second]] if of_sites else [given[:3], given[3:6]]
+        places = [model.site_pos[first], model.site_pos[second]] if of_sites else [numbers[:3], numbers[3:6]]
         return [_loop(read, i, bodies, places)]
     # A frame of the second body and one of the first stay together: three points of them do.
     frames = [np.eye(3), np.eye(3)]
@@ -81,11 +81,11 @@ def _points(read: ElementReader, i: int) -> list[Table] | str:
         frames = [_matrix(mujoco, model.site_quat[each]) for each in (first, second)]
     else:
         # The anchor in the second body's frame; where it is in the first's, and how the second is turned there.
-        frames[0], places = _matrix(mujoco, given[6:10]), [given[3:6], given[:3]]
+        frames[0], places = _matrix(mujoco, numbers[6:10]), [numbers[3:6], numbers[:3]]
     # Three springs of k / 3 at a distance s turn back with k s^2 / 2 about axes in their plane, and k s^2 across it.
     # MuJoCo has the scaled sine of half the angle, which is 1/4 of a spring of the turns' mobility.
     along, about = np.sum(model.body_invweight0[bodies], axis=0)
-    size = float(given[10]) * math.sqrt(along / (3.0 * about)) if about > 0.0 else _WELD
+    size = float(numbers[10]) * math.sqrt(along / (3.0 * about)) if about > 0.0 else _WELD
     corners = max(size, _WELD) * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
     return [
         _loop(read, i, bodies, [place + frame @ corner for place, frame in zip(places, frames, strict=True)], 3.0)
@@ -94,31 +94,31 @@ def _points(read: ElementReader, i: int) -> list[Table] | str:
 
 
 def _matrix(mujoco: Any, quaternion: Any) -> Any:
-    found = np.zeros(9)
-    mujoco.mju_quat2Mat(found, quaternion)
-    return found.reshape(3, 3)
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
 
 
 def _loop(read: ElementReader, i: int, bodies: list[int], places: list[Any], shared: float = 1.0) -> Table:
     """Return two points that stay together; the body that moves is the first."""
     model, names = read.model, read.names
-    pairs = sorted(zip(bodies, places, strict=True), key=lambda each: (model.body_weldid[each[0]] == 0, -each[0]))
+    pairs = sorted(zip(bodies, places, strict=True), key=lambda pair: (model.body_weldid[pair[0]] == 0, -pair[0]))
     (body, place), (other, there) = pairs
     mobility = float(np.sum(model.body_invweight0[bodies, 0]))
     # A body that turns about its mass centre alone has none.
     mobility = mobility or 1.0 / float(np.sum(model.body_mass[bodies]))
-    held = _held(read, i, mobility)
+    spring = _spring(read, i, mobility)
     return {
         "body": names.bodies[body],
         **names.carrier(other, "other"),
         "position": [float(each) for each in place],
         "other_position": [float(each) for each in there],
-        **{key: each / shared for key, each in held.items()},
+        **{key: each / shared for key, each in spring.items()},
     }
 
 
-def _renamed(found: Table) -> Table:
-    return dict(zip(distinct("equality", list(found)), found.values(), strict=True))
+def _renamed(entries: Table) -> Table:
+    return dict(zip(distinct("equality", list(entries)), entries.values(), strict=True))
 
 
 def _both(model: Any, i: int) -> list[int]:
@@ -130,7 +130,7 @@ def _spatial(mujoco: Any, model: Any, tendon: int) -> bool:
     return bool(model.wrap_type[model.tendon_adr[tendon]] != mujoco.mjtWrap.mjWRAP_JOINT)
 
 
-def _held(read: ElementReader, i: int, mobility: float) -> Table:
+def _spring(read: ElementReader, i: int, mobility: float) -> Table:
     model = read.model
     what = f"equality {model_name(read.model, 'equality', i)}"
     stiffness, damping = soft_spring(read, what, model.eq_solref[i], model.eq_solimp[i], mobility)
@@ -155,8 +155,8 @@ def _coupling(read: ElementReader, i: int) -> Table:
             other["powers"] = coefficients[2 : len(powers.coef)]
             _list_turns(read, i, second)
     both = model.jnt_dofadr[[each for each in (first, second) if each >= 0]]
-    held = _held(read, i, float(np.sum(model.dof_invweight0[both])))
-    return {"joint": names.joints[first], "offset": offset, **held, **other}
+    spring = _spring(read, i, float(np.sum(model.dof_invweight0[both])))
+    return {"joint": names.joints[first], "offset": offset, **spring, **other}
 
 
 def _list_turns(read: ElementReader, i: int, joint: int) -> None:
@@ -173,12 +173,12 @@ def _difference(read: ElementReader, i: int) -> Table:
     """Return an equality of fixed tendons as a spring of a tendon as long as their difference."""
     model = read.model
     tendons, ratios = _both(model, i), (1.0, -float(model.eq_data[i, 1]))
-    found: dict[str, float] = {}
+    coefficients: dict[str, float] = {}
     rest, mobility = float(model.eq_data[i, 0]), 0.0
     for tendon, ratio in zip(tendons, ratios, strict=False):
         rest += ratio * float(model.tendon_length0[tendon])
         mobility += float(model.tendon_invweight0[tendon])
         for k in range(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon]):
             joint = read.names.joints[model.wrap_objid[k]]
-            found[joint] = found.get(joint, 0.0) + ratio * float(model.wrap_prm[k])
-    return {"joints": found, "rest": [rest, rest], **_held(read, i, mobility)}
+            coefficients[joint] = coefficients.get(joint, 0.0) + ratio * float(model.wrap_prm[k])
+    return {"joints": coefficients, "rest": [rest, rest], **_spring(read, i, mobility)}

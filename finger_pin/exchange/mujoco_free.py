@@ -44,11 +44,11 @@ class FreeBodies:
         self._axes = np.column_stack([np.cross(across, up), across, up])
 
     def _carried(self, body: int) -> set[int]:
-        found = {body}
+        bodies = {body}
         for i in range(body + 1, self.model.nbody):
-            if int(self.model.body_parentid[i]) in found:
-                found.add(i)
-        return found
+            if int(self.model.body_parentid[i]) in bodies:
+                bodies.add(i)
+        return bodies
 
     def _of(self, joint: int) -> tuple[int, str, Array]:
         """Return the body of a joint, its name, and its rotation at the model's reference."""

@@ -17,9 +17,9 @@ NAME = "finger_pin_friction"
 #: Its attribute: how many frictions there are.
 COUNT = "frictions"
 
-#: What tells an actuator that it has no input; in a group that users do not switch off.
+#: The setting of an actuator without an input, and a group that users do not switch off.
 NO_INPUT, GROUP = 16, 30
-#: The solver makes a row of what has a friction loss: at least this, which XML keeps.
+#: The least friction loss for which the solver makes a row, and which XML keeps.
 LEAST_LOSS = 1e-6
 #: Kinds of friction: of a tendon that is pulled, of a joint's pin (17), of a slide that is a passive tendon's mass
 #: (14c), of a fixed tendon over one joint that is pulled by what drives the joint, and of a branch behind a pulley.
@@ -92,7 +92,7 @@ class PluginFriction:
             same way; negative where another one pulls the other way, so that it is slack while that is driven. Of a
             `BRANCH`, how many frictions before it that of its tendon stands, which is the first of ``more``, with one
             over the pulley's divisor.
-        held: Whether a tendon has a limit or an equality, which pull it too.
+        constrained: Whether a tendon has a limit or an equality, which pull it too.
     """
 
     kind: int
@@ -103,11 +103,11 @@ class PluginFriction:
     law: Coefficients
     more: tuple[tuple[bool, str, float], ...] = ()
     share: float = 0.0
-    held: bool = False
+    constrained: bool = False
 
     @property
     def of_joint(self) -> bool:
-        """Whether it is a joint's."""
+        """True for the friction of a joint."""
         return self.kind not in (TENDON, LINK, BRANCH)
 
     @property
@@ -117,20 +117,20 @@ class PluginFriction:
 
     def elements(self) -> Iterator[tuple[str, str, float]]:
         """Yield the elements of the table: kind and name of an object, and a number."""
-        own = "joint" if self.of_joint else "tendon"
+        owner = "joint" if self.of_joint else "tendon"
         length, kind, loads = float(HEAD + len(self.more)), float(self.kind), float(self.loads)
         carried = {"length": length, "ratio": self.ratio, "kind": kind, "share": self.share, "loads": loads}
         carried |= self.law._asdict()
         row = ("joint" if self.row_of_joint else "tendon"), self.row
         for name in ElementPlaces._fields:
-            yield *(row if name == "ratio" else (own, self.name)), carried[name]
+            yield *(row if name == "ratio" else (owner, self.name)), carried[name]
         for of_joint, name, value in self.more:
             yield ("joint" if of_joint else "tendon"), name, value
 
     @property
     def loads(self) -> int:
         """Number of entries of `act`, after the bristles of all, with which the solver's last forces load it."""
-        return 3 if self.kind == PIN else int(self.held)
+        return 3 if self.kind == PIN else int(self.constrained)
 
     @property
     def states(self) -> int:

@@ -22,22 +22,22 @@ def read_keyframes(
 
     Free bodies that are objects are where the first keyframe has them, unless a later one says otherwise.
     """
-    model, data, found = read.model, read.start_data(), []
+    model, data, keyframes = read.model, read.start_data(), []
     names = distinct("keyframe", [model.key(k).name for k in range(model.nkey)]) or ["reference"]
     for k, name in enumerate(names):
-        given = (model.key_qpos[k], model.key_qvel[k], model.key_ctrl[k], model.key_act[k]) if model.nkey else None
-        qpos, qvel, ctrl, act = given or (data.qpos, data.qvel, data.ctrl, data.act)
+        recorded = (model.key_qpos[k], model.key_qvel[k], model.key_ctrl[k], model.key_act[k]) if model.nkey else None
+        qpos, qvel, ctrl, act = recorded or (data.qpos, data.qvel, data.ctrl, data.act)
         position = {read.names.joints[i]: float(qpos[model.jnt_qposadr[i]]) for i in joints}
         velocity = {read.names.joints[i]: float(qvel[model.jnt_dofadr[i]]) for i in joints}
         for i in free.kept:
             position |= free.position(i, qpos)
         moving = {key: speed for key, speed in velocity.items() if speed}
         inputs, moved = actuators.inputs(ctrl), shapes.object_states(k)
-        found.append(
+        keyframes.append(
             {"position": position, "velocity": moving, "inputs": inputs, **({"objects": moved} if moved else {})}
         )
         _list_rest(read, free, name, k, act)
-    return dict(zip(names, found, strict=True))
+    return dict(zip(names, keyframes, strict=True))
 
 
 def _list_rest(read: ElementReader, free: FreeBodies, name: str, k: int, act: Array) -> None:

@@ -26,7 +26,7 @@ class Names:
     plugins: list[str]
 
     @classmethod
-    def of(cls, model: Any, plugins: list[str]) -> Names:
+    def from_model(cls, model: Any, plugins: list[str]) -> Names:
         """Read the names of a model; those of instances of plugins only its specification has."""
         return cls(
             bodies=distinct("body", [model.body(i).name for i in range(model.nbody)]),
@@ -63,17 +63,17 @@ def model_name(model: Any, what: str, i: int) -> str:
     return str(getattr(model, what)(i).name or f"{what}_{i}")
 
 
-def distinct(what: str, given: list[str]) -> list[str]:
+def distinct(what: str, names: list[str]) -> list[str]:
     """Return names for elements, all different; those without one are numbered."""
-    found: list[str] = []
-    for index, each in enumerate(given):
-        name = entry_name(each) if each else f"{what}_{index}"
-        while name in found:
+    entries: list[str] = []
+    for index, text in enumerate(names):
+        name = entry_name(text) if text else f"{what}_{index}"
+        while name in entries:
             name = f"{name[:56]}_{index}"
-        found.append(name)
-    return found
+        entries.append(name)
+    return entries
 
 
-def free_name(name: str, taken: Container[str], what: str) -> str:
-    """Return a name that is not taken, with what has it after its own name if need be."""
-    return free_name(f"{name}_{what}", taken, what) if name in taken else name
+def free_name(name: str, used: Container[str], what: str) -> str:
+    """Return a name that is not used yet: with the kind of its element behind it where it is."""
+    return free_name(f"{name}_{what}", used, what) if name in used else name

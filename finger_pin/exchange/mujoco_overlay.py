@@ -65,16 +65,16 @@ def add_tendons(spec: Any, tendons: Mapping[str, Mapping[str, Any]] | str | Path
             motor.gear, motor.ctrllimited, motor.ctrlrange = [-1.0, 0, 0, 0, 0, 0], 1, [0.0, laid.pull]
 
 
-def _tables(given: Mapping[str, Mapping[str, Any]] | str | Path) -> Mapping[str, Mapping[str, Any]]:
-    if isinstance(given, Mapping):
-        return given
+def _tables(tendons: Mapping[str, Mapping[str, Any]] | str | Path) -> Mapping[str, Mapping[str, Any]]:
+    if isinstance(tendons, Mapping):
+        return tendons
     try:
-        found = tomllib.loads(read_text(f"tendons {given}", Path(given)))
+        document = tomllib.loads(read_text(f"tendons {tendons}", Path(tendons)))
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"tendons {given}", f"cannot be read: {error}") from None
-    tables = found.get("tendons")
-    if set(found) != {"tendons"} or not isinstance(tables, dict):
-        raise InputError(f"tendons {given}", "must be tables [tendons.NAME], and nothing else")
+        raise InputError(f"tendons {tendons}", f"cannot be read: {error}") from None
+    tables = document.get("tendons")
+    if set(document) != {"tendons"} or not isinstance(tables, dict):
+        raise InputError(f"tendons {tendons}", "must be tables [tendons.NAME], and nothing else")
     return tables
 
 
@@ -102,10 +102,10 @@ def _lay_point(mujoco: Any, spec: Any, tendon: Any, name: str, point: Any, entry
     body.add_geom(name=name, type=kind, contype=0, conaffinity=0, mass=0.0, group=4, **frame)
     side = ""
     if point.side is not None:
-        seen = np.zeros(3)
-        mujoco.mju_rotVecQuat(seen, np.array(point.side), quaternion)
+        direction = np.zeros(3)
+        mujoco.mju_rotVecQuat(direction, np.array(point.side), quaternion)
         side = f"{name}_side"
-        body.add_site(name=side, pos=np.array(point.position) + seen)
+        body.add_site(name=side, pos=np.array(point.position) + direction)
     tendon.wrap_geom(name, side)
 
 

@@ -31,12 +31,12 @@ class Pairs(ElementReader):
         a body and its parent. Of two geoms the greater numbers count, or those of the one with the higher priority.
         """
         model, known = self.model, sorted(geoms)
-        found = {pair: self._mixed(*pair) for pair in itertools.combinations(known, 2) if self._meant(*pair)}
+        coefficients = {pair: self._mixed(*pair) for pair in itertools.combinations(known, 2) if self._meant(*pair)}
         for k in range(model.npair):
             pair = sorted((int(model.pair_geom1[k]), int(model.pair_geom2[k])))
             if set(pair) <= set(known):
-                found[pair[0], pair[1]] = _kept(int(model.pair_dim[k]), model.pair_friction[k][[0, 2, 3]])
-        return found
+                coefficients[pair[0], pair[1]] = _kept(int(model.pair_dim[k]), model.pair_friction[k][[0, 2, 3]])
+        return coefficients
 
     def _meant(self, a: int, b: int) -> bool:
         model, weld = self.model, self.model.body_weldid
@@ -74,11 +74,11 @@ class Pairs(ElementReader):
 
     def _shared(self, what: str, wanted: dict[Pair, float], moves: bool = True) -> dict[int, float]:
         """Return the least number of each geom with which no pair has less than it is to have; list those with more."""
-        found: dict[int, float] = {}
+        numbers: dict[int, float] = {}
         for pair, number in wanted.items():
             for i in pair:
-                found[i] = max(found.get(i, 0.0), number)
-        least = {pair: min(found[i] for i in pair) for pair in wanted}
+                numbers[i] = max(numbers.get(i, 0.0), number)
+        least = {pair: min(numbers[i] for i in pair) for pair in wanted}
         wrong = [
             f"{self._pair(pair)}: {least[pair]:.3g} for {number:.3g}"
             for pair, number in wanted.items()
@@ -86,7 +86,7 @@ class Pairs(ElementReader):
         ]
         if wrong:
             self.rest.add(f"{what} of pairs of geoms, which is greater here: {_few(wrong)}", moves)
-        return found
+        return numbers
 
     def _pressing(self, pair: Pair, friction: Array) -> tuple[float, float]:
         """Return the stiffness of a contact of two geoms at one point, N/m, and its damping, s/m.

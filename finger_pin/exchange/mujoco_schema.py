@@ -138,7 +138,7 @@ def kind_of(path: tuple[str, ...], attribute: str) -> Kind | None:
         known = next((SCHEMA[key] for key in keys if key in SCHEMA), None)
         if known is not None:
             whole: Kind | None = next((kind for kind, names in known.items() if names == ALL), None)
-            found: Kind | None = next((kind for kind, names in known.items() if attribute in names.split()), None)
+            listed: Kind | None = next((kind for kind, names in known.items() if attribute in names.split()), None)
             # Children are as an element of which all is the same.
-            return (found if end == len(path) else None) or whole
+            return (listed if end == len(path) else None) or whole
     return None

@@ -82,12 +82,12 @@ class Shapes:
 
     def of_body(self, body: int) -> Table:
         """Return the shapes of a body; of a surface MuJoCo has the coefficient of sliding friction."""
-        model, found = self.model, {}
+        model, shapes = self.model, {}
         for i in self._colliding:
             if model.geom_bodyid[i] == body and self._solid(i):
                 place = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
-                found[self.names.geoms[i]] = self._shape(i) | place
-        return found
+                shapes[self.names.geoms[i]] = self._shape(i) | place
+        return shapes
 
     def _shape(self, i: int) -> Table:
         """Return shape, sizes and surface of a geom."""
@@ -108,26 +108,26 @@ class Shapes:
 
     def objects(self, loose: list[int]) -> Table:
         """Return planes that may be touched, and free bodies at the start of runs, as objects."""
-        model, data, found = self.model, self._read.start_data(), {}
+        model, data, objects = self.model, self._read.start_data(), {}
         shapes = [i for i in self._colliding if self._solid(i) and int(model.geom_bodyid[i]) not in loose]
-        taken = {*self.names.joints, *(self.names.geoms[i] for i in shapes)}
+        used = {*self.names.joints, *(self.names.geoms[i] for i in shapes)}
         for i in self._colliding:
             if self._is_plane(i) and any(i in pair for pair in self._met) and not self._dropped(i):
-                self._placed_at[i] = free_name(self.names.geoms[i], taken, "object")
-                found[self._placed_at[i]] = self._shape(i) | self._placed(data, i)
+                self._placed_at[i] = free_name(self.names.geoms[i], used, "object")
+                objects[self._placed_at[i]] = self._shape(i) | self._placed(data, i)
         for body in loose:
-            name, own = self.names.bodies[body], [i for i in self._colliding if model.geom_bodyid[i] == body]
-            if len(own) != 1 or not self._solid(own[0]) or any(model.body_parentid == body):
+            name, geoms = self.names.bodies[body], [i for i in self._colliding if model.geom_bodyid[i] == body]
+            if len(geoms) != 1 or not self._solid(geoms[0]) or any(model.body_parentid == body):
                 self.rest.add(f"free body {name}: an object is one sphere, capsule, cylinder or box")
-            elif not self._dropped(own[0]):
-                (i,) = own
+            elif not self._dropped(geoms[0]):
+                (i,) = geoms
                 if np.linalg.norm(model.geom_pos[i] - model.body_ipos[body]) > 1e-3 * model.geom_rbound[i]:
                     self.rest.add(f"free body {name}: its mass centre is not its shape's")
-                self._placed_at[i] = free_name(name, taken | {*found}, "object")
+                self._placed_at[i] = free_name(name, used | {*objects}, "object")
                 moving = {"mass": float(model.body_mass[body]), **self._velocity(data, i)}
-                found[self._placed_at[i]] = self._shape(i) | self._placed(data, i) | moving
-                self._list_free(body, i, found[self._placed_at[i]])
-        return found
+                objects[self._placed_at[i]] = self._shape(i) | self._placed(data, i) | moving
+                self._list_free(body, i, objects[self._placed_at[i]])
+        return objects
 
     def object_states(self, keyframe: int) -> Table:
         """Return the free bodies that are elsewhere at a keyframe, or move otherwise, than where runs start."""
@@ -154,11 +154,11 @@ class Shapes:
 
     def _velocity(self, data: Any, i: int) -> Table:
         """Return the speeds of a free geom where runs start: of its middle, and of its turning in its own frame."""
-        found = np.zeros(6)
+        velocity = np.zeros(6)
         # Turning comes first.
-        self.mujoco.mj_objectVelocity(self.model, data, self.mujoco.mjtObj.mjOBJ_GEOM, i, found, 0)
-        turned = data.geom_xmat[i].reshape(3, 3).T @ found[:3]
-        return {"velocity": found[3:].tolist(), "angular_velocity": turned.tolist()} if found.any() else {}
+        self.mujoco.mj_objectVelocity(self.model, data, self.mujoco.mjtObj.mjOBJ_GEOM, i, velocity, 0)
+        turned = data.geom_xmat[i].reshape(3, 3).T @ velocity[:3]
+        return {"velocity": velocity[3:].tolist(), "angular_velocity": turned.tolist()} if velocity.any() else {}
 
     def _list_free(self, body: int, i: int, described: Table) -> None:
         """List what a free body has and an object has not."""
@@ -195,8 +195,10 @@ class Shapes:
     def set_apart(self, objects: Table, bodies: list[int]) -> None:
         """Note with objects the shapes, and the objects before them, that MuJoCo does not let collide with them."""
         weld, carriers = self.model.body_weldid, self.model.geom_bodyid
-        own = {i: self.names.geoms[i] for i in self._colliding if self._solid(i) and int(carriers[i]) in (0, *bodies)}
-        others = dict(own)
+        shapes = {
+            i: self.names.geoms[i] for i in self._colliding if self._solid(i) and int(carriers[i]) in (0, *bodies)
+        }
+        others = dict(shapes)
         for i, name in self._placed_at.items():
             apart = [
                 other

@@ -25,24 +25,24 @@ class TendonReader(ElementReader):
         """Return a tendon by its index."""
         model, types = self.model, self.mujoco.mjtWrap
         pieces = range(int(model.tendon_adr[i]), int(model.tendon_adr[i] + model.tendon_num[i]))
-        found: Table = {
+        tendon: Table = {
             "stiffness": float(model.tendon_stiffness[i]),
             "rest": model.tendon_lengthspring[i].tolist(),
             "damping": float(model.tendon_damping[i]),
             "friction": float(model.tendon_frictionloss[i]),
         }
         if model.wrap_type[pieces[0]] == types.mjWRAP_JOINT:
-            found["joints"] = {self.names.joints[model.wrap_objid[k]]: float(model.wrap_prm[k]) for k in pieces}
+            tendon["joints"] = {self.names.joints[model.wrap_objid[k]]: float(model.wrap_prm[k]) for k in pieces}
         else:
             names = distinct("pulley", [self._piece_name(k) for k in pieces])
-            found["path"] = self._without_idle({name: self._piece(k) for name, k in zip(names, pieces, strict=True)})
+            tendon["path"] = self._without_idle({name: self._piece(k) for name, k in zip(names, pieces, strict=True)})
         if model.tendon_limited[i]:
-            found["range"] = within_margin(model.tendon_range[i], float(model.tendon_margin[i]))
+            tendon["range"] = within_margin(model.tendon_range[i], float(model.tendon_margin[i]))
             soft = model.tendon_solref_lim[i], model.tendon_solimp_lim[i], float(model.tendon_invweight0[i])
             what = f"range of tendon {self.names.tendons[i]}"
-            found["limit_stiffness"], found["limit_viscous"] = soft_spring(self, what, *soft, stop=True)
-            found["limit_damping"] = 0.0
-        return found
+            tendon["limit_stiffness"], tendon["limit_viscous"] = soft_spring(self, what, *soft, stop=True)
+            tendon["limit_damping"] = 0.0
+        return tendon
 
     def _without_idle(self, path: Table) -> Table:
         """Return a path without the wraps that a point of their own body lies inside of: they never wrap."""

@@ -78,8 +78,8 @@ class Rest:
             if count:
                 self.add(f"{what}: {count}")
         for i in np.flatnonzero(model.body_mocapid >= 0):
-            own = model.geom_bodyid == i
-            touches = bool(np.any(own & ((model.geom_contype > 0) | (model.geom_conaffinity > 0))))
+            geoms = model.geom_bodyid == i
+            touches = bool(np.any(geoms & ((model.geom_contype > 0) | (model.geom_conaffinity > 0))))
             self.add(f"{self._name('body', i)}: mocap, which others lead, stands still", moves=touches)
 
     def listed(self) -> list[str]:
@@ -146,25 +146,25 @@ def _set(bits: Any, value: int) -> set[str]:
 
 def disabled(mujoco: Any, model: Any) -> set[str]:
     """Return the flags that a model disables, by the names that its XML has for them."""
-    found = _set(mujoco.mjtDisableBit, model.opt.disableflags)
-    return found | (_CONSTRAINTS if "constraint" in found else set())
+    flags = _set(mujoco.mjtDisableBit, model.opt.disableflags)
+    return flags | (_CONSTRAINTS if "constraint" in flags else set())
 
 
 def apply_flags(mujoco: Any, model: Any) -> Any:
     """Return a copy of a model without the elements that its flags disable, and with the friction that they set."""
-    found = copy.copy(model)
+    copied = copy.copy(model)
     flags = disabled(mujoco, model)
     if hasattr(model, "actuator_armature"):
-        _add_drives(mujoco, found)
-    for array in (each for flag in flags & set(_ZEROED) for each in _ZEROED[flag]):
-        values = getattr(found, array, None)
+        _add_drives(mujoco, copied)
+    for array in (name for flag in flags & set(_ZEROED) for name in _ZEROED[flag]):
+        values = getattr(copied, array, None)
         if values is not None:
             values[:] = 0
     if "gravity" in flags:
-        found.opt.gravity[:] = 0.0
+        copied.opt.gravity[:] = 0.0
     if "override" in _set(mujoco.mjtEnableBit, model.opt.enableflags):
-        found.geom_friction[:, 0] = found.pair_friction[:, 0] = model.opt.o_friction[0]
-    return found
+        copied.geom_friction[:, 0] = copied.pair_friction[:, 0] = model.opt.o_friction[0]
+    return copied
 
 
 def _add_drives(mujoco: Any, model: Any) -> None:

@@ -30,7 +30,7 @@ def build_table(model: NamedModel, plugin_frictions: list[PluginFriction]) -> Ta
     t.element = _ints((model.joint if each.of_joint else model.tendon)(each.name).id for each in plugin_frictions)
     t.ratio = wp.array([each.ratio for each in plugin_frictions], dtype=float)
     shares = [each.more[0][2] if each.kind == BRANCH else each.share for each in plugin_frictions]
-    t.share, t.constrained = wp.array(shares, dtype=float), _ints(each.held for each in plugin_frictions)
+    t.share, t.constrained = wp.array(shares, dtype=float), _ints(each.constrained for each in plugin_frictions)
     t.tendons = _ints(f for f, each in enumerate(plugin_frictions) if not each.of_joint)
     t.pins = _ints(f for f, each in enumerate(plugin_frictions) if each.of_joint)
     t.actuators_first, t.actuators = _lists(_actuators(model, plugin_frictions[trunk]) for trunk in trunks)
