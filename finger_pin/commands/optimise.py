@@ -149,6 +149,6 @@ def summary(result: xr.Dataset) -> str:
 
 def label(result: xr.Dataset, name: str) -> str:
     """Return a short name of a metric or key with its unit."""
-    from finger_pin.views.plots.sweep import short_key
+    from finger_pin.views.plots.sweep_metrics import short_key
 
     return f"{short_key(name)} ({result[name].attrs['units']})"

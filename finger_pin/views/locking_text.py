@@ -13,12 +13,12 @@ from finger_pin.views.summary import table
 _LEAST = 1e-9
 
 
-def summarize_locking(scenario: Scenario, found: SelfLockingMap) -> str:
+def summarize_locking(scenario: Scenario, locking_map: SelfLockingMap) -> str:
     """Return the self-locking of a scenario's finger as plain text: critical frictions, postures, its own.
 
     Args:
         scenario: Of a finger with force closure.
-        found: The map of its finger.
+        locking_map: The map of its finger.
 
     Raises:
         InputError: If there is no force closure.
@@ -36,16 +36,18 @@ def summarize_locking(scenario: Scenario, found: SelfLockingMap) -> str:
             *table(("moving", "locks at", "has"), rows),
         ]
     ]
-    least = np.unravel_index(int(np.argmin(found.coefficient)), found.coefficient.shape)
-    angles = zip(found.joints, (axis[index] for axis, index in zip(found.angles, least, strict=True)), strict=True)
+    least = np.unravel_index(int(np.argmin(locking_map.coefficient)), locking_map.coefficient.shape)
+    angles = zip(
+        locking_map.joints, (axis[index] for axis, index in zip(locking_map.angles, least, strict=True)), strict=True
+    )
     where = ", ".join(f"{name} {np.rad2deg(angle):.3g} deg" for name, angle in angles)
-    if found.uniform:
-        where = f"every posture of {' and '.join(found.joints)}"
+    if locking_map.uniform:
+        where = f"every posture of {' and '.join(locking_map.joints)}"
     blocks.append(
         [
             "With the friction of the tendons, all joints moving in their worst directions, mm:",
-            f"  locks at {_millimetres(float(found.coefficient.min()))}, at {where}",
-            f"  {_verdict(found.actual / float(found.coefficient.min()))}",
+            f"  locks at {_millimetres(float(locking_map.coefficient.min()))}, at {where}",
+            f"  {_verdict(locking_map.actual / float(locking_map.coefficient.min()))}",
         ]
     )
     place = f"in the motion of {scenario.name} where it is closest:"
@@ -56,28 +58,36 @@ def summarize_locking(scenario: Scenario, found: SelfLockingMap) -> str:
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
-def summarize_return(found: SpringReturn) -> str:
+def summarize_return(spring_return: SpringReturn) -> str:
     """Return in plain text whether springs bring a finger back, and the tensions between which the cord holds it."""
     ends = {"least bent": 0, "most bent": -1}
     rows = [
-        (f"{joint}, {place}", f"{found.winding_in[row, k]:.3g}", f"{max(found.letting_out[row, k], 0.0):.3g}")
-        for k, joint in enumerate(found.joints)
+        (
+            f"{joint}, {place}",
+            f"{spring_return.winding_in[row, k]:.3g}",
+            f"{max(spring_return.letting_out[row, k], 0.0):.3g}",
+        )
+        for k, joint in enumerate(spring_return.joints)
         for place, row in ends.items()
     ]
-    joint, position = found.worst
+    joint, position = spring_return.worst
     where = f"{joint} at ({', '.join(f'{each:.3g}' for each in np.rad2deg(position))}) deg"
     stays = "it comes back when the cord is let go, from every posture"
-    if not found.returns:
-        stuck = [name for name, column in zip(found.joints, found.letting_out.T, strict=True) if np.any(column <= 0.0)]
+    if not spring_return.returns:
+        stuck = [
+            name
+            for name, column in zip(spring_return.joints, spring_return.letting_out.T, strict=True)
+            if np.any(column <= 0.0)
+        ]
         stays = f"it does not come back when the cord is let go: {', '.join(stuck)}"
     return "\n".join(
         [
-            f"Springs against {found.cord}, N: the cord moves a joint in from, and lets it back from",
+            f"Springs against {spring_return.cord}, N: the cord moves a joint in from, and lets it back from",
             *table(("joint", "in", "back"), rows),
             "",
             f"  {stays}",
-            f"  {_of_springs(found.margin)}",
-            f"  tension back over tension in: at least {found.ratio:.3g}, {where}",
+            f"  {_of_springs(spring_return.margin)}",
+            f"  tension back over tension in: at least {spring_return.ratio:.3g}, {where}",
         ]
     )
 

@@ -40,7 +40,7 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
         (
             "What was found",
             "".join(f"<p class='doubt'><strong>{escape(each)}</strong></p>" for each in _doubts(result))
-            + _found(result)
+            + _estimates(result)
             + image(plot_profiles(result), "Profiles")
             + f"<p class='soft'>{_PROFILES}</p>",
         ),
@@ -66,14 +66,12 @@ _PROFILES = (
 
 
 def _parameters(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
-    found = []
+    rows = []
     for one in (result.isel(parameter=k) for k in range(result.sizes["parameter"])):
         unit = str(one["units"].values)
         ends = (_end(float(one["lower"])), _end(float(one["upper"])))
-        found.append(
-            (str(one["parameter"].values), f"{float(one['estimate']):.5g}", *ends, "" if unit == "1" else unit)
-        )
-    return found
+        rows.append((str(one["parameter"].values), f"{float(one['estimate']):.5g}", *ends, "" if unit == "1" else unit))
+    return rows
 
 
 def _signals(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
@@ -86,18 +84,18 @@ def _signals(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
 
 def _doubts(result: xr.Dataset) -> list[str]:
     """Return sentences on why not to trust any number: signals that are not met, searches that do not agree."""
-    found = []
+    doubts = []
     for k, (name, *_, unit) in enumerate(_signals(result)):
-        own = result["signal_index"].values == k
-        left, whole = (result[each].values[own] for each in ("residual", "measured"))
+        mask = result["signal_index"].values == k
+        left, whole = (result[each].values[mask] for each in ("residual", "measured"))
         rms, varies = float(np.sqrt(np.mean(left**2))), float(np.std(whole))
         # A constant would leave as much as the signal varies by; half of its square and more is no fit.
         if rms**2 > 0.5 * varies**2:
-            found.append(
+            doubts.append(
                 f"This is no fit of {name}: what is left over is {rms:.3g} {unit} rms, and the signal itself varies "
                 f"by {varies:.3g} {unit}. Look at units, signs and columns."
             )
-    return found if _borne_out(result) else [*found, _agreement(result)]
+    return doubts if _borne_out(result) else [*doubts, _agreement(result)]
 
 
 def _outliers(result: xr.Dataset) -> list[str]:
@@ -122,17 +120,17 @@ def _predictions(result: xr.Dataset) -> list[str]:
         return []
     columns = ("rms", "bias", "within", "scatter", "beyond", "samples", "units")
     rows = zip(result["prediction"].values, *(result[f"prediction_{each}"].values for each in columns), strict=True)
-    found = []
+    sentences = []
     for name, rms, bias, within, scatter, beyond, count, unit in rows:
         share = "" if math.isnan(within) else f", {within:.0%} of {count} samples within the 95 % band"
         repeated = "" if math.isnan(scatter) else f"; repeats scatter by {scatter:.3g}"
-        found.append(f"Held out: {name} is predicted to {rms:.3g} {unit} rms, bias {bias:.3g}{share}{repeated}.")
+        sentences.append(f"Held out: {name} is predicted to {rms:.3g} {unit} rms, bias {bias:.3g}{share}{repeated}.")
         if beyond > 0.0:
-            found.append(
+            sentences.append(
                 f"{beyond:.0%} of these loads are beyond those that were fitted: the band does not know what the model "
                 "lacks there."
             )
-    return found
+    return sentences
 
 
 def _end(value: float) -> str:
@@ -201,13 +199,13 @@ def _misses(result: xr.Dataset) -> list[str]:
 
 def _agreement(result: xr.Dataset) -> str:
     """Return a sentence on the agreement of the searches."""
-    alike, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
+    agreeing, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
     if count == 1:
         return "There was one search: whether the recordings are met better elsewhere is not known."
     if _borne_out(result):
-        return f"{alike} of {count} searches end at the same place."
+        return f"{agreeing} of {count} searches end at the same place."
     return (
-        f"Do not trust these intervals: only {alike} of {count} searches end at this place, the others where the "
+        f"Do not trust these intervals: only {agreeing} of {count} searches end at this place, the others where the "
         "recordings are met worse. There may be a better place still, and an interval says nothing of it. "
         "Narrower bounds, shorter windows or more starts help."
     )
@@ -215,8 +213,8 @@ def _agreement(result: xr.Dataset) -> str:
 
 def _borne_out(result: xr.Dataset) -> bool:
     """Return whether two searches at least, and half of them, end at the same place; one alone will do."""
-    alike, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
-    return count == 1 or (alike >= 2 and 2 * alike >= count)
+    agreeing, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
+    return count == 1 or (agreeing >= 2 and 2 * agreeing >= count)
 
 
 def _table(head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
@@ -228,7 +226,7 @@ def _table(head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
     return f"<table><tr>{top}</tr>{body}</table>"
 
 
-def _found(result: xr.Dataset) -> str:
+def _estimates(result: xr.Dataset) -> str:
     return _table(["parameter", "estimate", "lower (95 %)", "upper (95 %)", "unit"], list(_parameters(result)))
 
 

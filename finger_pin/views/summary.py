@@ -16,12 +16,12 @@ from finger_pin.simulation.energy import entries
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.simulation.recording import custom_of, is_tracking
 from finger_pin.typing import Array
-from finger_pin.views.units import actuators_by_unit, joints_by_unit
+from finger_pin.views.shown_units import actuators_by_unit, joints_by_unit
 
 _SETTLING = 1.0
 _LONG = 2.0
 _WARNINGS = ("interrupted", "self_locking", "micro_damping", "accuracy", "account", "ringing")
-# What counts as sliding, m/s.
+# The least speed of sliding, m/s.
 _CREEP = 1e-6
 
 
@@ -32,7 +32,7 @@ def summarize(result: xr.Dataset) -> str:
         result: Dataset of `simulate`, or the partial one that its exception carries.
     """
     require_samples(result)
-    head = [*_head(result), *_own(result), *_warnings(result)]
+    head = [*_head(result), *_custom(result), *_warnings(result)]
     tracks = read_scene(result.attrs).finger.links and is_tracking(result)
     motion = [_tracking(result)] if tracks else [*_joints(result), *_actuators(result)]
     pulled = [_tension(result)] if result.sizes["tendon"] else []
@@ -57,14 +57,14 @@ def _head(result: xr.Dataset) -> list[str]:
     return [title, run]
 
 
-def _own(result: xr.Dataset) -> list[str]:
+def _custom(result: xr.Dataset) -> list[str]:
     custom = custom_of(result)
     return [f"Not what the scenario alone gives: {custom} of one's own"] if custom else []
 
 
 def _warnings(result: xr.Dataset) -> list[str]:
-    told = [result.attrs[name] for name in _WARNINGS if name in result.attrs]
-    return [line for each in told for line in textwrap.wrap(f"Warning: {each}", 80)]
+    warnings = [result.attrs[name] for name in _WARNINGS if name in result.attrs]
+    return [line for each in warnings for line in textwrap.wrap(f"Warning: {each}", 80)]
 
 
 def _tracking(result: xr.Dataset) -> list[str]:
@@ -117,7 +117,7 @@ def _actuators(result: xr.Dataset) -> list[list[str]]:
                 forces.setdefault(unit, {}).update(
                     {name: np.asarray(result[f"{group}_force"].sel({group: name})) for name in names}
                 )
-    found = [
+    blocks = [
         _ranges(f"{'Torques' if unit == 'N m' else 'Forces'} of the actuators, {unit}", values)
         for unit, values in forces.items()
     ]
@@ -129,8 +129,8 @@ def _actuators(result: xr.Dataset) -> list[list[str]]:
         for name in result[each].values
     }
     if frictions:
-        found.append(_ranges("Friction of tendons that they and springs pull, N", frictions))
-    return found
+        blocks.append(_ranges("Friction of tendons that they and springs pull, N", frictions))
+    return blocks
 
 
 def _tension(result: xr.Dataset) -> list[str]:

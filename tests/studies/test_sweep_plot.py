@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from finger_pin.views.plots.sweep import plot_sweep, short_key
+from finger_pin.views.plots.sweep_metrics import plot_sweep, short_key
 
 RADIUS = "finger.tendons.T3.crossings.medial.radius"
 

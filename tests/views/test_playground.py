@@ -8,7 +8,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.views.playground.inputs import JOINTS, SCENARIO, TENDONS
+from finger_pin.views.playground.input_sliders import JOINTS, SCENARIO, TENDONS
 from finger_pin.views.playground.pacing import Pacer
 from finger_pin.views.playground.session import Session, save_pieces
 

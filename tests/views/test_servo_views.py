@@ -7,7 +7,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.studies.metrics import METRICS, Run
-from finger_pin.views.plots.energy import plot_energy
+from finger_pin.views.plots.energy_account import plot_energy
 from finger_pin.views.plots.servo import plot_servo
 from finger_pin.views.summary import slack_time, summarize
 

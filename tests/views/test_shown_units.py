@@ -9,7 +9,7 @@ from matplotlib.text import Text
 import finger_pin as fp
 from finger_pin.views import plots
 from finger_pin.views.plots.identification import plot_identification
-from finger_pin.views.units import prefixed
+from finger_pin.views.shown_units import prefixed
 
 # Half a turn and less, rad, and what they are in degrees.
 ANGLES, DEGREES = np.pi * np.array([1.0, 0.5, 0.25]), [180.0, 90.0, 45.0]

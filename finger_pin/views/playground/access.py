@@ -1,4 +1,4 @@
-"""Who may play: the page that the playground serves, and no other page that the user's browser shows."""
+"""Access to the playground: from the page that it serves, and from no other page that the user's browser shows."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _checked(host: str, handler: Handler, connection: websockets.ServerConnectio
 
 
 def refusal(headers: Headers, host: str) -> str:
-    """Return why a request is refused, or nothing if it comes from the page itself.
+    """Return the reason for refusing a request, or nothing if it comes from the page itself.
 
     A name that a stranger's DNS points to this machine is no name of it; addresses are what they say. Browsers send the
     origin of the page that opens a WebSocket, and no page can change it.
@@ -77,8 +77,8 @@ def refusal(headers: Headers, host: str) -> str:
 
 
 def _names(host: str) -> set[str]:
-    own = socket.gethostname().lower()
-    return {"localhost", host.lower(), own, f"{own}.local", socket.getfqdn().lower()}
+    hostname = socket.gethostname().lower()
+    return {"localhost", host.lower(), hostname, f"{hostname}.local", socket.getfqdn().lower()}
 
 
 def _is_address(name: str) -> bool:

@@ -1,4 +1,4 @@
-"""What a finger does while it is played: friction that holds, and running plots."""
+"""Running plots of a finger that is played, and its friction where it holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What moves a finger that is played: the scenario itself, sliders of joints, or sliders of tendons and servos."""
+"""Inputs that move a played finger: the scenario itself, sliders of joints, or sliders of tendons and servos."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.typing import Array
 
-#: Kinds of what moves the finger.
+#: Kinds of inputs.
 SCENARIO, JOINTS, TENDONS = "the scenario", "joint references", "tendons and servos"
 # Period of controllers, s, and the time in which a goal follows its slider, so that a click is no blow, s.
 _PERIOD, _FOLLOWING = 1e-3, 0.05
@@ -99,18 +99,18 @@ class Inputs:
     def _tendon_sliders(self) -> tuple[Slider, ...]:
         finger = self._loop.finger
         low, high = input_ranges(finger)
-        winched, found = finger.routing.winched, []
+        winched, sliders = finger.routing.winched, []
         for channel in self._pulled.tolist():
             tendon = channel < finger.routing.actuated
             name = finger.input_names[channel].removeprefix("tendon_winding.")
             unit = "" if not tendon else "m" if winched[channel] else "N"
-            found.append(Slider(name, unit, float(low[channel]), float(high[channel]), unit != "N"))
+            sliders.append(Slider(name, unit, float(low[channel]), float(high[channel]), unit != "N"))
         holds = finger.actuators.holds
         if holds.any():
             names = [name for name, held in zip(finger.actuators.names, holds, strict=True) if held]
             ends = zip(names, *(each[holds] for each in spool_ranges(finger)), strict=True)
-            found += [Slider(name, "rad", float(least), float(most), True) for name, least, most in ends]
-        return tuple(found)
+            sliders += [Slider(name, "rad", float(least), float(most), True) for name, least, most in ends]
+        return tuple(sliders)
 
     def _joint_sliders(self) -> tuple[Slider, ...]:
         finger, limiter = self._loop.finger, self._loop.finger.stroke_limiter
@@ -135,9 +135,9 @@ class Inputs:
 
     def present(self, kind: str, position: Array) -> Array:
         """Return the values that the sliders of a kind have to have for the present posture, tensions and angles."""
-        found = position[self._free] if kind == JOINTS else np.concatenate([self._last[self._pulled], self._goals])
+        values = position[self._free] if kind == JOINTS else np.concatenate([self._last[self._pulled], self._goals])
         low, high = np.array([(each.low, each.high) for each in self.sliders[kind]]).T
-        return np.asarray(np.clip(found, low, high))
+        return np.asarray(np.clip(values, low, high))
 
     def set(self, kind: str, index: int, value: float, position: Array) -> None:
         """Move a slider, and let its kind move the finger."""
@@ -155,11 +155,11 @@ class Inputs:
             time: s.
             x: The packed state, shape (size,).
         """
-        loop, finger, given = self._loop, self._loop.finger, self.values[self.kind]
+        loop, finger, targets = self._loop, self._loop.finger, self.values[self.kind]
         share = 1.0 - math.exp(-self.period / _FOLLOWING)
         at_once = np.array([not each.follows for each in self.sliders[self.kind]], dtype=bool)
-        rate = (given - self._shown) / _FOLLOWING
-        self._shown = np.where(at_once, given, self._shown + share * (given - self._shown))
+        rate = (targets - self._shown) / _FOLLOWING
+        self._shown = np.where(at_once, targets, self._shown + share * (targets - self._shown))
         desired = self._desired(rate) if self.kind == JOINTS else loop.reference.at(time)
         command = np.zeros(finger.mechanism.channels)
         if self.kind == TENDONS:
@@ -179,7 +179,7 @@ class Inputs:
         matrix = self._coupling.matrix
         return ReferenceSignals(matrix @ base + self._coupling.offset, matrix @ velocity)
 
-    def _felt(self, state: State, desired: Array) -> Array:
+    def _damping_velocity(self, state: State, desired: Array) -> Array:
         """Return the velocity that the damping of a sampled controller is given, shape (n,), rad/s.
 
         Held over a period h, damping D of a light link, D h > 2 J, would throw it to and fro. It acts on the velocity
@@ -194,9 +194,9 @@ class Inputs:
         return np.asarray(desired + ahead)
 
     def _planned(self, time: float, x: Array, desired: ReferenceSignals) -> tuple[Array, Array]:
-        """Return what the scenario's controller commands, and the goals of spools."""
+        """Return the commands of the scenario's controller, and the goals of spools."""
         finger, state = self._loop.finger, self._loop.finger.layout.unpack(x)
-        velocity = self._felt(state, desired.velocity)
+        velocity = self._damping_velocity(state, desired.velocity)
         plan = self._loop.controller.command(time, desired, state.position, velocity)
         command = np.array(plan.tension[: finger.routing.actuated])
         # Rounding may take what is at zero below it.

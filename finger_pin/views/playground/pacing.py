@@ -40,7 +40,7 @@ class Pacer:
 
     @property
     def late(self) -> bool:
-        """Whether the steps of this frame have taken as long as they may."""
+        """True once the steps of this frame have taken as long as they may."""
         return self._clock() - self._begun > _LONGEST
 
     def stepped(self, simulated: float) -> None:
@@ -52,7 +52,7 @@ class Pacer:
 
     @property
     def slow(self) -> bool:
-        """Whether the machine cannot follow."""
+        """True where the machine cannot follow."""
         return self.rate < _SLOW * self.speed
 
     def rest(self) -> float:

@@ -14,7 +14,7 @@ import viser
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 from finger_pin.views.playground.charts import Charts
-from finger_pin.views.playground.inputs import SCENARIO, Slider
+from finger_pin.views.playground.input_sliders import SCENARIO, Slider
 from finger_pin.views.playground.session import Reading, Session
 from finger_pin.views.playground.stage import Stage
 
@@ -33,7 +33,7 @@ _MANY = 16
 
 
 class Player(Protocol):
-    """What the controls ask for."""
+    """The player that the controls command."""
 
     session: Session
     playing: bool
@@ -191,10 +191,15 @@ class Panel:
             self._player.session.handles[index] = place
 
     def _add_parameters(self) -> None:
-        for index, each in enumerate(self._player.session.parameters):
-            step = 10.0 ** np.floor(np.log10(each.high / 100.0))
+        for index, parameter in enumerate(self._player.session.parameters):
+            step = 10.0 ** np.floor(np.log10(parameter.high / 100.0))
             handle = self._gui.add_slider(
-                each.label, min=0.0, max=each.high, step=step, initial_value=each.start, hint=", ".join(each.keys)
+                parameter.label,
+                min=0.0,
+                max=parameter.high,
+                step=step,
+                initial_value=parameter.start,
+                hint=", ".join(parameter.keys),
             )
             handle.on_update(partial(self._change, index))
 

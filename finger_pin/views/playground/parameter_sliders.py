@@ -59,7 +59,7 @@ def parameters(scenario: Scenario, controller: LoopController, further: Sequence
     Raises:
         InputError: If a further key is not of the finger or its controller, or has no number.
     """
-    found = []
+    sliders = []
     for label, keys, high, factor in _candidates(scenario, controller):
         try:
             values = ParametrisedScenario(scenario, keys).values
@@ -73,8 +73,8 @@ def parameters(scenario: Scenario, controller: LoopController, further: Sequence
             continue
         high = high if not factor else 3.0 if label == "gain" else 2.0 if label == "gravity" else 10.0
         name = f"{label.partition(',')[0]} ×" if factor else label
-        found.append(Parameter(name, keys, values, max(high, 1.0 if factor else 2.0 * float(values[0])), factor))
-    return (*found, *(_of_key(scenario, key) for key in further))
+        sliders.append(Parameter(name, keys, values, max(high, 1.0 if factor else 2.0 * float(values[0])), factor))
+    return (*sliders, *(_of_key(scenario, key) for key in further))
 
 
 def _candidates(scenario: Scenario, controller: LoopController) -> Iterator[tuple[str, tuple[str, ...], float, bool]]:

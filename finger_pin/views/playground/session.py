@@ -19,8 +19,8 @@ from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.typing import Array
-from finger_pin.views.playground.inputs import Inputs, Slider
-from finger_pin.views.playground.parameters import OF_FINGER, parameters
+from finger_pin.views.playground.input_sliders import Inputs, Slider
+from finger_pin.views.playground.parameter_sliders import OF_FINGER, parameters
 
 # Of what is not recorded this much is kept, s.
 _KEPT = 60.0
@@ -28,7 +28,7 @@ _KEPT = 60.0
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What a page shows of an instant.
+    """The signals of an instant that a page shows.
 
     Attributes:
         time: s.
@@ -59,9 +59,9 @@ class Session:
     Attributes:
         scenario: The scenario, with the present parameters.
         simulator: Steps it.
-        inputs: What moves it.
-        parameters: What can be changed.
-        handles: Where the spring of every tip is held, shape (3,), m, base frame; None for none.
+        inputs: Inputs that move it.
+        parameters: Sliders of its parameters.
+        handles: Place to which the spring of every tip pulls it, shape (3,), m, base frame; None for none.
         stiffness: Of the springs, N/m.
         recording: Whether what is played is recorded.
     """
@@ -156,8 +156,8 @@ class Session:
         """
         chosen = [*self._chosen[:index], value, *self._chosen[index + 1 :]]
         entries: dict[str, object] = {}
-        for parameter, each in zip(self.parameters, chosen, strict=True):
-            entries |= parameter.at(each)
+        for parameter, number in zip(self.parameters, chosen, strict=True):
+            entries |= parameter.at(number)
         scenario = self._family.with_values([*entries.values()])
         loop = ClosedLoop.from_scenario(scenario)
         if self.parameters[index].keys[0].partition(".")[0] in OF_FINGER:
@@ -202,30 +202,30 @@ class Session:
         return self.simulator.signals()
 
     def reading(self) -> Reading:
-        """Return what a page shows of this instant."""
-        finger, found = self.finger, self.signals()
-        state, tendons = found.state, found.tendons
-        around, pins = finger.scene, found.mechanism.rows["joint_friction"]
+        """Return the signals of this instant that a page shows."""
+        finger, signals = self.finger, self.signals()
+        state, tendons = signals.state, signals.tendons
+        around, pins = finger.scene, signals.mechanism.rows["joint_friction"]
         bristles = bool(finger.layout.names_of("joint_stiction"))
         return Reading(
             time=self.simulator.time,
             position=state.position,
             strands=tendons.strands,
             tension=finger.routing.tendon_tension(tendons.strands),
-            tendon_use=_tendon_use(found),
+            tendon_use=_tendon_use(signals),
             joint_use=np.abs(pins.row.state) / pins["level"] if bristles else np.zeros(0),
-            force=np.reshape(found.fingertip_force, (-1, 3)),
+            force=np.reshape(signals.fingertip_force, (-1, 3)),
             objects=state.object_pose.reshape(-1, 7),
-            contacts=None if around is None else found.mechanism.touching,
+            contacts=None if around is None else signals.mechanism.touching,
         )
 
 
-def _tendon_use(found: FingerSignals) -> Array:
+def _tendon_use(signals: FingerSignals) -> Array:
     """Return the bristle force of every tendon over its level; of several bends the largest."""
-    tables = [found.mechanism.rows[name] for name in ("driven_tendons", "passive_tendons")]
+    tables = [signals.mechanism.rows[name] for name in ("driven_tendons", "passive_tendons")]
     use = np.concatenate([np.abs(each.row.state) / each["level"] for each in tables])
-    for name, weights in found.wraps.items():
-        wraps = found.mechanism.rows[name]
+    for name, weights in signals.wraps.items():
+        wraps = signals.mechanism.rows[name]
         at_bends = np.abs(wraps.row.state) / wraps["level"]
         use = np.maximum(use, np.max((weights != 0.0) * at_bends, axis=1, initial=0.0))
     return use

@@ -14,9 +14,9 @@ from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.playground.session import Reading, Session
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, strand_colours
+from finger_pin.views.viewer.meshcat_solids import ROOT, Command, link_names, newton_length, solid_commands
 from finger_pin.views.viewer.scene import Scene, scale_above
 from finger_pin.views.viewer.scene_objects import SceneObjects
-from finger_pin.views.viewer.solids import ROOT, Command, link_names, newton_length, solid_commands
 
 # Shares of the finger's length: the longest arrow of a force, the cross to drag the tip.
 _ARROW, _CROSS = 0.22, 0.16
@@ -146,8 +146,8 @@ class Stage:
         """Point the camera at the finger."""
         times = np.linspace(0.0, self._session.scenario.simulation.duration, _LOOKED_AT)
         header = self.scene.header("", self._session.postures(times), self.scale, palm=self._placed(times))
-        seen = np.array(header["inView"])
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        points = np.array(header["inView"])
+        low, high = points.min(axis=0), points.max(axis=0)
         middle, extent = 0.5 * (low + high), float(np.linalg.norm(high - low))
         away, right = _AWAY / np.linalg.norm(_AWAY), np.cross([0.0, 0.0, 1.0], _AWAY)
         camera = server.initial_camera

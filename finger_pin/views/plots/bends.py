@@ -1,4 +1,4 @@
-"""Tendons that rub where they bend: what every bend leaves of the tension, and what that does to the joints."""
+"""Tension behind every bend of tendons that rub where they bend, and its effect on the joints."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, times
 from finger_pin.views.plots.panels import legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import GREY, Width, colour, limit_line, styled
-from finger_pin.views.units import joints_by_unit, shown_unit
+from finger_pin.views.shown_units import joints_by_unit, shown_unit
 
 # A difference changes sign all the time: on a logarithmic axis only its greatest values show something.
 _BINS = 400

@@ -32,8 +32,8 @@ def plot_critical_friction(finger: FingerLike, *, width: Width = None, titles: b
     entries["all joints"] = critical_friction(finger)
     figure, (part,) = sheet([(7.5, 0.9 + 0.42 * len(entries))], width, titles)
     axes = part.subplots()
-    for row, (name, found) in enumerate(entries.items()):
-        value = _MILLI * found.coefficient
+    for row, (name, critical) in enumerate(entries.items()):
+        value = _MILLI * critical.coefficient
         axes.barh(row, value, height=0.6, color=colour(VERMILLION if name == "all joints" else BLUE))
         axes.text(value, row, f" {value:.2f}", va="center", fontsize="small")
     actual = _MILLI * float(np.max(description.joint_friction.break_away))
@@ -48,29 +48,29 @@ def plot_critical_friction(finger: FingerLike, *, width: Width = None, titles: b
 
 
 @styled
-def plot_self_locking_map(found: SelfLockingMap, *, width: Width = None, titles: bool = True) -> Figure:
+def plot_self_locking_map(locking_map: SelfLockingMap, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw a map over one or two joints: the tension that slow motion needs, and the critical coefficient.
 
     What is the same at every posture is said in a line instead.
 
     Args:
-        found: Map of `self_locking_map`.
+        locking_map: Map of `self_locking_map`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
-    coefficient = _MILLI * found.coefficient
-    panels = [(found.tension, "largest tension (N)", "tension that slow motion needs")]
+    coefficient = _MILLI * locking_map.coefficient
+    panels = [(locking_map.tension, "largest tension (N)", "tension that slow motion needs")]
     note = f"critical coefficient {coefficient.flat[0]:.3g} mm at every posture"
     if not np.isfinite(coefficient).any():
         note = "no joint friction locks it"
-    elif not found.uniform:
+    elif not locking_map.uniform:
         panels.append((coefficient, "critical coefficient (mm)", "joint friction at which it locks"))
         note = f"critical coefficient from {coefficient.min():.3g} to {coefficient.max():.3g} mm"
     figure, places = grid(len(panels), 2, (5.8, 4.8), width, titles)
-    heading(figure, f"{note}; the finger has {_MILLI * found.actual:.3g} mm")
+    heading(figure, f"{note}; the finger has {_MILLI * locking_map.actual:.3g} mm")
     for axes, (values, label, text) in zip(places, panels, strict=True):
         title(axes, text)
-        _map(figure, axes, found, values, label)
+        _map(figure, axes, locking_map, values, label)
     return figure
 
 
@@ -101,10 +101,10 @@ def plot_runaway(results: dict[str, xr.Dataset], *, width: Width = None, titles:
     return figure
 
 
-def _map(figure: Figure, axes: Axes, found: SelfLockingMap, values: Array, label: str) -> None:
-    angles = [np.rad2deg(each) for each in found.angles]
+def _map(figure: Figure, axes: Axes, locking_map: SelfLockingMap, values: Array, label: str) -> None:
+    angles = [np.rad2deg(each) for each in locking_map.angles]
     shown = np.ma.masked_invalid(values)
-    axes.set_xlabel(f"{found.joints[0]} (°)")
+    axes.set_xlabel(f"{locking_map.joints[0]} (°)")
     if not shown.count():
         axes.set(xlim=angles[0][[0, -1]], yticks=[])
         axes.text(0.5, 0.5, "locked everywhere", transform=axes.transAxes, ha="center", color=colour(GREY))
@@ -114,7 +114,7 @@ def _map(figure: Figure, axes: Axes, found: SelfLockingMap, values: Array, label
         axes.margins(x=0.0)
     else:
         axes.grid(visible=False)
-        axes.set_ylabel(f"{found.joints[1]} (°)")
+        axes.set_ylabel(f"{locking_map.joints[1]} (°)")
         drawn = axes.contourf(*angles, shown.T, levels=12, cmap="cividis")
         figure.colorbar(drawn, ax=axes, label=label)
         if shown.count() < values.size:

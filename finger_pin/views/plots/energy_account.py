@@ -30,7 +30,7 @@ from finger_pin.views.plots.style import (
     styled,
     thin,
 )
-from finger_pin.views.units import prefixed
+from finger_pin.views.shown_units import prefixed
 
 #: Of losses, in their order; they begin anew where there are more.
 _COLOURS = (
@@ -82,17 +82,17 @@ def _balance(
     axes: Axes, time: Array, supplied: Array, lost: dict[str, xr.Variable], stored: Array, least: float, factor: float
 ) -> None:
     level = np.zeros(len(time))
-    for each, look in zip(lost.values(), cycle(_COLOURS), strict=False):
-        if np.any(each.values):
-            above = level + factor * each.values
-            named = {"label": each.attrs["label"]} if np.max(np.abs(each.values)) > least else {}
+    for loss, look in zip(lost.values(), cycle(_COLOURS), strict=False):
+        if np.any(loss.values):
+            above = level + factor * loss.values
+            named = {"label": loss.attrs["label"]} if np.max(np.abs(loss.values)) > least else {}
             shade(axes, time, level, above, color=look, alpha=0.8, **named)
             level = above
     change = factor * (stored - stored[0])
     shade(axes, time, level, level + np.maximum(change, 0.0), color=GREY, alpha=0.35, label="put into store")
     if np.min(change) < -factor * least:
-        taken = {"facecolor": "none", "edgecolor": colour(BLACK), "hatch": "////", "alpha": 0.5}
-        shade(axes, time, level + np.minimum(change, 0.0), level, label="taken from store", **taken)
+        hatching = {"facecolor": "none", "edgecolor": colour(BLACK), "hatch": "////", "alpha": 0.5}
+        shade(axes, time, level + np.minimum(change, 0.0), level, label="taken from store", **hatching)
     trace(axes, time, factor * supplied, label="supplied", color=BLACK, linewidth=thin(1.15))
     if axes.dataLim.y0 >= 0.0:
         axes.set_ylim(bottom=0.0)

@@ -12,7 +12,7 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, times, trace
 from finger_pin.views.plots.panels import sheet, stack, title
 from finger_pin.views.plots.style import Width, styled
-from finger_pin.views.units import actuators_by_unit, joints_by_unit, shown_unit
+from finger_pin.views.shown_units import actuators_by_unit, joints_by_unit, shown_unit
 
 # The label of a panel's vertical axis, and its lines by name.
 Panel: TypeAlias = tuple[str, dict[str, Array]]
@@ -38,19 +38,19 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
         if panels:
             axes = stack(part, [label for label, _ in panels])
             title(axes[0], text)
-            for each, (_, panel) in zip(axes, panels, strict=True):
+            for panel_axes, (_, panel) in zip(axes, panels, strict=True):
                 for index, (name, values) in enumerate(panel.items()):
-                    trace(each, times(result), values, label=name, **series(index))
-                each.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="x-small", frameon=False)
+                    trace(panel_axes, times(result), values, label=name, **series(index))
+                panel_axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="x-small", frameon=False)
     return figure
 
 
 def _moved(result: xr.Dataset) -> list[Panel]:
     panels = []
-    for unit, found in joints_by_unit(result).items():
+    for unit, joints in joints_by_unit(result).items():
         factor, shown = shown_unit(unit)
         label = f"{'angle' if unit == 'rad' else 'position'} ({shown})"
-        panels += _panels(factor * result["joint_position"], "joint", found, label)
+        panels += _panels(factor * result["joint_position"], "joint", joints, label)
     return panels
 
 
@@ -58,9 +58,9 @@ def _driven(result: xr.Dataset) -> list[Panel]:
     panels = _panels(result["tendon_tension"], "tendon", names(result, "tendon"), "tension (N)")
     for group in (STATELESS, STATEFUL, MUSCLES):
         if f"{group}_force" in result:
-            for unit, found in actuators_by_unit(result, group).items():
+            for unit, actuators in actuators_by_unit(result, group).items():
                 label = f"{'torque' if unit == 'N m' else 'force'} ({unit})"
-                panels += _panels(result[f"{group}_force"], group, found, label)
+                panels += _panels(result[f"{group}_force"], group, actuators, label)
     return panels
 
 

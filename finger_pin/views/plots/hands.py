@@ -23,8 +23,8 @@ _KINDS = ("joint", "tendon")
 
 def fingers_of(result: xr.Dataset) -> list[str]:
     """Return the names of the fingers of a hand's result; none for that of a finger."""
-    found = dict.fromkeys(name.split(".")[0] for name in names(result, "joint") if "." in name)
-    return list(found)
+    fingers = dict.fromkeys(name.split(".")[0] for name in names(result, "joint") if "." in name)
+    return list(fingers)
 
 
 def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
@@ -43,9 +43,9 @@ def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
     chosen = result.drop_vars([name for name in result if str(name).startswith(("energy_", "power_"))])
     for dimension in ("joint", "tendon", "passive_tendon"):
         if dimension in chosen.coords:
-            own = [name for name in names(chosen, dimension) if name.startswith(f"{finger}.")]
-            bare = [name.removeprefix(f"{finger}.") for name in own]
-            chosen = chosen.sel({dimension: own}).assign_coords({dimension: bare})
+            dotted = [name for name in names(chosen, dimension) if name.startswith(f"{finger}.")]
+            bare = [name.removeprefix(f"{finger}.") for name in dotted]
+            chosen = chosen.sel({dimension: dotted}).assign_coords({dimension: bare})
     return chosen.sel(finger=finger, drop=True) if "finger" in chosen.dims else chosen
 
 

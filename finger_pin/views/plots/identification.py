@@ -13,7 +13,7 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.lines import trace
 from finger_pin.views.plots.panels import grid, title
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, Width, styled
-from finger_pin.views.units import shown_unit
+from finger_pin.views.shown_units import shown_unit
 
 #: Rise of minus twice the likelihood at the ends of a 95 % interval.
 _LEVEL = 3.841

@@ -80,9 +80,9 @@ def grid(
     return figure, panels[:count]
 
 
-def _across(whole: float | None, count: int, each: float) -> int:
+def _across(whole: float | None, count: int, panel_width: float) -> int:
     """Return how many panels of a width fit side by side into a figure, in; at least one."""
-    return count if whole is None else max(1, min(count, int(whole / (_NARROWEST * each))))
+    return count if whole is None else max(1, min(count, int(whole / (_NARROWEST * panel_width))))
 
 
 def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[float] | None = None) -> list[Axes]:

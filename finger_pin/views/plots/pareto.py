@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from finger_pin.views.plots.panels import grid, legend, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin
-from finger_pin.views.units import in_shown_units
+from finger_pin.views.shown_units import in_shown_units
 
 # Percentiles of the designs that are in view whatever they are, and the room around them, in shares of their span.
 _IN_VIEW, _ROOM = (0.0, 95.0), 0.08

@@ -13,9 +13,9 @@ from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.views.plots.bends import plot_bends
-from finger_pin.views.plots.contact import plot_contact
-from finger_pin.views.plots.convergence import plot_convergence
-from finger_pin.views.plots.energy import plot_energy
+from finger_pin.views.plots.contact_forces import plot_contact
+from finger_pin.views.plots.convergence_check import plot_convergence
+from finger_pin.views.plots.energy_account import plot_energy
 from finger_pin.views.plots.fig6 import plot_fig6
 from finger_pin.views.plots.hand_motion import plot_hand_motion
 from finger_pin.views.plots.losses import plot_losses

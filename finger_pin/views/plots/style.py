@@ -87,12 +87,12 @@ def inches(width: Width) -> float | None:
         InputError: If it is neither a length nor the name of one.
     """
     if width is None:
-        own = settings["figure.figsize"]
-        return None if list(own) == list(_DEFAULTS["figure.figsize"]) else float(own[0])
-    found = WIDTHS.get(width, 0.0) if isinstance(width, str) else float(width)
-    if not 1.0 <= found <= 100.0:
+        figsize = settings["figure.figsize"]
+        return None if list(figsize) == list(_DEFAULTS["figure.figsize"]) else float(figsize[0])
+    length = WIDTHS.get(width, 0.0) if isinstance(width, str) else float(width)
+    if not 1.0 <= length <= 100.0:
         raise InputError("width", "must be from 1 to 100 inches, or 'column' or 'page'", width)
-    return found
+    return length
 
 
 def colour(name: str) -> str:

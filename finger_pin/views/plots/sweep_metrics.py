@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from finger_pin.typing import Array
 from finger_pin.views.plots.panels import grid, heading, labelled, plain, title
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, Width, colour, inches, new_figure, styled
-from finger_pin.views.units import in_shown_units
+from finger_pin.views.shown_units import in_shown_units
 
 _MAP = "cividis"
 # Values that differ by more than this factor are coloured by their logarithm.
@@ -62,12 +62,12 @@ def short_key(key: str) -> str:
 
 def _numbered(result: xr.Dataset) -> xr.Dataset:
     """Return a sweep with numbers from 0 in place of names, which are then the attribute ``names`` of their key."""
-    for key, held in result.coords.items():
-        if held.dtype.kind not in "iuf":
-            names = list(dict.fromkeys(held.values.tolist()))
-            places = np.array([float(names.index(name)) for name in held.values.tolist()])
+    for key, coordinate in result.coords.items():
+        if coordinate.dtype.kind not in "iuf":
+            names = list(dict.fromkeys(coordinate.values.tolist()))
+            places = np.array([float(names.index(name)) for name in coordinate.values.tolist()])
             spelt = [str(name).lower() if isinstance(name, bool) else str(name) for name in names]
-            result = result.assign_coords({key: (held.dims, places, {**held.attrs, "names": spelt})})
+            result = result.assign_coords({key: (coordinate.dims, places, {**coordinate.attrs, "names": spelt})})
     return result
 
 
@@ -79,12 +79,12 @@ def _lines(result: xr.Dataset, key: str, width: Width, titles: bool) -> Figure:
     values = result[key].values[order]
     failed = result["status"].values[order] == "failed"
     for name, axes in panels.items():
-        found = result[name].values[order]
+        metric = result[name].values[order]
         marker, line = ("o" if len(values) <= 40 or named else ""), ("none" if named else "-")
-        axes.plot(values, found, color=colour(BLUE), marker=marker, markersize=3.5, linestyle=line)
+        axes.plot(values, metric, color=colour(BLUE), marker=marker, markersize=3.5, linestyle=line)
         axes.margins(x=0.2 if named else 0.02)
         _scale(axes.set_xscale, axes.xaxis, result[key])
-        if not np.any(np.nan_to_num(found)):
+        if not np.any(np.nan_to_num(metric)):
             axes.set_ylim(0.0, 1.0)
         axes.set_ylabel(_unit(result, name))
         _mark_failures(axes, values[failed])

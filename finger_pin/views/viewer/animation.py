@@ -68,12 +68,12 @@ def animation_page(
     finger: Finger | None = None,
 ) -> str:
     """Return the page that plays a result, with fingertip forces and a second result if given."""
-    motion = Playback.of(result, finger=finger)
+    motion = Playback.from_result(result, finger=finger)
     every = slice(None, None, max(1, len(motion.time) // _POSITIONS_IN_VIEW))
-    seen = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
-    beside = Playback.of(ghost).ghost(motion.time) if ghost is not None else None
+    palm = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
+    beside = Playback.from_result(ghost).ghost(motion.time) if ghost is not None else None
     header = motion.scene.header(
-        motion.title, motion.position[every], motion.largest, forces=forces, ghost=beside, palm=seen
+        motion.title, motion.position[every], motion.largest, forces=forces, ghost=beside, palm=palm
     )
     chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
     if beside is not None:
@@ -135,7 +135,7 @@ class Playback:
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
 
     @classmethod
-    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE, finger: Finger | None = None) -> Playback:
+    def from_result(cls, result: xr.Dataset, rate: float = FRAME_RATE, finger: Finger | None = None) -> Playback:
         """Choose the frames of a result.
 
         Args:
@@ -158,7 +158,7 @@ class Playback:
         title = result.attrs.get("title") or scene.geometry.description.title or scene.geometry.description.name
         palm, few = _palm(result, frames), slice(None, None, max(1, len(frames) // _POSITIONS_IN_VIEW))
         tips = scene.tips(scene.geometry.poses(position[few])).reshape(-1, 3)
-        objects = SceneObjects.of(result, time[frames], scene.size, tips.mean(axis=0), palm)
+        objects = SceneObjects.from_result(result, time[frames], scene.size, tips.mean(axis=0), palm)
         return cls(scene, title, time[frames], position, tension, palm, objects)
 
 

@@ -13,8 +13,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.viewer.animation import Playback
+from finger_pin.views.viewer.meshcat_solids import ROOT, Command, link_names, placed, set_object, solid_commands
 from finger_pin.views.viewer.scene import SLACK_TENSION, Scene, scale_above
-from finger_pin.views.viewer.solids import ROOT, Command, link_names, placed, set_object, solid_commands
 
 if TYPE_CHECKING:
     import meshcat
@@ -46,7 +46,7 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
     for name, value in (("speed", speed), ("rate", rate)):
         if not value > 0.0:
             raise InputError(name, "must be above 0", value)
-    motion = Playback.of(result, rate / speed)
+    motion = Playback.from_result(result, rate / speed)
     root = visualizer.path.lower()
     scene, tube, scale = motion.scene, motion.scene.tube_radius, scale_above(motion.largest)
     objects = motion.objects

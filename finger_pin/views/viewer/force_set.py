@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.analysis import ForcePolytope
 from finger_pin.typing import Array
-from finger_pin.views.viewer.solids import ROOT, Command, newton_length, set_object
+from finger_pin.views.viewer.meshcat_solids import ROOT, Command, newton_length, set_object
 
 _PATH = f"{ROOT}/forces"
 _COLOUR, _RIM, _OPACITY = 0xFFB347, 0xFFD9A0, 0.22
@@ -30,7 +30,7 @@ class ForceSet:
     scale: float
 
     @classmethod
-    def of(cls, polytope: ForcePolytope, length: float) -> ForceSet:
+    def from_polytope(cls, polytope: ForcePolytope, length: float) -> ForceSet:
         """Choose a scale at which the set is at most half as large as a finger of some length, m."""
         extent = float(np.max(np.linalg.norm(polytope.vertices, axis=1)))
         return cls(polytope, newton_length(_SHARE * length, extent) if extent > 0.0 else 1.0)

@@ -52,9 +52,9 @@ def solid_commands(
     for visual in geometry.visuals:
         placement = visual.placement
         shape, turn = primitive(visual.name, visual.shape)
-        own, opacity = visual.colour[:3], visual.colour[3] * SOLID_OPACITY
+        visual_colour, opacity = visual.colour[:3], visual.colour[3] * SOLID_OPACITY
         path = f"{root}/{links[visual.link]}/{visual.name}"
-        yield mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
+        yield mesh(path, shape, placement.rotation @ turn, placement.translation, colour or visual_colour, opacity)
     thickness = 0.8 * geometry.lanes.spacing
     for pulley in geometry.pulleys:
         path = f"{root}/{links[pulley.joint]}/groove_{pulley.tendon}"
@@ -152,8 +152,8 @@ def placed(rotation: Array, translation: Array) -> list[float]:
     """Return a pose as meshcat has it: 16 numbers, column by column."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, translation
-    found: list[float] = matrix.T.ravel().tolist()
-    return found
+    numbers: list[float] = matrix.T.ravel().tolist()
+    return numbers
 
 
 def newton_length(longest: float, strongest: float) -> float:

@@ -18,7 +18,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual, joint_axes
 from finger_pin.typing import Array
 from finger_pin.views.viewer.force_set import ForceSet
-from finger_pin.views.viewer.solids import ROOT, encode, is_mesh, link_names, root_command, solid_commands
+from finger_pin.views.viewer.meshcat_solids import ROOT, encode, is_mesh, link_names, root_command, solid_commands
 
 #: Below this tension a tendon is drawn loose, wholly at none, N.
 SLACK_TENSION = 0.05
@@ -59,7 +59,7 @@ class Ghost:
         """Return the frames for the page."""
         return _encode_poses(LinkPoses(self.poses.rotation[:, 1:], self.poses.translation[:, 1:]))
 
-    def seen(self) -> Array:
+    def points_in_view(self) -> Array:
         """Return points that the camera must have in view, shape (m, 3), m."""
         return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
 
@@ -70,12 +70,12 @@ def shown(finger: FingerLike) -> TendonGeometry | TreeGeometry:
     Raises:
         InputError: If a joint of a description carries no link.
     """
-    own = finger if isinstance(finger, Finger) else None
+    built = finger if isinstance(finger, Finger) else None
     description = description_of(finger)
     if not description.links:
         return TreeGeometry(description)
-    visuals = None if own is None else own.visuals
-    body = None if own is None or visuals is None else own.rigid_body
+    visuals = None if built is None else built.visuals
+    body = None if built is None or visuals is None else built.rigid_body
     return TendonGeometry(description, resolution=_RESOLUTION, body=body, solids=visuals)
 
 
@@ -140,8 +140,8 @@ class Scene:
         """
         geometry, tube = self.geometry, self.tube_radius
         turn = self.view()
-        shown = ForceSet.of(forces, self._size) if forces is not None else None
-        beside = ([] if shown is None else [shown.corners]) + ([] if ghost is None else [ghost.seen()])
+        shown = ForceSet.from_polytope(forces, self._size) if forces is not None else None
+        beside = ([] if shown is None else [shown.corners]) + ([] if ghost is None else [ghost.points_in_view()])
         corners = self._in_view(joint_positions, palm, beside)
         drawn = list(shown.commands()) if shown is not None else []
         return {
@@ -171,15 +171,15 @@ class Scene:
         geometry, turn = self.geometry, self.view()
         poses = geometry.poses(joint_positions, palm)
         paths = geometry.paths(joint_positions, poses=poses)
-        seen = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
+        visible = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
         tree = isinstance(geometry, TreeGeometry)
         large = [each for each in geometry.visuals if tree or is_mesh(each.shape) or each.name == "palm"]
-        seen += [*(_corners(visual, poses) for visual in large), *beside]
-        corners: Array = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
+        visible += [*(_corners(visual, poses) for visual in large), *beside]
+        corners: Array = np.concatenate([points.reshape(-1, 3) for points in visible]) @ turn.T
         if not tree:
             return corners
         # What a hand has lost, such as a pen of a model's that falls, leaves the view.
-        first = np.concatenate([points.reshape(-1, *points.shape[-2:])[0] for points in seen]) @ turn.T
+        first = np.concatenate([points.reshape(-1, *points.shape[-2:])[0] for points in visible]) @ turn.T
         middle = first.mean(axis=0)
         reach = np.linalg.norm(first - middle, axis=1).max()
         kept: Array = corners[np.linalg.norm(corners - middle, axis=1) <= _LOST * reach]

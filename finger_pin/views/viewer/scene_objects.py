@@ -15,7 +15,7 @@ from finger_pin.description.objects import Object
 from finger_pin.description.scene_metadata import read_scene
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
-from finger_pin.views.viewer.solids import (
+from finger_pin.views.viewer.meshcat_solids import (
     ROOT,
     SOLID_OPACITY,
     Y_TO_Z,
@@ -61,7 +61,7 @@ class SceneObjects:
     middle: Array
 
     @classmethod
-    def of(
+    def from_result(
         cls, result: xr.Dataset, time: Array, size: float, middle: Array, palm: LinkPoses | None = None
     ) -> SceneObjects | None:
         """Read a result at the times of the frames, which are among its samples; None if it has no contacts.
@@ -80,29 +80,31 @@ class SceneObjects:
         steepness = np.max(np.divide(level, normal, out=np.zeros_like(level), where=normal > 1e-6), axis=0)
         frames, closed = np.searchsorted(np.asarray(result["time"]), time), np.flatnonzero(steepness > 0.0)
         parts = [np.asarray(result[f"contact_{name}"])[np.ix_(frames, closed)] for name in ("point", "force", "normal")]
-        found = {name: np.broadcast_to(each.pose, (len(time), 7)) for name, each in objects.items() if palm is not None}
+        poses_by_name = {
+            name: np.broadcast_to(each.pose, (len(time), 7)) for name, each in objects.items() if palm is not None
+        }
         if "object_position" in result:
             moved = [np.asarray(result[f"object_{name}"])[frames] for name in ("position", "orientation")]
             names = np.asarray(result["object"]).tolist()
-            found |= dict(zip(names, np.moveaxis(np.concatenate(moved, axis=-1), 1, 0), strict=True))
-        poses = np.stack(list(found.values()), axis=1) if found else np.zeros((len(time), 0, 7))
+            poses_by_name |= dict(zip(names, np.moveaxis(np.concatenate(moved, axis=-1), 1, 0), strict=True))
+        poses = np.stack(list(poses_by_name.values()), axis=1) if poses_by_name else np.zeros((len(time), 0, 7))
         if palm is not None:
             turned = [np.einsum("mij,mcj->mci", palm.rotation, each) for each in (*parts, poses[..., :3])]
             open_ = ~np.any(parts[1], axis=-1, keepdims=True)
             parts = [turned[0] + palm.translation[:, None] * ~open_, *turned[1:3]]
             attitudes = [pin.Quaternion(each) for each in palm.rotation]
-            seen = np.array(
+            orientations = np.array(
                 [
                     [(attitude * pin.Quaternion(each)).coeffs() for each in row]
                     for attitude, row in zip(attitudes, poses[..., 3:], strict=True)
                 ]
             ).reshape(*poses.shape[:2], 4)
-            poses = np.concatenate([turned[3] + palm.translation[:, None], seen], axis=-1)
-            for index, name in enumerate(found):
+            poses = np.concatenate([turned[3] + palm.translation[:, None], orientations], axis=-1)
+            for index, name in enumerate(poses_by_name):
                 if objects[name].frame == "world":
                     poses[:, index] = objects[name].pose
         contacts = np.concatenate(parts, axis=-1)
-        return cls(objects, tuple(found), poses, contacts, steepness[steepness > 0.0], size, middle)
+        return cls(objects, tuple(poses_by_name), poses, contacts, steepness[steepness > 0.0], size, middle)
 
     def header(self, turn: Array) -> dict[str, Any]:
         """Return their part of the page's header; ``turn`` is the rotation of the scene."""
@@ -116,29 +118,29 @@ class SceneObjects:
                 "cone": _CONE * self.size,
                 "note": f"contact forces, {1e3 * length:.4g} mm per N, in their friction cones",
             },
-            "alsoInView": np.round(self.seen() @ turn.T, 5).tolist(),
+            "alsoInView": np.round(self.points_in_view() @ turn.T, 5).tolist(),
         }
 
     def chunk(self) -> dict[str, str]:
         """Return the frames for the page."""
         return {name: encode(values, "<f4") for name, values in (("object", self.poses), ("contact", self.contacts))}
 
-    def seen(self) -> Array:
+    def points_in_view(self) -> Array:
         """Return places of free objects and contacts, and corners of fixed ones, near the finger, shape (m, 3)."""
         free = [index for index, name in enumerate(self.moving) if self.by_name[name].mass is not None]
         places = self.poses[:, free, :3].reshape(-1, 3)
         points = self.contacts[np.any(self.contacts[..., 3:6] != 0.0, axis=-1)][:, :3]
         corners = [_corners(each) for each in self.by_name.values() if each.mass is None and each.sizes]
-        found = np.concatenate([places[::10], points[::10], *corners])
-        return np.asarray(found[np.linalg.norm(found - self.middle, axis=1) < 1.2 * self.size])
+        in_view = np.concatenate([places[::10], points[::10], *corners])
+        return np.asarray(in_view[np.linalg.norm(in_view - self.middle, axis=1) < 1.2 * self.size])
 
     def commands(self) -> Iterator[Command]:
         """Yield meshcat's commands for all objects, each at its start."""
-        for name, each in self.by_name.items():
+        for name, scene_object in self.by_name.items():
             path = f"{ROOT}/object_{name}"
             for index, (shape, turned, offset, colour) in enumerate(self.parts(name)):
                 yield mesh(f"{path}/part{index}", shape, turned, offset, colour, 1.6 * SOLID_OPACITY)
-            yield self._placement(name, each.pose)
+            yield self._placement(name, scene_object.pose)
 
     def frame(self, index: int) -> Iterator[Command]:
         """Yield meshcat's commands that move objects to their places in a frame."""
@@ -149,8 +151,8 @@ class SceneObjects:
         """Return poses of an object in all frames, shape (m, 7)."""
         if name in self.moving:
             return np.asarray(self.poses[:, self.moving.index(name)])
-        each = self.by_name[name]
-        return np.tile(each.pose, (len(self.poses), 1))
+        scene_object = self.by_name[name]
+        return np.tile(scene_object.pose, (len(self.poses), 1))
 
     def arrows(self) -> Array:
         """Return both ends of the arrow of every contact's force in all frames, shape (m, c, 2, 3), m."""
@@ -169,31 +171,31 @@ class SceneObjects:
 
     def parts(self, name: str) -> Iterator[tuple[Command, Array, Array, tuple[float, float, float]]]:
         """Yield the solids of an object: meshcat's geometry, its rotation and place in the object, and its colour."""
-        each = self.by_name[name]
-        sizes, colour = each.sizes, _FIXED if each.mass is None else _FREE
-        rotation = pin.Quaternion(each.quaternion).toRotationMatrix()
-        place = np.array(each.position)
-        if each.shape == "half_space":
+        scene_object = self.by_name[name]
+        sizes, colour = scene_object.sizes, _FIXED if scene_object.mass is None else _FREE
+        rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
+        place = np.array(scene_object.position)
+        if scene_object.shape == "half_space":
             # The part of it that is nearest to the finger.
             side, thick = 2.0 * _WIDE * self.size, _THICK * self.size
             below = rotation.T @ (self.middle - place) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thick]
             parts = [(box(side, side, thick), np.eye(3), below)]
-        elif each.shape == "box":
+        elif scene_object.shape == "box":
             parts = [(box(*sizes), np.eye(3), np.zeros(3))]
-        elif each.shape == "sphere":
+        elif scene_object.shape == "sphere":
             parts = [(ball(sizes[0]), np.eye(3), np.zeros(3))]
         else:
             parts = [(cylinder(*sizes), Y_TO_Z, np.zeros(3))]
-            if each.shape == "capsule":
+            if scene_object.shape == "capsule":
                 ends = np.array([0.0, 0.0, 0.5 * sizes[1]])
                 parts += [(ball(sizes[0]), np.eye(3), end) for end in (-ends, ends)]
         yield from ((*part, colour) for part in parts)
 
 
-def _corners(each: Object) -> Array:
+def _corners(scene_object: Object) -> Array:
     """Return the corners of the box around a fixed object, shape (8, 3), m."""
-    radius = each.radius or 0.0
-    round_ends = 0.0 if each.shape == "cylinder" else 2.0 * radius
-    sides = each.sides or (2.0 * radius, 2.0 * radius, (each.length or 0.0) + round_ends)
-    rotation = pin.Quaternion(each.quaternion).toRotationMatrix()
-    return np.asarray(0.5 * np.array(list(product((-1.0, 1.0), repeat=3))) * sides @ rotation.T + each.position)
+    radius = scene_object.radius or 0.0
+    round_ends = 0.0 if scene_object.shape == "cylinder" else 2.0 * radius
+    sides = scene_object.sides or (2.0 * radius, 2.0 * radius, (scene_object.length or 0.0) + round_ends)
+    rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
+    return np.asarray(0.5 * np.array(list(product((-1.0, 1.0), repeat=3))) * sides @ rotation.T + scene_object.position)

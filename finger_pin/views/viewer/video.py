@@ -30,9 +30,9 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, strand_colours, tension_colours
+from finger_pin.views.viewer.meshcat_solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, primitive
 from finger_pin.views.viewer.scene import Scene, scale_above
 from finger_pin.views.viewer.scene_objects import SceneObjects
-from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, primitive
 
 _BACKGROUND, _INK, _DIM, _TRACE = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
@@ -75,16 +75,16 @@ def write_video(
     for name, value in (("speed", speed), ("rate", rate)):
         if not 0.0 < value < np.inf:
             raise InputError(name, "must be a number above 0", value)
-    found = find_ffmpeg()
-    if not gif and not found:
+    ffmpeg = find_ffmpeg()
+    if not gif and not ffmpeg:
         wanted = "the program ffmpeg, which is not found (the package imageio-ffmpeg has it, too)"
         raise FingerPinError(f"an MP4 needs {wanted}; a GIF does without")
-    writer: AbstractMovieWriter = (FFMpegWriter if found else PillowWriter)(fps=rate)  # type: ignore[arg-type]
-    motion = Playback.of(result, rate / speed)
+    writer: AbstractMovieWriter = (FFMpegWriter if ffmpeg else PillowWriter)(fps=rate)  # type: ignore[arg-type]
+    motion = Playback.from_result(result, rate / speed)
     figure = new_figure(*_INCHES, layout=None)
     film = _Film(figure, motion)
     resolution = (_GIF_WIDTH if gif else _WIDTH) / _INCHES[0]
-    shown = rc_context({"animation.ffmpeg_path": found})
+    shown = rc_context({"animation.ffmpeg_path": ffmpeg})
     with shown, replacing(target) as temporary, writer.saving(figure, temporary, resolution):
         step, last = speed / rate, motion.time[-1]
         for due in np.arange(motion.time[0], last + 0.5 * step, step):
@@ -105,7 +105,7 @@ def draw_picture(result: xr.Dataset, stage: Array, goal: Array | None = None) ->
     figure = new_figure(*_INCHES, layout=None)
     figure.set_dpi(_GIF_WIDTH / _INCHES[0])
     figure.set_facecolor(_BACKGROUND)
-    motion = Playback.of(result)
+    motion = Playback.from_result(result)
     film = _Film(figure, motion, stage)
     film.show(len(motion.time) - 1)
     if goal is not None:
@@ -117,13 +117,13 @@ def draw_picture(result: xr.Dataset, stage: Array, goal: Array | None = None) ->
 
 def find_ffmpeg() -> str:
     """Return the path of the program ffmpeg: matplotlib's, or that of the package imageio-ffmpeg; empty without any."""
-    found = shutil.which(rcParams["animation.ffmpeg_path"])
-    if found is None:
+    program = shutil.which(rcParams["animation.ffmpeg_path"])
+    if program is None:
         with contextlib.suppress(ImportError, RuntimeError):
             import imageio_ffmpeg
 
-            found = imageio_ffmpeg.get_ffmpeg_exe()
-    return found or ""
+            program = imageio_ffmpeg.get_ffmpeg_exe()
+    return program or ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ class _Film:
         self.poses = self.links = scene.geometry.poses(motion.position, motion.palm)
         self.solids, objects = tuple(_solids(scene)), motion.objects
         # Objects are further links; what is seen of them does not move the camera far away.
-        own = self.solids
+        finger_solids = self.solids
         if objects is not None:
             self.solids += tuple(_objects(objects, self.poses.translation.shape[1]))
             placed = np.stack([objects.placed(name) for name in objects.by_name], axis=1)
@@ -164,16 +164,16 @@ class _Film:
         self.axes = axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_axis_off()
         few = np.unique(np.linspace(0, len(motion.time) - 1, _FEW).round().astype(int))
-        seen = np.concatenate(
+        points = np.concatenate(
             [
                 self.tips.reshape(-1, 2),
                 stage @ self.camera[:2].T,
-                np.zeros((0, 2)) if objects is None else objects.seen() @ self.camera[:2].T,
-                *(self._outline(solid, frame) for frame in few for solid in own),
+                np.zeros((0, 2)) if objects is None else objects.points_in_view() @ self.camera[:2].T,
+                *(self._outline(solid, frame) for frame in few for solid in finger_solids),
                 *(line for frame in few for line in self._lines(frame)),
             ]
         )
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        low, high = points.min(axis=0), points.max(axis=0)
         # Room for the legend at the left, and for the title above.
         unit = float(np.max((high - low) / (np.array([0.76, 0.8]) * _INCHES)))
         left, below = 0.5 * (low + high) - unit * np.array([0.58, 0.47]) * _INCHES
@@ -231,8 +231,8 @@ class _Film:
         return np.asarray(solid.corners @ rotation.T + translation)
 
     def _outline(self, solid: _Solid, frame: int) -> Array:
-        seen = self._placed(solid, frame) @ self.camera[:2].T
-        return np.asarray(seen[scipy.spatial.ConvexHull(seen).vertices])
+        points = self._placed(solid, frame) @ self.camera[:2].T
+        return np.asarray(points[scipy.spatial.ConvexHull(points).vertices])
 
     def _legend(self, figure: Figure) -> None:
         colours = ListedColormap(tension_colours(np.linspace(0.0, self.scale, 256), self.scale))

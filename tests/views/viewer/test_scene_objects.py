@@ -107,7 +107,7 @@ def test_a_meshcat_window_shows_objects_where_they_end_and_the_forces_on_them(pi
 
 
 def test_a_film_shows_the_ball_round_and_where_it_is(pinched):
-    motion = Playback.of(pinched, 10.0)
+    motion = Playback.from_result(pinched, 10.0)
     film, frame = _Film(new_figure(4.0, 3.0), motion), 3
     film.show(frame)
     at = pinched.sel(time=motion.time[frame])
@@ -125,7 +125,7 @@ def test_forces_have_one_colour_on_the_page_in_a_window_and_in_films():
 
 
 def test_a_goal_is_marked_where_it_is_on_a_palm_that_moves(pinched):
-    motion = Playback.of(pinched)
+    motion = Playback.from_result(pinched)
     film, goal = _Film(new_figure(4.0, 3.0), motion), np.array([0.1, -0.02, 0.03])
     film.mark(goal)
     # The palm moves without turning.

@@ -93,7 +93,7 @@ def test_a_hand_that_no_tendon_pulls_shows_its_joints_and_no_scale_of_tensions(b
         "tendon_tension": (("time", "tendon"), np.zeros((2, 0))),
     }
     result = xr.Dataset(still, {"time": [0.0, 1.0]}, scene_metadata(scenario))
-    film = _Film(figure := new_figure(4.0, 3.0), Playback.of(result))
+    film = _Film(figure := new_figure(4.0, 3.0), Playback.from_result(result))
     film.show(0)
     assert figure.axes == [film.axes]
     page = opened(browser, write_animation(result, tmp_path / "alone.html").as_uri())
