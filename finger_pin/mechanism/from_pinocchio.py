@@ -84,8 +84,12 @@ def _by_finger(values: Any, fingers: tuple[str, ...], entry: str) -> list[Any]:
     return [values[name] for name in fingers]
 
 
-def turned_model(body: RigidBody) -> tuple[pin.Model, list[Array]]:
+def turned_model(body: RigidBody, slides: bool = False) -> tuple[pin.Model, list[Array]]:
     """Return the joints of a body with their axes along z, and the rotation of each frame, the base first.
+
+    Args:
+        body: The body.
+        slides: Whether joints may slide.
 
     Raises:
         InputError: If a joint does not turn.
@@ -96,13 +100,13 @@ def turned_model(body: RigidBody) -> tuple[pin.Model, list[Array]]:
         data = joint.createData()
         joint.calc(data, np.zeros(1), np.zeros(1))
         subspace = np.ravel(data.S)
-        if joint.nv != 1 or np.any(subspace[:3]):
+        slide = bool(np.any(subspace[:3]))
+        if joint.nv != 1 or (slide and not slides):
             raise InputError(f"joint {original.names[index]}", "the viewer shows tendons around joints that turn")
-        turn = _frame(subspace[3:], _onwards(body, index))
-        above = pin.SE3(turns[parent], np.zeros(3))
-        at = model.addJoint(
-            parent, pin.JointModelRZ(), above.inverse() * placement * pin.SE3(turn, np.zeros(3)), original.names[index]
-        )
+        turn = _frame(subspace[:3] if slide else subspace[3:], _onwards(body, index))
+        above = pin.SE3(turns[parent], np.zeros(3)).inverse()
+        kind = pin.JointModelPZ() if slide else pin.JointModelRZ()
+        at = model.addJoint(parent, kind, above * placement * pin.SE3(turn, np.zeros(3)), original.names[index])
         model.inertias[at] = original.inertias[index]
         turns.append(turn)
     return model, turns

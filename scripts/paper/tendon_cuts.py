@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.mechanism.geometry import TendonGeometry
-from finger_pin.mechanism.geometry.wound_tendon import Arc, WoundSpan
+from finger_pin.mechanism.geometry.cord_pieces import Arc, Piece, WoundSpan
 from finger_pin.typing import Array
 
 
@@ -63,13 +63,13 @@ def tendon_cuts(geometry: TendonGeometry, groove: Groove = Groove.DISTAL) -> tup
     return tuple(cut for name, pieces in tendons for cut in _cuts(geometry.model, name, pieces, groove))
 
 
-def _cuts(model: pin.Model, tendon: str, pieces: Sequence[WoundSpan | Arc], groove: Groove) -> Iterator[Cut]:
+def _cuts(model: pin.Model, tendon: str, pieces: Sequence[Piece], groove: Groove) -> Iterator[Cut]:
     """Yield the cuts of a wound tendon, joint by joint.
 
     Args:
         model: Pinocchio model of the finger.
         tendon: Name of the tendon.
-        pieces: From `winding.wind`.
+        pieces: Of the tendon.
         groove: Link that the grooves are part of.
     """
     spans = [piece for piece in pieces if isinstance(piece, WoundSpan)]

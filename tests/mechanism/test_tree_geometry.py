@@ -6,8 +6,9 @@ import pytest
 from mujoco_models import ROUTED, asset, posture
 
 import finger_pin as fp
-from finger_pin.mechanism.geometry import TreeGeometry
+from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views.viewer.scene import Scene
+from finger_pin.views.viewer.video import draw_picture
 
 MOTORS = "".join(f'<motor name="{name}_motor" tendon="{name}" gear="-1" ctrlrange="0 5"/>' for name in ("top", "below"))
 
@@ -21,7 +22,7 @@ def pulled():
 
 def test_paths_are_as_long_as_their_tendons_and_end_at_their_sites(pulled):
     model, description = pulled
-    geometry, hand, data = TreeGeometry(description), fp.Hand(description), mujoco.MjData(model)
+    geometry, hand, data = TendonGeometry(description), fp.Hand(description), mujoco.MjData(model)
     random, wrapped = np.random.default_rng(0), 0
     positions = random.uniform([-1.4, -1.4, -0.01], [1.4, 1.4, 0.01], (120, 3))
     drawn = {path.name: path.points for path in geometry.paths(positions)}
@@ -62,7 +63,7 @@ def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
     """Of the Shadow hand meshes, but of two links that have boxes; its capsules are hidden."""
     model = mujoco.MjModel.from_xml_path(str(asset("hand/reach.xml")))
     description, data = fp.from_mujoco(model), mujoco.MjData(model)
-    geometry = TreeGeometry(description)
+    geometry = TendonGeometry(description)
     data.qpos = posture(model, np.random.default_rng(1))
     mujoco.mj_kinematics(model, data)
     poses = geometry.poses(data.qpos)
@@ -111,3 +112,56 @@ def test_a_hinge_is_looked_at_along_its_axis_with_what_weighs_below_on_a_grid_of
     np.testing.assert_allclose(scene.view() @ axis, [0.0, -1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(scene.view()[2], np.eye(3)[up], atol=1e-12)
     assert scene.header("", np.zeros((1, 1)), 1.0)["grid"] == 0.01
+
+
+# Axes of the chain a, b, c differ, and d is on a chain of its own; e slides.
+SUMS = """<mujoco><worldbody>
+    <body><joint name="a" axis="0 1 0"/><geom size="0.01"/>
+      <body pos="0.05 0 0"><joint name="b" axis="0 0 1" range="-60 60" limited="true"/><geom size="0.01"/>
+        <body pos="0.04 0 0"><joint name="c" axis="0 1 0.3"/><geom size="0.01" pos="0.03 0 0"/></body></body></body>
+    <body pos="0 0.1 0"><joint name="d" axis="1 0 0"/><geom size="0.01" pos="0 0 0.04"/>
+      <body pos="0 0 0.05"><joint name="e" type="slide"/><geom size="0.01"/></body></body>
+  </worldbody><tendon>
+    <fixed name="skipping" stiffness="1"><joint joint="a" coef="0.01"/><joint joint="c" coef="-0.006"/></fixed>
+    <fixed name="both" stiffness="1"><joint joint="b" coef="0.008"/><joint joint="d" coef="0.012"/></fixed>
+    <fixed name="pulled"><joint joint="b" coef="-0.009"/><joint joint="c" coef="-0.007"/></fixed>
+    <fixed name="sliding" stiffness="1"><joint joint="d" coef="0.01"/><joint joint="e" coef="0.5"/></fixed>
+    <fixed name="geared" stiffness="1"><joint joint="a" coef="2"/></fixed>
+  </tendon><actuator><motor name="motor" tendon="pulled" gear="-1" ctrlrange="0 5"/></actuator></mujoco>"""
+
+
+def test_sums_of_hinges_wind_around_them_and_are_drawn_longer_by_their_excursion():
+    """Straight pieces rest in links and arcs of radius r turn by q, so that lengths are exact but for chords.
+
+    A chord over an angle a is shorter than its arc by a^2 / 24 of it, and arcs turn by four pi at most.
+    """
+    description, resolution = fp.from_mujoco(mujoco.MjModel.from_xml_string(SUMS)), 60
+    geometry = TendonGeometry(description, resolution=resolution)
+    positions = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 5))
+    positions[0] = 0.0
+    drawn = {path.name: path.points for path in geometry.paths(positions)}
+    assert set(drawn) == {"motor", "skipping", "both", "both.1"}
+    lengths = {name: np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1) for name, points in drawn.items()}
+    lengths["both"] += lengths.pop("both.1")
+    arms = {"skipping": [0.01, 0, -0.006, 0, 0], "both": [0, 0.008, 0, 0.012, 0], "motor": [0, -0.009, -0.007, 0, 0]}
+    poses = geometry.poses(positions)
+    for name, arm in arms.items():
+        error = np.abs(arm).sum() * 4.0 * np.pi / (24.0 * resolution**2)
+        np.testing.assert_allclose(lengths[name] - lengths[name][0], positions @ arm, atol=error)
+        assert error < 1e-3 * np.ptp(positions @ arm)
+    for pulley in geometry.pulleys:
+        rotation, place = poses.rotation[:, pulley.joint, None], poses.translation[:, pulley.joint, None]
+        local = np.einsum("mpji,mpj->mpi", rotation, drawn[pulley.tendon] - place) @ pulley.frame
+        distance = np.linalg.norm(local[..., :2], axis=-1)
+        on_pulley = np.isclose(distance, abs(pulley.radius), atol=1e-12) & (np.abs(local[..., 2]) < 0.01)
+        assert np.all(np.count_nonzero(on_pulley, axis=1) > 3)
+    assert len(geometry.pulleys) == 6
+
+
+def test_a_tree_whose_bodies_may_touch_is_filmed_without_objects():
+    description = fp.from_mujoco(mujoco.MjModel.from_xml_string(SUMS))
+    simulator = fp.Simulator(fp.Finger(description))
+    simulator.step([1.0], 1e-4)
+    result = simulator.result()
+    assert "contact_force" in result and "object_position" not in result
+    assert np.ptp(draw_picture(result, np.zeros((0, 3)))) > 0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import coal
@@ -12,11 +13,13 @@ import pinocchio as pin
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.from_pinocchio import chain, placed_solids, turned_model, width_of
+from finger_pin.mechanism.geometry.cord_pieces import Arc, Leg, WoundSpan
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes, tendon_lanes
-from finger_pin.mechanism.geometry.wound_tendon import BASE_LEAD, Arc, WoundSpan, wind
+from finger_pin.mechanism.geometry.wound_tendon import BASE_LEAD, joint_chains, wind
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.shapes import MATERIALS
 from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
+from finger_pin.typing import Array
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class Visual:
         shape: Geometry of Pinocchio: a box, a cylinder, a sphere or a mesh.
         placement: In the frame of the link.
         colour: Red, green, blue and opacity, 0 to 1.
+        framed: Whether the camera must have its corners in view; of links their joints suffice.
     """
 
     name: str
@@ -36,23 +40,26 @@ class Visual:
     shape: Any
     placement: pin.SE3
     colour: tuple[float, float, float, float]
+    framed: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pulley:
     """The winding surface of one tendon at one joint.
 
     Attributes:
         tendon: Name of the tendon.
-        joint: Index of the joint, 1 for the first; its axis is the z axis of the link after it.
+        joint: Index of the joint, 1 for the first.
         radius: r, signed, m.
         offset: Along the joint axis, m.
+        frame: Rotation of the pulley, whose axis is z, in the frame of the link after the joint, shape (3, 3).
     """
 
     tendon: str
     joint: int
     radius: float
     offset: float
+    frame: Array = field(default_factory=lambda: np.eye(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +73,7 @@ class WoundFinger:
         lanes: Offset of each tendon along the joint axes.
         widths: Of its links, m.
         size: Largest distance of its tip from its base, about, m.
+        legs: Of its cords through space, by name.
     """
 
     pieces: dict[str, tuple[WoundSpan | Arc, ...]]
@@ -74,6 +82,7 @@ class WoundFinger:
     lanes: Lanes
     widths: tuple[float, ...]
     size: float
+    legs: dict[str, tuple[Leg, ...]] = field(default_factory=dict)
 
     @classmethod
     def from_links(cls, description: FingerDescription, resolution: int) -> WoundFinger:
@@ -108,16 +117,19 @@ class WoundFinger:
         size: float,
         resolution: int,
     ) -> WoundFinger:
-        lanes = tendon_lanes(description, model, widths)
-        pieces = {name: wind(description, model, lanes, name, resolution) for name in description.tendons}
         indices = {name: index for index, name in enumerate(description.joints, start=1)}
-        pulleys = tuple(
-            Pulley(name, indices[joint], crossing.radius, lanes.offset[name, indices[joint]])
+        ranges = dict(enumerate((joint.range for joint in description.joints.values()), start=1))
+        arms = {
+            name: {indices[joint]: crossing.radius for joint, crossing in tendon.crossings.items()}
             for name, tendon in description.tendons.items()
-            for joint, crossing in tendon.crossings.items()
-            if crossing.radius
-        )
-        return cls(pieces, pulleys, visuals, lanes, widths, size)
+        }
+        lanes = tendon_lanes(arms, model, widths)
+        pieces = {}
+        for name in description.tendons:
+            (radius,) = joint_chains(description.cord(name), indices, model)
+            mass_link = _mass_link(description, name, list(arms[name]))
+            pieces[name] = wind(radius, ranges, model, lanes, name, resolution, mass_link)
+        return cls(pieces, pulleys_of(arms, lanes), visuals, lanes, widths, size)
 
     def placed(self, name: str, place: pin.SE3, first: int) -> WoundFinger:
         """Return it as part of a hand: under dotted names, on its place, with its joints after ``first`` others."""
@@ -138,7 +150,10 @@ class WoundFinger:
         )
         return replace(
             self,
-            pieces={f"{name}.{key}": _moved(each, place, first) for key, each in self.pieces.items()},
+            pieces={
+                f"{name}.{key}": tuple(each.moved(place, first) for each in pieces)
+                for key, pieces in self.pieces.items()
+            },
             pulleys=tuple(pulleys),
             visuals=tuple(visuals),
             lanes=lanes,
@@ -190,22 +205,27 @@ def palm_of(hand: HandSettings | None) -> tuple[Visual, ...]:
     if hand is None or not all(hand.palm.size):
         return ()
     place = pin.SE3(np.eye(3), np.array(hand.palm.centre))
-    return (Visual("palm", 0, coal.Box(*hand.palm.size), place, MATERIALS["palm"]),)
+    return (Visual("palm", 0, coal.Box(*hand.palm.size), place, MATERIALS["palm"], framed=True),)
+
+
+def pulleys_of(arms: Mapping[str, Mapping[int, float]], lanes: Lanes) -> tuple[Pulley, ...]:
+    """Return the winding surfaces of tendons, by their arms, m, of each tendon by joint."""
+    return tuple(
+        Pulley(name, joint, radius, lanes.offset[name, joint])
+        for name, by_joint in arms.items()
+        for joint, radius in by_joint.items()
+        if radius
+    )
+
+
+def _mass_link(description: FingerDescription, tendon: str, crossed: list[int]) -> int:
+    # The lumped mass is drawn on the link after its last proximal crossing; nowhere on an actuated tendon.
+    if description.tendons[tendon].kind == "actuated":
+        return len(description.joints) + 1
+    before = description.tendons[tendon].proximal_crossings
+    return crossed[before - 1] if before else crossed[0] - 1
 
 
 def _visual(solid: pin.GeometryObject, placement: pin.SE3) -> Visual:
     red, green, blue, opacity = (float(part) for part in solid.meshColor)
     return Visual(solid.name, int(solid.parentJoint), solid.geometry, placement, (red, green, blue, opacity))
-
-
-def _moved(pieces: tuple[WoundSpan | Arc, ...], place: pin.SE3, first: int) -> tuple[WoundSpan | Arc, ...]:
-    """Return the pieces of a finger's tendon as those of a hand, with its joints after others."""
-    moved: list[WoundSpan | Arc] = []
-    for piece in pieces:
-        if isinstance(piece, Arc):
-            moved.append(replace(piece, joint=first + piece.joint))
-        elif piece.link:
-            moved.append(replace(piece, link=first + piece.link))
-        else:
-            moved.append(replace(piece, points=piece.points @ place.rotation.T + place.translation))
-    return tuple(moved)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.finger import FingerDescription
 from finger_pin.typing import Array
 
 #: Part of the narrowest link that the lanes may take up, and most that one lane may take.
@@ -32,7 +31,7 @@ class Lanes:
     lead: float
 
 
-def tendon_lanes(description: FingerDescription, model: pin.Model, widths: Sequence[float]) -> Lanes:
+def tendon_lanes(arms: Mapping[str, Mapping[int, float]], model: pin.Model, widths: Sequence[float]) -> Lanes:
     """Give every tendon a lane at every joint.
 
     Joints with parallel axes share their lanes. A tendon whose winding at the other joints puts it to one side gets
@@ -40,8 +39,8 @@ def tendon_lanes(description: FingerDescription, model: pin.Model, widths: Seque
     run on opposite sides of the axis.
 
     Args:
-        description: The finger.
-        model: Its Pinocchio model.
+        arms: Of the tendons, m: by name and index of the joints that they cross.
+        model: Pinocchio model of the finger, whose joints turn about z.
         widths: Of its links, m.
     """
     data = model.createData()
@@ -52,16 +51,12 @@ def tendon_lanes(description: FingerDescription, model: pin.Model, widths: Seque
     offset: dict[tuple[str, int], float] = {}
     spacings = [_ONE_LANE * width]
     for family in families:
-        radii = {
-            name: {index + 1: _radius(description, name, joint) for index, joint in enumerate(description.joints)}
-            for name in description.tendons
-        }
         axis = frames[family[0]][:, 2]
         sideways = {
-            name: sum(float(r * frames[j][:, 1] @ axis) for j, r in by_joint.items() if r and j not in family)
-            for name, by_joint in radii.items()
+            name: sum(float(r * frames[j][:, 1] @ axis) for j, r in sorted(by_joint.items()) if r and j not in family)
+            for name, by_joint in arms.items()
         }
-        lanes = _allot({name: {j: radii[name][j] for j in family} for name in radii}, sideways)
+        lanes = _allot({name: {j: by_joint.get(j) for j in family} for name, by_joint in arms.items()}, sideways)
         count = max(lanes.values(), default=0)
         spacing = min(_ONE_LANE, _ALL_LANES / max(count, 1)) * width
         spacings.append(spacing)
@@ -79,11 +74,6 @@ def joint_axes(model: pin.Model) -> Array:
     twists = [pin.getJointJacobian(model, data, joint, reference) for joint in range(1, model.njoints)]
     columns = [joint.idx_v for joint in model.joints[1:]]
     return np.array([np.reshape(twist, (6, -1))[3:, at] for twist, at in zip(twists, columns, strict=True)])
-
-
-def _radius(description: FingerDescription, tendon: str, joint: str) -> float | None:
-    crossing = description.tendons[tendon].crossings.get(joint)
-    return None if crossing is None else crossing.radius
 
 
 def _families(frames: dict[int, Array]) -> tuple[tuple[int, ...], ...]:

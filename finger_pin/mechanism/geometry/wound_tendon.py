@@ -1,4 +1,4 @@
-"""Windings of one tendon: straight spans at rest in the links, and arcs around the joints between them.
+"""Winding of a tendon around joints: straight spans at rest in the links, and arcs around the joints between them.
 
 Between two joints the common tangent of their pulleys is at rest in the link, so only the arcs change when a joint
 turns, by r theta, and the path obeys (3) for any constant radius. The signed radius r puts the path at y = r in the
@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.cords import Cord
+from finger_pin.mechanism.geometry.cord_pieces import Arc, WoundSpan
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes
 from finger_pin.typing import Array
 
@@ -29,64 +29,44 @@ LARGEST_TILT = 0.6
 BASE_LEAD, LINK_LEAD = 2.5, 0.6
 
 
-@dataclass(frozen=True, eq=False)
-class WoundSpan:
-    """A straight piece.
+def joint_chains(cord: Cord, joints: Mapping[str, int], model: pin.Model) -> list[dict[int, float]]:
+    """Return the arms of a cord by joint, m, for every chain of joints, and 0 at those in between.
 
-    Attributes:
-        link: Index of the link at which it rests; 0 is the base, 1 the link after the first joint.
-        points: In the frame of that link, shape (P, 3), m.
-        sag: Shape of its sag, 1 at its middle and 0 at its ends, times its length, shape (P,), m.
-        distal: Whether a point lies beyond the lumped mass of a passive tendon, shape (P,).
+    Args:
+        cord: A cord of arms.
+        joints: Indices of the joints by name.
+        model: Pinocchio model; the joints that carry a joint come before it.
     """
-
-    link: int
-    points: Array
-    sag: Array
-    distal: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class Arc:
-    """A piece around a joint.
-
-    Attributes:
-        joint: Index of the joint, 1 for the first.
-        radius: r, m.
-        entry: Direction of the path where it meets the pulley, in the frame of the link before the joint, rad.
-        turn: Turn of the path from entry to exit at theta = 0, rad.
-        offset: Of each point along the joint axis, shape (P,), m.
-        fraction: Of each point along the arc, 0 to 1, shape (P,).
-        distal: As for `WoundSpan`.
-    """
-
-    joint: int
-    radius: float
-    entry: float
-    turn: float
-    offset: Array
-    fraction: Array
-    distal: NDArray[np.bool_]
+    arms = {joints[element.name]: element.radius for element in cord.elements if element.radius is not None}
+    chains = []
+    while arms:
+        support = [int(joint) for joint in model.supports[max(arms)]]
+        first = next(index for index, joint in enumerate(support) if joint in arms)
+        chains.append({joint: arms.pop(joint, 0.0) for joint in support[first:]})
+    return chains[::-1]
 
 
 def wind(
-    description: FingerDescription, model: pin.Model, lanes: Lanes, tendon: str, resolution: int
+    radius: Mapping[int, float],
+    ranges: Mapping[int, tuple[float, float]],
+    model: pin.Model,
+    lanes: Lanes,
+    tendon: str,
+    resolution: int,
+    mass_link: int,
 ) -> tuple[WoundSpan | Arc, ...]:
     """Return the pieces of a tendon from its actuator or proximal anchor to its insertion.
 
     Args:
-        description: The finger.
-        model: Its Pinocchio model.
+        radius: Its arms, m, by joint: each joint carries the next.
+        ranges: Of the joints, rad.
+        model: Pinocchio model whose joints turn about z.
         lanes: Of its tendons.
         tendon: Which one.
         resolution: Points per span and per radian of arc.
+        mass_link: Link that carries the lumped mass of a passive tendon; of others one beyond all links.
     """
-    indices = {name: index for index, name in enumerate(description.joints, start=1)}
-    crossings = description.tendons[tendon].crossings
-    crossed = [indices[name] for name in crossings]
-    path = range(min(crossed), max(crossed) + 1)
-    radius = dict.fromkeys(path, 0.0) | {indices[name]: crossing.radius for name, crossing in crossings.items()}
-    ranges = dict(enumerate((joint.range for joint in description.joints.values()), start=1))
+    path = tuple(radius)
     side = {j: math.copysign(1.0, r) if r else 0.0 for j, r in radius.items()}
     # How far each joint can unwrap its arc.
     unwrap = {j: min(max(side[j] * limit for limit in ranges[j]), 2.0 * math.pi) for j in path}
@@ -111,22 +91,21 @@ def wind(
     # The two ends of a full turn lie beside each other.
     skew = {j: 0.25 * lanes.spacing * turns[j] for j in path}
     entry, leave = directions(skew)
-    mass_link = _mass_link(description, tendon, crossed)
     first = path[0]
     begin = _on_pulley(radius[first], lanes.offset[tendon, first] - skew[first], entry[first])
     ends = _lead_in(model.jointPlacements[first], begin, entry[first], _start(lanes, model, first))
-    pieces: list[WoundSpan | Arc] = [_span(first - 1, ends, resolution, mass_link, whole=True)]
-    for j in path:
+    pieces: list[WoundSpan | Arc] = [_span(int(model.parents[first]), ends, resolution, mass_link, whole=True)]
+    for j, after in itertools.zip_longest(path, path[1:]):
         offset = lanes.offset[tendon, j]
         if radius[j]:
             turn = leave[j] - entry[j] - side[j] * 2.0 * math.pi * turns[j]
-            fraction = _arc_fractions(turn, ranges[j], resolution, last=j == path[-1])
+            fraction = _arc_fractions(turn, ranges[j], resolution, last=after is None)
             offsets = offset + skew[j] * (2.0 * fraction - 1.0)
             pieces.append(Arc(j, radius[j], entry[j], turn, offsets, fraction, np.full(len(fraction), j > mass_link)))
-        if j != path[-1]:
+        if after is not None:
             leaving = _on_pulley(radius[j], offset + skew[j], leave[j])
-            arriving = _on_pulley(radius[j + 1], lanes.offset[tendon, j + 1] - skew[j + 1], entry[j + 1])
-            ends = np.array([leaving, model.jointPlacements[j + 1].act(arriving)])
+            arriving = _on_pulley(radius[after], lanes.offset[tendon, after] - skew[after], entry[after])
+            ends = np.array([leaving, model.jointPlacements[after].act(arriving)])
             pieces.append(_span(j, ends, resolution, mass_link, whole=radius[j] != 0.0))
     return tuple(pieces)
 
@@ -165,17 +144,9 @@ def _on_pulley(radius: float, offset: float, direction: float) -> Array:
 
 
 def _start(lanes: Lanes, model: pin.Model, joint: int) -> float:
-    if joint == 1:
+    if not model.parents[joint]:
         return BASE_LEAD * lanes.lead
     return LINK_LEAD * float(np.linalg.norm(model.jointPlacements[joint].translation))
-
-
-def _mass_link(description: FingerDescription, tendon: str, crossed: list[int]) -> int:
-    # The lumped mass is drawn on the link after its last proximal crossing; nowhere on an actuated tendon.
-    if description.tendons[tendon].kind == "actuated":
-        return len(description.joints) + 1
-    before = description.tendons[tendon].proximal_crossings
-    return crossed[before - 1] if before else crossed[0] - 1
 
 
 def _span(link: int, ends: Array, resolution: int, mass_link: int, *, whole: bool) -> WoundSpan:

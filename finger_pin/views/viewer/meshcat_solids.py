@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.geometry import TendonGeometry, TreeGeometry
+from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.typing import Array
 
 ROOT = "/finger_pin"
@@ -26,16 +26,13 @@ GROOVE_COLOUR = (0.55, 0.62, 0.72)
 Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
-def link_names(geometry: TendonGeometry | TreeGeometry) -> list[str]:
+def link_names(geometry: TendonGeometry) -> list[str]:
     """Return the names under which the base and the links stand in the scene."""
     return ["base", *(f"{name}_link" for name in geometry.description.joints)]
 
 
 def solid_commands(
-    geometry: TendonGeometry | TreeGeometry,
-    tube_radius: float,
-    root: str = ROOT,
-    colour: tuple[float, ...] | None = None,
+    geometry: TendonGeometry, tube_radius: float, root: str = ROOT, colour: tuple[float, ...] | None = None
 ) -> Iterator[Command]:
     """Yield meshcat's ``set_object`` command for every solid; each hangs below the link that carries it.
 
@@ -59,7 +56,8 @@ def solid_commands(
     for pulley in geometry.pulleys:
         path = f"{root}/{links[pulley.joint]}/groove_{pulley.tendon}"
         shape = cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
-        yield mesh(path, shape, Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or GROOVE_COLOUR, SOLID_OPACITY)
+        turn, place = pulley.frame @ Y_TO_Z, pulley.offset * pulley.frame[:, 2]
+        yield mesh(path, shape, turn, place, colour or GROOVE_COLOUR, SOLID_OPACITY)
 
 
 def root_command(rotation: Array) -> Command:

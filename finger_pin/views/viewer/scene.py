@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from finger_pin.analysis import ForcePolytope
 from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual, joint_axes
+from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, Visual, joint_axes
 from finger_pin.typing import Array
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.meshcat_solids import ROOT, encode, is_mesh, link_names, root_command, solid_commands
@@ -64,7 +64,7 @@ class Ghost:
         return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
 
 
-def shown(finger: FingerLike) -> TendonGeometry | TreeGeometry:
+def shown(finger: FingerLike) -> TendonGeometry:
     """Return the geometry of a finger or hand that is given in any way.
 
     Raises:
@@ -72,8 +72,6 @@ def shown(finger: FingerLike) -> TendonGeometry | TreeGeometry:
     """
     built = finger if isinstance(finger, Finger) else None
     description = description_of(finger)
-    if not description.links:
-        return TreeGeometry(description)
     visuals = None if built is None else built.visuals
     body = None if built is None or visuals is None else built.rigid_body
     return TendonGeometry(description, resolution=_RESOLUTION, body=body, solids=visuals)
@@ -99,8 +97,7 @@ class Scene:
         self.geometry = shown(finger)
         description = self.geometry.description
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
-        bodies = description.tree
-        self._slides = [name for name, joint in bodies.joints.items() if joint.kind == "slide"] if bodies else []
+        self._slides = [name for name, joint in description.tree.joints.items() if joint.kind == "slide"]
         self.strands = (*description.actuated_names, *halves)
         self._widths, size = self.geometry.widths, self.geometry.size
         self._size = size
@@ -172,11 +169,10 @@ class Scene:
         poses = geometry.poses(joint_positions, palm)
         paths = geometry.paths(joint_positions, poses=poses)
         visible = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
-        tree = isinstance(geometry, TreeGeometry)
-        large = [each for each in geometry.visuals if tree or is_mesh(each.shape) or each.name == "palm"]
-        visible += [*(_corners(visual, poses) for visual in large), *beside]
+        framed = [visual for visual in geometry.visuals if visual.framed or is_mesh(visual.shape)]
+        visible += [*(_corners(visual, poses) for visual in framed), *beside]
         corners: Array = np.concatenate([points.reshape(-1, 3) for points in visible]) @ turn.T
-        if not tree:
+        if not self._slides:
             return corners
         # What a hand has lost, such as a pen of a model's that falls, leaves the view.
         first = np.concatenate([points.reshape(-1, *points.shape[-2:])[0] for points in visible]) @ turn.T

@@ -146,7 +146,7 @@ class _Film:
         self.solids, objects = tuple(_solids(scene)), motion.objects
         # Objects are further links; what is seen of them does not move the camera far away.
         finger_solids = self.solids
-        if objects is not None:
+        if objects is not None and objects.by_name:
             self.solids += tuple(_objects(objects, self.poses.translation.shape[1]))
             placed = np.stack([objects.placed(name) for name in objects.by_name], axis=1)
             turned = Rotation.from_quat(placed[..., 3:].reshape(-1, 4)).as_matrix().reshape(*placed.shape[:2], 3, 3)
@@ -252,7 +252,9 @@ def _solids(scene: Scene) -> Iterator[_Solid]:
         yield _Solid(visual.link, corners, (*visual.colour[:3], SOLID_OPACITY * visual.colour[3]))
     for pulley in geometry.pulleys:
         ring = _ring(max(abs(pulley.radius) - scene.tube_radius, 0.5 * scene.tube_radius), 0.8 * geometry.lanes.spacing)
-        yield _Solid(pulley.joint, ring + np.array([0.0, 0.0, pulley.offset]), (*GROOVE_COLOUR, SOLID_OPACITY))
+        yield _Solid(
+            pulley.joint, ring @ pulley.frame.T + pulley.offset * pulley.frame[:, 2], (*GROOVE_COLOUR, SOLID_OPACITY)
+        )
 
 
 def _objects(objects: SceneObjects, first: int) -> Iterator[_Solid]:
