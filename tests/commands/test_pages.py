@@ -43,7 +43,9 @@ SHORTER = {
     r"conclusions\.py$": "conclusions.py reversals --only a",
     r"reaction\.py$": "reaction.py reversals --forces 1",
     # What it finds has a test of its own.
-    r"(identify\.py) (winding|servo_pendulum|postures|spool_finger).*": r"\1 --list any",
+    r"(identify\.py) (winding|servo_pendulum|postures|spool_finger|instrument).*": r"\1 --list any",
+    # It fits a bench under every law.
+    r"(compare_laws\.py).*": r"\1 --help",
     # Its stages have tests of their own, and it measures for minutes.
     r"(benchmark\.py).*": r"\1 --help",
     # They train for minutes, with a library that tests do without.

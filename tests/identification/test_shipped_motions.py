@@ -76,6 +76,33 @@ def test_a_real_servo_moves_as_is_predicted_to_what_an_independent_fit_reaches(n
     assert np.sqrt(np.mean((recording.outputs["motor_position.servo"] - computed) ** 2)) < 0.105
 
 
+# What `identify instrument` finds from two motions at the straight wrist.
+INSTRUMENT = {
+    "tendon_friction.coulomb": 0.061033,
+    "tendon_friction.stiffness": 1501.6,
+    "joint_friction.coulomb": 1.1631e-3,
+    "joint_friction.stiction": 1.1631e-3,
+    "joint_friction.drag": 0.020594,
+    "tendons.*.winch.stiffness": 1.0282e5,
+    "joints.jaw.spring.stiffness": 0.01187,
+    "joints.jaw.spring.rest": 1.1372,
+}
+
+
+@pytest.mark.parametrize("name", ["straight_03_20", "straight_03_30", "straight_05_40"])
+def test_the_cords_of_a_grasper_move_as_is_predicted_about_as_well_as_networks_were_published_to(name):
+    """Means of absolute errors in O'Neill, Stephens and Kowalewski (2018), trained on the tool: 0.37 deg, 4.42 mN m."""
+    scenario, settings = load_bench("instrument", {f"finger.{key}": value for key, value in INSTRUMENT.items()})
+    recording = read_recording(name, settings.recordings[name])
+    late = recording.time - recording.time[0] >= 3.5
+    models, _ = recording_models(scenario, [recording], None, [late])
+    computed = models[0].compute(models[0].scenario, {})
+    pairs = zip(recording.outputs.values(), computed, strict=True)
+    errors = [np.mean(np.abs(measured - model)[late]) for measured, model in pairs]
+    assert np.rad2deg(errors[0]) < 2.0 * 0.37
+    assert 5.0 * errors[1] < 1.1 * 4.42
+
+
 def test_a_fingertip_against_a_load_cell_tells_the_friction_of_its_canals_and_the_wrong_zero():
     """Two links, bristles and pad were integrated apart from the package: 0.14 and 0.05 N; a noise of 4 mN."""
     result = fp.identify("pressing", starts=2)
