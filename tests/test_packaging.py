@@ -54,7 +54,7 @@ def test_the_package_imports_all_that_it_depends_on_and_nothing_else():
 def test_every_licence_in_the_package_stands_in_its_metadata():
     files = {path.relative_to(ROOT).as_posix() for path in (ROOT / "finger_pin").rglob("*LICENSE*")}
     assert files and files | {"LICENSE"} == set(PROJECT["license-files"])
-    marks = {"Apache License": "Apache-2.0", "MIT License": "MIT"}
+    marks = {"Apache License": "Apache-2.0", "MIT License": "MIT", "Open Database License": "ODbL-1.0"}
     texts = [(ROOT / name).read_text("utf-8") for name in PROJECT["license-files"]]
     kinds = {kind for text in texts for mark, kind in marks.items() if mark in text[:400]}
     assert set(PROJECT["license"].split(" AND ")) == kinds and len(kinds) == len(texts)
