@@ -34,10 +34,7 @@ _NO_LOAD = {f"{_TENDON}coulomb": 0.0, f"{_JOINT}{{coulomb,stiction}}": 0.0}
 _NO_SERVO = {f"{_GEARS}{name}": 0.0 for name in ("by_load", "stribeck_by_load", "viscous")}
 #: Of every bench the laws beside its own.
 LAWS: dict[str, dict[str, Law]] = {
-    "transmission": {
-        "constant": Law({f"{_TENDON}coulomb": 0.0}),
-        "capstan": Law({f"{_TENDON}drag": 0.0}),
-    },
+    "transmission": {"constant": Law({f"{_TENDON}coulomb": 0.0}), "capstan": Law({f"{_TENDON}drag": 0.0})},
     "instrument": {
         "none": Law({**_NO_LOAD, f"{_JOINT}drag": 0.0, f"{_TENDON}stiffness": 1e5}),
         "constant": Law({**_NO_LOAD, f"{_TENDON}stiffness": 1e5}),

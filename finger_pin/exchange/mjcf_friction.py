@@ -28,8 +28,13 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
     A passive tendon without its mass is a spring, and rubs as a driven tendon that its spring pulls.
 
     Raises:
-        InputError: If tendons rub at several bends: a tendon of MuJoCo has one force along all of its length.
+        InputError: If tendons rub at several bends, as a tendon of MuJoCo has one force along all of its length, or
+            joints by another law.
     """
+    law = description.joint_friction.law
+    if law != "lugre" and any(description.bearings):
+        allowed = 'must be "lugre", law (9), the only one that is computed in the step of MuJoCo; or leave out friction'
+        raise InputError("finger.joint_friction.law", allowed, law)
     if tendons.at_bends:
         allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
         raise InputError("finger.tendon_friction.place", allowed, description.tendon_friction.place)

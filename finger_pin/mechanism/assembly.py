@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -10,7 +12,7 @@ import numpy as np
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Routing
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.canals import Canals
 from finger_pin.mechanism.joints import JointFriction, JointSprings, StrokeLimiter
 from finger_pin.mechanism.mechanism import Mechanism
@@ -99,6 +101,7 @@ def assemble(
     Raises:
         InputError: As `Finger`.
     """
+    _warn_of_turns(description)
     routing, tendons, actuators, joint_friction, stroke_limiter, springs = parts
     joints, width = routing.joints, parts.width
     # Dry friction of a tree's tendons has states of its own, which stand with those of the user's rows.
@@ -218,3 +221,14 @@ def check_joints(body: RigidBody, description: FingerDescription) -> None:
     for name, joint in zip(body.joints, body.model.joints[1:], strict=True):
         if joint.nv != 1:
             raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
+
+
+def _warn_of_turns(description: FingerDescription) -> None:
+    """Warn of powers of an angle that may leave the half turn on either side of its range's middle."""
+    for name, coupling in description.tree.couplings.items():
+        if coupling.other is None or not any(coupling.higher):
+            continue
+        joint, hinge = description.joints[coupling.other], description.tree.joints[coupling.other].kind == "hinge"
+        if hinge and not (joint.limited and np.ptp(joint.range) <= 2.0 * math.pi):
+            says = f"repeat where {coupling.other} turns by more than half a turn from its range's middle; limit it"
+            warnings.warn(ScenarioWarning(f"finger.tree.couplings.{name}.powers: {says}"), stacklevel=4)

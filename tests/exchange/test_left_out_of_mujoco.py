@@ -1,10 +1,16 @@
 """Elements of a MuJoCo model that are not carried over: listed, or refused by name."""
 
+import tomllib
+import warnings
+from contextlib import nullcontext
+
 import mujoco
 import pytest
 from mujoco_models import FIXED, LINK, ROUTED, model_of
 
 import finger_pin as fp
+from finger_pin.description.loading import read_scenario
+from finger_pin.exceptions import ScenarioWarning
 
 pytestmark = pytest.mark.filterwarnings("ignore:hand. not carried over")
 
@@ -71,3 +77,23 @@ def test_what_moves_or_carries_anything_is_warned_of_once_and_what_does_not_is_o
     with pytest.warns(fp.exceptions.LeftOutWarning) as told:
         fp.from_mujoco(model, "gripper")
     assert [str(each.message) for each in told] == ["gripper: not carried over: actuator stick: it drives a body"]
+
+
+CAM = """<mujoco><compiler angle="radian"/><worldbody>
+<body><joint name="cam" axis="0 1 0" RANGE/><geom type="capsule" size=".005" fromto="0 0 0 .04 0 0"/></body>
+<body pos="0 1 0"><joint name="lever" axis="0 1 0"/><geom type="capsule" size=".005" fromto="0 0 0 .04 0 0"/></body>
+</worldbody><equality><joint joint1="lever" joint2="cam" polycoef="0 .02 .05 0 0"/></equality></mujoco>"""
+
+
+@pytest.mark.parametrize(("limits", "warned"), [('range="-3 3"', False), ('range="-1 6"', True), ("", True)])
+def test_powers_of_an_angle_beyond_half_a_turn_are_warned_of_whoever_wrote_them(limits, warned):
+    """The finger is read from TOML: nothing of MuJoCo's list is left."""
+    model = mujoco.MjModel.from_xml_string(CAM.replace("RANGE", limits))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        table = tomllib.loads(fp.to_toml(fp.from_mujoco(model)))
+    table["tree"].pop("left_out", None)
+    scenario = read_scenario({"name": "cam", "finger": table})
+    expected = pytest.warns(ScenarioWarning, match=r"powers: repeat where cam turns") if warned else nullcontext()
+    with expected:
+        fp.Finger(scenario.finger)

@@ -274,3 +274,10 @@ def test_a_hand_has_the_inertia_the_tips_and_the_tendons_that_pinocchio_computes
     np.testing.assert_allclose(tips, hand.motion(q, np.zeros(20)).tip, atol=1e-14)
     lengths = [data.tendon(name).length[0] for name in hand.routing.tendons[:20]]
     np.testing.assert_allclose(lengths, hand.routing.actuated_coupling @ q, atol=1e-15)
+
+
+@pytest.mark.parametrize("law", ["dahl", "coulomb"])
+def test_a_law_that_mujocos_step_does_not_have_is_not_written_as_another(law):
+    finger = fp.load_finger("planar", {"finger.joint_friction.law": law})
+    with pytest.raises(InputError, match=r"finger.joint_friction.law = .*must be \"lugre\", law \(9\)"):
+        fp.to_mjcf(finger, friction=True)
