@@ -30,7 +30,6 @@ _RESOLUTION = 11
 # Beyond so many times the hand's own extent, the camera does not follow.
 _LOST = 3.0
 _LARGEST = 32767
-_CORDS = "cords that no motor pulls; their tension is not shown"
 _GHOST, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
 
 
@@ -83,9 +82,10 @@ class Scene:
     Attributes:
         geometry: Its tendons in space.
         strands: Labels of the strands whose tension is shown: the actuated tendons, then two halves of each passive.
+        size: Length of the finger, m.
         tube_radius: Of the tubes that are drawn for tendons, m.
         tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots. Cords of
-            a tree that no motor pulls have the index behind the last strand: their tension is not shown.
+            a tree that actuators or springs pull have the index behind the last strand: no tension is shown.
     """
 
     def __init__(self, finger: FingerLike) -> None:
@@ -99,10 +99,9 @@ class Scene:
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
         self._slides = [name for name, joint in description.tree.joints.items() if joint.kind == "slide"]
         self.strands = (*description.actuated_names, *halves)
-        self._widths, size = self.geometry.widths, self.geometry.size
-        self._size = size
+        self._widths, self.size = self.geometry.widths, self.geometry.size
         # Points travel as 16-bit integers; this is their unit, a few micrometres.
-        self._quantum = 1.5 * size / _LARGEST
+        self._quantum = 1.5 * self.size / _LARGEST
         self.tube_radius = min(_TUBE_IN_LANE * self.geometry.lanes.spacing, _TUBE_IN_LINK * min(self._widths))
         self.tendons = [
             self._tendon(path.name, path.distal.tolist())
@@ -110,10 +109,15 @@ class Scene:
         ]
         self._strands = [self._strands_of(tendon["name"]) for tendon in self.tendons]
 
-    @property
-    def size(self) -> float:
-        """Length of the finger, m."""
-        return self._size
+    def _note_on_cords(self) -> str:
+        """Return what pulls the cords whose tension is not shown; empty without any."""
+        tree = self.geometry.description.tree
+        drawn = {each["name"] for each in self.tendons if len(self.strands) in each["strand"]}
+        names = {name if name in tree.tendons else name.rpartition(".")[0] for name in drawn}
+        drives = {each.tendon: each for each in tree.actuators.values() if each.tendon in names}
+        kinds = {"muscles" if each.muscle else "actuators" for each in drives.values()}
+        kinds |= {"springs"} if names - {*drives} else set()
+        return f"cords that {' and '.join(sorted(kinds))} pull; their tension is not shown" if names else ""
 
     def header(
         self,
@@ -137,7 +141,7 @@ class Scene:
         """
         geometry, tube = self.geometry, self.tube_radius
         turn = self.view()
-        shown = ForceSet.from_polytope(forces, self._size) if forces is not None else None
+        shown = ForceSet.from_polytope(forces, self.size) if forces is not None else None
         beside = ([] if shown is None else [shown.corners]) + ([] if ghost is None else [ghost.points_in_view()])
         corners = self._in_view(joint_positions, palm, beside)
         drawn = list(shown.commands()) if shown is not None else []
@@ -146,7 +150,7 @@ class Scene:
             "commands": [root_command(turn), *solid_commands(geometry, tube), *drawn],
             "ghost": ghost.header() if ghost is not None else None,
             "forces": shown.note if shown is not None else "",
-            "cords": _CORDS if any(len(self.strands) in each["strand"] for each in self.tendons) else "",
+            "cords": self._note_on_cords(),
             "links": link_names(geometry),
             "joints": list(geometry.description.joints),
             "slides": self._slides,

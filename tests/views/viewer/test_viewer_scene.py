@@ -15,6 +15,7 @@ from PIL import Image
 import finger_pin as fp
 from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views.viewer import write_animation
+from finger_pin.views.viewer.scene import Scene
 
 
 def test_the_page_loads_without_console_messages_and_without_a_network(browser, loaded, result, tmp_path):
@@ -179,3 +180,24 @@ def test_a_finger_of_two_joints_and_three_tendons_is_shown(browser, tmp_path):
     )
     assert up == pytest.approx([0.0, 1.0, 0.0], abs=1e-7)
     assert console_errors(page) == []
+
+
+CORDS = """<mujoco><compiler angle="radian"/><worldbody><site name="a" pos=".01 0 -.05"/><body>
+<joint name="turn" axis="0 1 0"/><geom type="capsule" size=".005" fromto="0 0 0 0 0 .05" mass=".01"/>
+<site name="b" pos=".01 0 .02"/></body></worldbody><tendon>
+<spatial name="cord" STIFF><site site="a"/><site site="b"/></spatial></tendon><actuator>DRIVE</actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("stiff", "drive", "pulls"),
+    [
+        ("", '<muscle tendon="cord" ctrllimited="true" ctrlrange="0 1" lengthrange=".05 .09"/>', "muscles"),
+        ("", '<position tendon="cord" kp="10" ctrlrange="0 .1"/>', "actuators"),
+        ('stiffness="10"', "", "springs"),
+    ],
+)
+def test_cords_without_tension_are_named_by_what_pulls_them(stiff, drive, pulls):
+    mujoco = pytest.importorskip("mujoco")
+    text = CORDS.replace("STIFF", stiff).replace("DRIVE", drive)
+    scene = Scene(fp.from_mujoco(mujoco.MjModel.from_xml_string(text)))
+    assert scene.header("", np.zeros((1, 1)), 1.0)["cords"] == f"cords that {pulls} pull; their tension is not shown"
