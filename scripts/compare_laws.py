@@ -79,15 +79,15 @@ def by_variable(result: xr.Dataset, values: str, along: str) -> dict[str, float]
     }
 
 
-def main() -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Fit a bench under every law; print what each leaves over, and how well it predicts."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bench", choices=LAWS)
     parser.add_argument("--starts", type=int, default=1, metavar="N", help="from how many points to search")
-    arguments = parser.parse_args()
+    options = parser.parse_args(arguments)
     print(f"{'law':20} numbers  signal, rms fitted, rms held out, share of held-out samples in the 95 % band")
-    for name, law in {**LAWS[arguments.bench], "as described": Law({})}.items():
-        result = fitted(arguments.bench, law, arguments.starts)
+    for name, law in {**LAWS[options.bench], "as described": Law({})}.items():
+        result = fitted(options.bench, law, options.starts)
         noise = by_variable(result, "noise", "signal")
         told = "prediction_rms" in result
         rms = by_variable(result, "prediction_rms", "prediction") if told else {}

@@ -214,7 +214,9 @@ class RecordedMotion:
         variable, _, label = name.partition(".")
         values, (dims, *_) = arrays[variable], arrays.variables[variable]
         for axis, dim in reversed(list(enumerate(dims))[1:]):
-            labels, columns = [str(each) for each in arrays[dim]], label.split("-")
+            labels = [str(each) for each in arrays[dim]]
+            # A pair of bodies in contact has a name with a hyphen.
+            columns = [label] if label in labels else label.split("-")
             missing = next((each for each in columns if each not in labels), None)
             if missing is not None or len(columns) > 2:
                 allowed = f"there is no {missing or label}; there are {', '.join(labels)}, and A-B for a difference"

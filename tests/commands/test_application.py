@@ -158,7 +158,7 @@ def test_a_bench_that_is_not_there_is_told_with_the_benches_that_ship(capsys):
     assert application.run("identify", ["transmision"]) == 2
     said = capsys.readouterr().err
     assert (
-        'bench = "transmision": no such bench; there are fig6, postures' in said
+        'bench = "transmision": no such bench; there are fig6, instrument, postures' in said
         and "did you mean transmission?" in said
     )
 

@@ -45,7 +45,7 @@ SHORTER = {
     # What it finds has a test of its own.
     r"(identify\.py) (winding|servo_pendulum|postures|spool_finger|instrument).*": r"\1 --list any",
     # It fits a bench under every law.
-    r"(compare_laws\.py).*": r"\1 --help",
+    r"(compare_laws\.py) .*": r"\1 transmission",
     # Its stages have tests of their own, and it measures for minutes.
     r"(benchmark\.py).*": r"\1 --help",
     # They train for minutes, with a library that tests do without.

@@ -107,7 +107,7 @@ def test_columns_of_bodies_are_those_of_the_model():
 def test_elements_of_a_friction_carry_what_their_names_say(kind):
     law = Coefficients(*(0.5 + k for k in range(len(Coefficients._fields))))
     more = ((True, "crossed", -3.0), (False, "pulley", -4.0))
-    friction = PluginFriction(kind, "rubbing", "acting", kind == TENDON, -2.0, law, more, share=-5.0, held=True)
+    friction = PluginFriction(kind, "rubbing", "acting", kind == TENDON, -2.0, law, more, share=-5.0, constrained=True)
     elements = list(friction.elements())
     own, row = ("tendon", "joint") if kind == TENDON else ("joint", "tendon")
     expected = {"length": len(elements), "kind": kind, "share": -5.0, "loads": friction.loads, **law._asdict()}

@@ -156,7 +156,7 @@ class Acts:
         # The first samples alone, as the paths of a tree take long for thousands of goals.
         short = FEW * loop_period(loop.finger)
         made = PositionDrives(loop.finger, loop.controller, loop.reference, short, start, wound, given).compiled
-        names = ("goals", "given", "gains", "period", "resolution", "supply")
+        names = ("goals", "prescribed_voltages", "gains", "period", "resolution", "supply")
         yield from (np.asarray(getattr(made, name)) for name in names)
 
     def differ(self, scenario):
@@ -187,6 +187,7 @@ SOMETIMES = {
     r".*\.(objects|shapes)\..*": "what touches nothing at these instants, or is turned about its own axis",
     r".*bodies\.(centre|inertia)": "of a body that turns about one axis",
     r".*bodies\.(position|orientation)": "of a body that slides, and that no path passes",
+    r".*tree\.joints\.axis": "of a slide whose body nothing touches and no path passes, without gravity",
     r".*bodies\.gravity_compensation": "without gravity",
     r"controller\.gravity_compensation": "without gravity",
     r".*\.(bearing|tendons\.joints)": "that nothing loads",
