@@ -89,9 +89,9 @@ def main(arguments: list[str] | None = None) -> int:
     for name, law in {**LAWS[options.bench], "as described": Law({})}.items():
         result = fitted(options.bench, law, options.starts)
         noise = by_variable(result, "noise", "signal")
-        told = "prediction_rms" in result
-        rms = by_variable(result, "prediction_rms", "prediction") if told else {}
-        within = by_variable(result, "prediction_within", "prediction") if told else {}
+        predicts = "prediction_rms" in result
+        rms = by_variable(result, "prediction_rms", "prediction") if predicts else {}
+        within = by_variable(result, "prediction_within", "prediction") if predicts else {}
         print(f"{name:20} {result.sizes['parameter']:7}", flush=True)
         for signal, value in noise.items():
             predicted = f"{rms[signal]:9.3g} {within[signal]:7.0%}" if signal in rms else ""

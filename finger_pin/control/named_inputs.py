@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finger_pin.description.validation import choices
 from finger_pin.description.winding import command_place
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
+
+#: Numbers in the order of the inputs, or by name.
+Inputs = ArrayLike | Mapping[str, float]
 
 
 def input_places(finger: Finger) -> dict[str, int]:

@@ -217,11 +217,10 @@ def _positioned(finger: Finger) -> list[tuple[str, Actuator]]:
 
 def wound_spools(scenario: Scenario, finger: Finger) -> dict[int, tuple[Signal, float]]:
     """Return the windings of motors in position drive, by their number: rad, or m and the radius of the spool."""
-    actuators, windings = finger.actuators, {}
+    actuators, windings = finger.actuators, dict[int, tuple[SignalSettings, float]]()
     cords = [finger.routing.tendons[k] for k in actuators.tendons]
     for part in scenario.parts().values():
-        angles: dict[str, SignalSettings] = {**(part.controller.spool_angle or {})}
-        for name, settings in angles.items():
+        for name, settings in (part.controller.spool_angle or {}).items():
             windings[actuators.names.index(name)] = settings, 1.0
         for name, length in (part.controller.tendon_winding or {}).items():
             if name in cords:

@@ -119,6 +119,7 @@ class UserController(LoopController):
         self.needs_sensors = callable(getattr(controller, "sense", None))
         self.sensors = tuple(getattr(controller, "sensors", ()))
         self._finger, self._routing, self._start, self._asked = finger, finger.routing, start, False
+        self._actuators = tuple(finger.description.tree.actuators)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
@@ -138,7 +139,7 @@ class UserController(LoopController):
             np.array([each.torque for each in answers]),
             np.array([each.tension for each in answers]),
             np.array(missing) if len(missing) == len(answers) else None,
-            np.array([each.inputs for each in answers]) if self._finger.description.tree.actuators else None,
+            np.array([each.inputs for each in answers]) if self._actuators else None,
         )
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
@@ -162,13 +163,13 @@ class UserController(LoopController):
                 else f"the controller raised {type(error).__name__}: {error}"
             )
             self.problem, self.problem_time = " ".join(text.split()), time
-            routing, actuators = self._routing, self._finger.description.tree.actuators
+            routing, actuators = self._routing, self._actuators
             unknown = np.full(len(routing.tendons), np.nan)
             inputs = np.full(len(actuators), np.nan) if actuators else None
             return ControlSignals(np.zeros(len(routing.joints)), unknown, inputs=inputs)
 
     def _complete(self, answer: object) -> ControlSignals:
-        routing, actuators = self._routing, tuple(self._finger.description.tree.actuators)
+        routing, actuators = self._routing, self._actuators
         if isinstance(answer, Mapping):
             answer = inputs_by_name("controller", answer, self._finger, loops=True)
         tension, inputs = _numbers(getattr(answer, "tension", answer)), getattr(answer, "inputs", None)

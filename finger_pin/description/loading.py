@@ -132,12 +132,14 @@ def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    if isinstance(name, Scenario):
-        return _overridden(name.set_entries(), overrides) if overrides else name
+    if isinstance(name, Scenario) and not overrides:
+        return name
     if not overrides and not is_path(str(name)):
         return _shipped_scenario(str(name))
     overrides = normalise_overrides(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
+        if isinstance(name, Scenario):
+            return _resolved(name.set_entries(), overrides)
         return _scenario(*read_scenario_file(str(name), Path()), str(name), overrides)
 
 
@@ -185,6 +187,11 @@ def _scenario(table: Table, folder: Path, name: str, overrides: Table) -> Scenar
     """Return the scenario of a file's table, without its table ``[identify]``."""
     table.pop("identify", None)
     table.setdefault("name", as_name(Path(name).stem))
+    return _resolved(table, overrides, folder)
+
+
+def _resolved(table: Table, overrides: Table, folder: Path = Path()) -> Scenario:
+    """Return the scenario of a table, which changes; descriptions in it that no key touches stay the same ones."""
     override(overrides, table, folder)
     resolve_signals(table, Path())
     resolve_commands(table)
@@ -197,18 +204,9 @@ def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None 
     Raises:
         InputError: Naming the entry that is wrong.
     """
+    checked = normalise_overrides(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
-        return _overridden(copy.deepcopy(dict(table)), overrides or {})
-
-
-def _overridden(table: Table, overrides: Mapping[str, Any]) -> Scenario:
-    """Return the scenario of a table, which changes; descriptions in it that no key touches stay the same ones."""
-    checked = normalise_overrides(overrides, set(Scenario.model_fields))
-    with _depth_limited("scenario"):
-        override(checked, table, Path())
-        resolve_signals(table, Path())
-        resolve_commands(table)
-        return validate(Scenario, table, ())
+        return _resolved(copy.deepcopy(dict(table)), checked)
 
 
 def to_toml(description: Description) -> str:

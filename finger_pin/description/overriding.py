@@ -54,10 +54,8 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
     first = (".kind", ".motor", ".law", ".drive")
     for early in (True, False):
         _apply({key: value for key, value in entries.items() if key.endswith(first) == early}, table)
-        for finger in [as_table(placed).get("finger") for placed in fingers_of(table).values()] or [
-            table.get("finger")
-        ]:
-            with_motors(as_table(finger), Path())
+        for owner in fingers_of(table).values() or [table]:
+            with_motors(as_table(as_table(owner).get("finger")), Path())
 
 
 def _expand_wildcards(overrides: Table, table: Table) -> Table:

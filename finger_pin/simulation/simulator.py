@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.control.named_inputs import inputs_by_name
+from finger_pin.control.named_inputs import Inputs, inputs_by_name
 from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_paths
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -28,9 +28,6 @@ from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import as_finite_array, check_motors
 from finger_pin.simulation.step_log import StepLog
 from finger_pin.typing import Array
-
-#: Numbers in the order of the inputs, or by name.
-Inputs = ArrayLike | Mapping[str, float]
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 
@@ -190,8 +187,7 @@ class Simulator:
 
         Args:
             inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon; of
-                an ideal winch the length that is wound in, m. Inputs of a tree's actuators follow. Or numbers by name:
-                ``{"T1": 5.0, "tendon_winding.T2": 0.01, "motor_voltage.M1": 3.0, "servo": 0.2}``.
+                a winch the length wound in, m; then inputs of a tree's actuators. Or by name, as in ``{"T1": 5.0}``.
             dt: s.
             fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
 
