@@ -150,12 +150,14 @@ class LoopController(ABC):
     Attributes:
         needs_sensors: Whether it takes readings of sensors, by `sense`; then it has to be sampled.
         sensors: Its own sensors, besides encoders and tension sensors.
+        delays: After which its inputs act, shape (u,), s; None if they act at once, or their delays are in them.
         problem: Message of an error inside, or empty; the motion ends there.
         problem_time: When, s.
     """
 
     needs_sensors = False
     sensors: Sequence[SampledSensor] = ()
+    delays: Array | None = None
     problem = ""
     problem_time = float("-inf")
 

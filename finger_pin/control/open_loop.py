@@ -9,9 +9,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger_pin.control.input_queue import input_delays
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.core.inputs import InputTable, core_signal, scheduled_control
 from finger_pin.description.effects import wound_tendons
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import ForceSignal, InputSignal, SignalSettings
@@ -55,9 +57,7 @@ class OpenLoopTensions(LoopController):
         ]
         driven = scenario.controller.inputs or {}
         settings += [driven.get(name) or _input(keyframe_inputs.get(name, 0.0)) for name in _actuators(scenario)]
-        return cls(
-            Signal.from_settings(settings, scenario.simulation.rtol).later(scenario.simulation.start_time), routing
-        )
+        return cls._from_signal(Signal.from_settings(settings, scenario.simulation.rtol), scenario, routing)
 
     @classmethod
     def from_samples(
@@ -75,7 +75,17 @@ class OpenLoopTensions(LoopController):
         least = float(np.min(np.asarray(samples[1])[:, : routing.actuated][:, ~routing.winched], initial=0.0))
         if least < 0.0:
             raise InputError("controller", "tensions must not be negative: a tendon only pulls", least)
-        return cls(signal.later(scenario.simulation.start_time), routing)
+        return cls._from_signal(signal, scenario, routing)
+
+    @classmethod
+    def _from_signal(cls, signal: Signal, scenario: Scenario, routing: Routing) -> OpenLoopTensions:
+        """Return the signals after the delays of a tree's actuators, their time counted from that of the start."""
+        delays = input_delays(scenario.finger, routing)
+        return cls(signal.delayed(delays).later(scenario.simulation.start_time), routing)
+
+    def as_commanded(self, finger: FingerDescription) -> OpenLoopTensions:
+        """Return the inputs as they are commanded, before the delays of a tree's actuators."""
+        return OpenLoopTensions(self.signal.delayed(-input_delays(finger, self.routing)), self.routing)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.input_queue import InputQueue
 from finger_pin.control.interface import ControlSignals, Instant, LoopController, SampledSensor
 from finger_pin.control.measurement import JointEncoder, JointSpeed, TensionSensor, readings
 from finger_pin.core.stepping.stepper import TABLEAUS
@@ -24,7 +25,7 @@ class SampledController(LoopController):
     """A controller that is asked at multiples of a period, in order, and then answers for any time up to the next.
 
     Its tensions of a sample act after the delay, and are held until those of the next one act. Before the first
-    arrives, it acts already.
+    arrives, it acts already. Inputs of a tree's actuators that have delays come so much later; they are zero before.
 
     Attributes:
         period: Sampling period, s.
@@ -48,17 +49,23 @@ class SampledController(LoopController):
         self._late = whole
         self._rest = rest if rest > _COINCIDENT * settings.period else 0.0
         self._acting = 0
+        delays, actuated = loop.controller.delays, loop.finger.routing.actuated
+        self._queue = None if delays is None else InputQueue(settings.delay + delays[actuated:])
 
     def act(self, x: Array) -> Array:
         """Sample if due, and return the tensions, and inputs of a tree, that act from now on, shape (channels,)."""
         if self.instant == len(self._samples) * self.period:
             self._samples.append(self._sample(self.instant, x))
+            if self._queue is not None and (commanded := self._samples[-1].inputs) is not None:
+                self._queue.add(self.instant, commanded)
         while self._acting + 1 < len(self._samples) and self._arrival(self._acting + 1) <= self.instant:
             self._acting += 1
-        self.instant = len(self._samples) * self.period
+        now, self.instant = self.instant, len(self._samples) * self.period
         if self._acting + 1 < len(self._samples):
             self.instant = min(self.instant, self._arrival(self._acting + 1))
         inputs = self._samples[self._acting].inputs
+        if self._queue is not None:
+            inputs, self.instant = self._queue.at(now), self._queue.next_arrival(now, self.instant)
         return self._tension() if inputs is None else np.concatenate([self._tension(), inputs])
 
     def command(
@@ -71,10 +78,14 @@ class SampledController(LoopController):
         tensions = np.array([sample.tension for sample in self._samples])
         missing = [sample.torque_deficit for sample in self._samples if sample.torque_deficit is not None]
         torque_deficit = np.array(missing)[index] if len(missing) == len(self._samples) else None
-        inputs = [sample.inputs for sample in self._samples if sample.inputs is not None]
-        return ControlSignals(
-            torques[index], tensions[index], torque_deficit, np.array(inputs)[index] if inputs else None
-        )
+        inputs = np.array([sample.inputs for sample in self._samples if sample.inputs is not None])
+        acting = inputs[index] if len(inputs) else None
+        if self._queue is not None:
+            instants = np.asarray(time)[..., None] * (1.0 + 1e-12)
+            arrived = np.floor((instants - self._queue.delays) / self.period + _COINCIDENT).astype(int)
+            latest = inputs[np.clip(arrived, 0, len(inputs) - 1), np.arange(inputs.shape[1])]
+            acting = np.where(arrived < 0, 0.0, latest)
+        return ControlSignals(torques[index], tensions[index], torque_deficit, acting)
 
     def measured(self, name: str, times: Array) -> Array:
         """Return the last readings of a sensor at times (m,), shape (m,) or (m, k)."""

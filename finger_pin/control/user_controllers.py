@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
+from finger_pin.control.input_queue import input_delays
 from finger_pin.control.interface import Controller, ControlSignals, LoopController
 from finger_pin.control.named_inputs import inputs_by_name
 from finger_pin.control.open_loop import OpenLoopTensions
@@ -120,6 +121,8 @@ class UserController(LoopController):
         self.sensors = tuple(getattr(controller, "sensors", ()))
         self._finger, self._routing, self._start, self._asked = finger, finger.routing, start, False
         self._actuators = tuple(finger.description.tree.actuators)
+        delays = input_delays(finger.description, finger.routing)
+        self.delays = delays if delays.any() else None
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array

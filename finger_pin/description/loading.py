@@ -57,11 +57,11 @@ def list_motors() -> dict[str, str]:
     return shipped("motors")
 
 
-def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) -> FingerDescription:
-    """Load a finger by the name of a shipped one or the path of a TOML file.
+def load_finger(name: str | Path | FingerDescription, overrides: Mapping[str, Any] | None = None) -> FingerDescription:
+    """Load a finger by the name of a shipped one or the path of a TOML file, or change one that is read.
 
     Args:
-        name: Such as ``ub`` or ``my_finger.toml``.
+        name: Such as ``ub`` or ``my_finger.toml``, or a finger, such as `from_mujoco` returns.
         overrides: Values by dotted key, such as ``{"finger.joints.distal.link.length": 0.025}``.
 
     Raises:
@@ -230,10 +230,12 @@ def to_toml(description: Description) -> str:
     return "".join(pieces)
 
 
-def _load(kind: str, model: type[_Described], name: str | Path, overrides: Mapping[str, Any] | None) -> _Described:
+def _load(
+    kind: str, model: type[_Described], name: str | Path | _Described, overrides: Mapping[str, Any] | None
+) -> _Described:
     """Load a finger or a hand."""
     checked = normalise_overrides(overrides or {}, {kind})
-    table: Table = {kind: str(name)}
+    table: Table = {kind: name if isinstance(name, model) else str(name)}
     with _depth_limited(kind):
         override(checked, table, Path())
         return validate(model, table[kind], (kind,))

@@ -109,6 +109,16 @@ class TreeActuator(Description):
         None, unit="1", source="design", doc="Between which a, or the sum of the error, is held."
     )
 
+    slew: Annotated[float, real(0.0, _LARGE, above=True)] | None = quantity(
+        None,
+        unit="1/s",
+        source="design",
+        doc="Largest rate of a, which follows u; without time_constant within 0.1 ms.",
+    )
+    delay: Annotated[float, real(0.0, 10.0)] = quantity(
+        0.0, unit="s", source="design", doc="After which a command acts; before the first arrives, u is 0."
+    )
+
     muscle: Muscle | None = Field(None, description="A muscle in place of an affine force.")
 
     @model_validator(mode="after")
@@ -116,7 +126,7 @@ class TreeActuator(Description):
         if (self.joint is None) == (self.tendon is None):
             raise problem("", "drives a joint or a tendon, and not both")
         if self.muscle is not None:
-            for entry in sorted(self.model_fields_set - {"joint", "tendon", "gear", "input_range", "muscle"}):
+            for entry in sorted(self.model_fields_set - {"joint", "tendon", "gear", "input_range", "delay", "muscle"}):
                 if getattr(self, entry) != type(self).model_fields[entry].default:
                     raise problem(entry, "has no effect beside muscle; leave it out", getattr(self, entry))
             low, high = self.excitations
@@ -124,8 +134,10 @@ class TreeActuator(Description):
                 raise problem("input_range", "must lie within 0 and 1, those of a muscle's excitation", [low, high])
         if (self.time_constant > 0.0) + self.integrates + (self.integral > 0.0) > 1:
             raise problem("", "has one of time_constant, integrates and integral")
+        if self.slew is not None and (self.integrates or self.integral > 0.0):
+            raise problem("slew", "is beside neither integrates nor integral", self.slew)
         if self.state_range is not None and not self.has_state:
-            raise problem("state_range", "is for time_constant, integrates or integral", list(self.state_range))
+            raise problem("state_range", "is for time_constant, slew, integrates or integral", list(self.state_range))
         for entry in ("input_range", "force_range", "state_range"):
             limits = getattr(self, entry)
             if limits is not None and limits[0] > limits[1]:
@@ -146,7 +158,8 @@ class TreeActuator(Description):
     @property
     def has_state(self) -> bool:
         """Whether its force depends on more than input and motion of the moment."""
-        return self.time_constant > 0.0 or self.integrates or self.integral > 0.0 or self.muscle is not None
+        follows = self.time_constant > 0.0 or self.slew is not None
+        return follows or self.integrates or self.integral > 0.0 or self.muscle is not None
 
     @property
     def excitations(self) -> Pair:

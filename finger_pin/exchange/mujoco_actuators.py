@@ -24,6 +24,27 @@ def _affine(gain: float, offset: float, by_length: float, by_speed: float) -> Ta
 _PID = ("kp", "ki", "kd", "imax", "slewmax")
 
 
+def _pid(kp: float, ki: float, kd: float, most: float, slew: float, offset: float = 0.0) -> Table | str:
+    """Return the law of a PID actuator, with the derivative of the length alone, or the reason for its lack.
+
+    Args:
+        kp: Proportional gain.
+        ki: Gain of the sum of the error.
+        kd: Gain of the speed.
+        most: Of the sum of the error; 0 for no limit.
+        slew: Largest rate of its input; 0 for no limit.
+        offset: Force without input at length zero.
+    """
+    if ki and slew:
+        return "its PID limits the rate of its input, and has an integral part"
+    law = _affine(kp, offset, -kp, -kd)
+    if slew:
+        law["slew"] = slew
+    if ki:
+        law["integral"] = ki
+    return law | ({"state_range": [-most, most]} if ki and most else {})
+
+
 class ActuatorReader(ElementReader):
     """Reads actuators."""
 
@@ -37,7 +58,7 @@ class ActuatorReader(ElementReader):
             if isinstance(law, str):
                 self._leave_out(i, law)
             else:
-                laws[i] = law
+                laws[i] = law | self._delay(i)
         return laws
 
     @cached_property
@@ -180,14 +201,15 @@ class ActuatorReader(ElementReader):
         gain, bias = model.actuator_gainprm[i].tolist(), model.actuator_biasprm[i].tolist()
         if kind == "muscle":
             return self._muscle(i)
+        if kind == "pid" and not any(bias[3:]):
+            most, slew = model.actuator_dynprm[i, :2].tolist()
+            return _pid(-bias[1], gain[0], -bias[2], most, slew, bias[0])
         state = self._state(i)
         if isinstance(state, str):
             return state + (f", of kind {kind}" if kind != "fixed" else "")
         if kind == "dcmotor" and not (any(gain[2:]) or any(bias) or np.any(model.actuator_dynprm[i]) or state):
             resistance, constant = gain[:2]
             return _affine(constant / resistance, 0.0, 0.0, -(constant**2) / resistance)
-        if kind == "pid" and not (any(gain) or any(bias[3:]) or np.any(model.actuator_dynprm[i]) or state):
-            return _affine(-bias[1], *bias[:3])
         if kind != "fixed":
             return f"its gain is not constant, but of kind {kind}"
         if model.actuator_biastype[i] not in (int(biases.mjBIAS_NONE), int(biases.mjBIAS_AFFINE)):
@@ -241,17 +263,15 @@ class ActuatorReader(ElementReader):
         numbers = {key: float(text) for key, text in zip(_PID, (each.decode() for each in texts), strict=False) if text}
         if self.names.plugins[instance : instance + 1] != ["mujoco.pid"]:
             return "a plugin computes it"
-        if numbers.get("slewmax"):
-            return "its PID limits the rate of its input"
         if model.actuator_dyntype[i] != self.mujoco.mjtDyn.mjDYN_NONE:
             return "its PID has an input that comes late"
-        law = _affine(numbers.get("kp", 0.0), 0.0, -numbers.get("kp", 0.0), -numbers.get("kd", 0.0))
-        if numbers.get("ki"):
-            law["integral"] = numbers["ki"]
-            if "imax" in numbers:
-                most = numbers["imax"] / numbers["ki"]
-                law["state_range"] = [-most, most]
-        return law
+        kp, ki, kd, most, slew = (numbers.get(key, 0.0) for key in _PID)
+        # The plugin limits the force of the sum, actuators of kind pid the sum itself.
+        return _pid(kp, ki, kd, most / (ki or 1.0), slew)
+
+    def _delay(self, i: int) -> Table:
+        delay = getattr(self.model, "actuator_delay", None)
+        return {} if delay is None or delay[i] <= 0.0 else {"delay": float(delay[i])}
 
     def _control(self, i: int) -> int:
         """Return the control of an actuator; those before it may have several, or none."""

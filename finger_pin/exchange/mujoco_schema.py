@@ -16,7 +16,7 @@ _ELSEWHERE = "site refsite slidersite cranksite cranklength"
 _DRIVEN = {
     "carried": f"{_TRANSMISSION} ctrllimited ctrlrange forcelimited forcerange",
     "listed": _ELSEWHERE,
-    # With delay, which is listed; of muscles, for which lengths are found, they are resolved by MuJoCo's compiler.
+    # How MuJoCo keeps late controls; of muscles, for which lengths are found, they are resolved by MuJoCo's compiler.
     "idle": "interp nsample lengthrange",
 }
 _SOFT = "limited range margin solreflimit solimplimit"
@@ -41,7 +41,7 @@ _EQUALITY: dict[Kind, str] = {"carried": "active solref solimp"}
 
 #: By element, below its parent where another has the same name, attributes by kind; children without entry are as it.
 #: Where one number of a carried or listed attribute alone is left out, the list says so: polynomials of stiffness and
-#: damping, controls that come late, forces on what several drive, moments of inertia of free bodies.
+#: damping, forces on what several drive, moments of inertia of free bodies.
 SCHEMA: dict[str, dict[Kind, str]] = {
     "mujoco": {"idle": "model"},
     # MuJoCo's compiler has resolved them.
@@ -114,7 +114,7 @@ SCHEMA: dict[str, dict[Kind, str]] = {
     "actuator/velocity": _actuator("kv"),
     "intvelocity": _actuator("actlimited actrange dampratio inheritrange kp kv"),
     "orientation": {"listed": ALL},
-    "pid": _actuator("dampratio inheritrange kp kv", "imax input ki slewmax", "ffrange posrange velrange"),
+    "pid": _actuator("dampratio imax inheritrange ki kp kv slewmax", "input", "ffrange posrange velrange"),
     "damper": {"listed": ALL},
     "cylinder": _actuator("area bias diameter timeconst"),
     "muscle": _actuator("force fpmax fvmax lmax lmin range scale tausmooth timeconst vmax"),

@@ -191,7 +191,5 @@ def is_disabled(mujoco: Any, model: Any, actuator: int) -> str | None:
     """Return the reason for which an actuator does not act, or not as it seems, or None."""
     if "actuation" in disabled(mujoco, model):
         return "actuation is disabled in the model"
-    if model.opt.disableactuator & (1 << int(model.actuator_group[actuator])):
-        return f"its group {int(model.actuator_group[actuator])} is disabled in the model"
-    delay = getattr(model, "actuator_delay", None)
-    return "its control is delayed" if delay is not None and delay[actuator] > 0.0 else None
+    disabled_group = model.opt.disableactuator & (1 << int(model.actuator_group[actuator]))
+    return f"its group {int(model.actuator_group[actuator])} is disabled in the model" if disabled_group else None

@@ -1,8 +1,8 @@
 """An actuator whose force is affine in its input and in its own motion, both within limits: a motor, or a servo.
 
 One with a state answers late, or sums up: z' = r_u u + r_l l + r_z z, and its force has a part that is proportional to
-z. With r_u = 1 / T = -r_z it is a filter of its input, with r_u = 1 its integral, with r_u = 1 = -r_l that of a servo's
-error.
+z. With r_u = 1 / T = -r_z it is a filter of its input, whose rate may be limited, with r_u = 1 its integral, with
+r_u = 1 = -r_l that of a servo's error.
 """
 
 from __future__ import annotations
@@ -48,14 +48,15 @@ _STOPS = 1e3
 
 def _command_and_rates(row: Row, p: Parameters) -> Numbers:
     """Return u within its limits, and z' free of its limits and within them."""
-    _, _, _, _, lowest, highest, _, _, _, by_input, by_length, by_state, least, most = p
+    _, _, _, _, lowest, highest, _, _, _, by_input, by_length, by_state, least, most, slew = p
     command = np.minimum(np.maximum(row.command, lowest), highest)
     rate = by_input * command + by_length * row.length + by_state * row.state
-    return command, rate, np.minimum(np.maximum(rate, _STOPS * (least - row.state)), _STOPS * (most - row.state))
+    limited = np.minimum(np.maximum(rate, -slew), slew)
+    return command, rate, np.minimum(np.maximum(limited, _STOPS * (least - row.state)), _STOPS * (most - row.state))
 
 
 def _value_of_state(row: Row, p: Parameters) -> Numbers:
-    gain, offset, by_length, by_speed, _, _, least, most, by_state, _, _, _, _, _ = p
+    gain, offset, by_length, by_speed, _, _, least, most, by_state, _, _, _, _, _, _ = p
     command, free, rate = _command_and_rates(row, p)
     wanted = gain * command + offset + by_length * row.length + by_speed * row.speed + by_state * row.state
     return np.minimum(np.maximum(wanted, least), most), rate, wanted, free
@@ -63,12 +64,13 @@ def _value_of_state(row: Row, p: Parameters) -> Numbers:
 
 def _slopes_of_state(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     gain, _, by_length, by_speed, lowest, highest, least, most, by_state = p[:9]
-    rate_by_input, rate_by_length, rate_by_state, least_state, most_state = p[9:]
+    rate_by_input, rate_by_length, rate_by_state, least_state, most_state, slew = p[9:]
     wanted, rate = signals
     free = 1.0 * (wanted > least) * (wanted < most)
     heard = 1.0 * (row.command > lowest) * (row.command < highest)
-    stopped = 1.0 * (rate > _STOPS * (most_state - row.state)) + 1.0 * (rate < _STOPS * (least_state - row.state))
-    moves = 1.0 - stopped
+    limited = np.minimum(np.maximum(rate, -slew), slew)
+    stopped = 1.0 * (limited > _STOPS * (most_state - row.state)) + 1.0 * (limited < _STOPS * (least_state - row.state))
+    moves = (1.0 - stopped) * (rate > -slew) * (rate < slew)
     force = (free * by_length, free * by_speed, free * by_state, 0.0, 0.0, free * heard * gain, 0.0)
     rate_slope = moves * rate_by_state - stopped * _STOPS
     return force, (moves * rate_by_length, 0.0, rate_slope, 0.0, moves * heard * rate_by_input, 0.0)
@@ -85,6 +87,7 @@ ACTUATOR_WITH_STATE = Law(
         "state_by_state",
         "least_state",
         "most_state",
+        "slew",
     ),
     value=_value_of_state,
     slopes=_slopes_of_state,

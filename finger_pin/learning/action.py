@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finger_pin.control.input_queue import InputQueue, input_delays
 from finger_pin.control.input_ranges import input_ranges, spool_ranges
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.position_drive import build_drives, loop_period
@@ -99,6 +100,7 @@ class Action(LoopController):
         self._begins: list[float] = []
         self._values: list[Array] = []
         self._value = self.inputs
+        self._queue = InputQueue(input_delays(self._finger.description, self._finger.routing))
         self._waiting: deque[tuple[float, Array]] = deque()
         if self._drives is not None:
             for name in _MEMORY:
@@ -123,9 +125,12 @@ class Action(LoopController):
             if self._drives is not None:
                 # A sample at this instant has been taken already, but not before the first action.
                 self._drives.goals[int(self._drives.latest(begin)) + 1 if self._begins else 0 :] = self._value
+            else:
+                self._queue.add(begin, self._value)
         if self._drives is None:
-            self.inputs = self._value
+            self.inputs = self._value = self._queue.at(begin)
             stepper.hold(self._value)
+            end = self._queue.next_arrival(begin, end)
         self._begins.append(begin)
         self._values.append(self._value)
         return min(self._waiting[0][0], end) if self._waiting else end

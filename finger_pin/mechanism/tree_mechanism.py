@@ -39,7 +39,8 @@ ELASTIC = "elastic_cords"
 _TIP = "fingertip"
 # Dry friction of a tendon holds until it has slid so far, m.
 _HOLDS = 1e-4
-_UNLIMITED = (-np.inf, np.inf)
+# How soon an actuator of limited rate follows its input, s.
+_LAG, _UNLIMITED = 1e-4, (-np.inf, np.inf)
 # What rows of a tree store and exchange, by table.
 _STORED = {
     "tendon_spring": Energy("tendon_spring", "tendons' springs"),
@@ -288,13 +289,12 @@ def _actuator(actuator: TreeActuator) -> tuple[float, ...]:
         peak = muscle.force, muscle.optimal_length, origin
         return *peak, *shape, *muscle.time_constants, muscle.smoothing, *actuator.excitations
     bounds = (*(actuator.input_range or _UNLIMITED), *(actuator.force_range or _UNLIMITED))
-    bias = actuator.offset, actuator.by_length, actuator.by_speed
+    bias = actuator.offset, actuator.by_length, actuator.by_speed, *bounds
     if not actuator.has_state:
-        return actuator.gain, *bias, *bounds
+        return actuator.gain, *bias
     if actuator.integral:
         law, state = actuator.gain, (actuator.integral, 1.0, -1.0, 0.0)
-    else:
-        # What it holds takes the place of its input.
-        rate = 1.0 / actuator.time_constant if actuator.time_constant else 0.0
-        law, state = 0.0, (actuator.gain, rate or 1.0, 0.0, -rate)
-    return law, *bias, *bounds, *state, *(actuator.state_range or _UNLIMITED)
+    else:  # What it holds takes the place of its input.
+        lag = actuator.time_constant or (0.0 if actuator.slew is None else _LAG)
+        law, state = 0.0, (actuator.gain, 1.0 / (lag or 1.0), 0.0, -1.0 / lag if lag else 0.0)
+    return law, *bias, *state, *(actuator.state_range or _UNLIMITED), actuator.slew or np.inf

@@ -14,7 +14,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import JointReference
 from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
 from finger_pin.exceptions import InputError
-from finger_pin.references.signal import Signal
+from finger_pin.references.signal import Signal, no_harmonics
 from finger_pin.typing import Array
 
 _STILL = JointReference()
@@ -89,7 +89,7 @@ class SignalReference:
         free_signal = free_signal.later(scenario.simulation.start_time)
         coefficients = np.zeros((*free_signal.coefficients.shape[:2], len(routing.joints)))
         coefficients[..., free] = free_signal.coefficients
-        return cls(Signal(np.zeros((len(routing.joints), 4)), free_signal.knots, coefficients), coupling)
+        return cls(Signal(no_harmonics(len(routing.joints)), free_signal.knots, coefficients), coupling)
 
     def at(self, time: Array | float) -> ReferenceSignals:
         """Return theta^d and its rate at one time, or at times of shape (m,)."""

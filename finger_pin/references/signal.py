@@ -28,12 +28,13 @@ _ROUNDING = 1e-9
 
 
 class Harmonic(NamedTuple):
-    """Columns of sinusoids: offset and amplitude in the unit of the signal, frequency, Hz, and phase, rad."""
+    """Columns: offset and amplitude in the unit of the signal, frequency, Hz, phase, rad, and begin, s: zero before."""
 
     offset: int
     amplitude: int
     frequency: int
     phase: int
+    begin: int
 
 
 HARMONIC = Harmonic(*range(len(Harmonic._fields)))
@@ -44,7 +45,7 @@ class Signal:
     """k signals over time.
 
     Attributes:
-        harmonics: Columns `HARMONIC`, shape (k, 4).
+        harmonics: Columns `HARMONIC`, shape (k, 5).
         knots: Shape (m,), s, increasing, at least two; the polynomials are constant outside.
         coefficients: Shape (6, m - 1, k): of the powers 5 to 0 of the time since the knot before, as scipy's `PPoly`.
     """
@@ -61,8 +62,9 @@ class Signal:
             settings: Of each signal.
             tolerance: Of their range, what dense samples may be missed by (`sample_fitting`).
         """
-        harmonics = np.array([[each.offset, each.amplitude, each.frequency, each.phase] for each in settings])
-        return cls(harmonics.reshape(-1, 4), *joined(polynomials(settings, tolerance)))
+        harmonics = [[each.offset, each.amplitude, each.frequency, each.phase, -np.inf] for each in settings]
+        shape = len(settings), len(HARMONIC)
+        return cls(np.reshape(harmonics, shape), *joined(polynomials(settings, tolerance)))
 
     @classmethod
     def from_samples(
@@ -91,14 +93,14 @@ class Signal:
             raise InputError(name, "times and values must be finite")
         if not np.all(np.diff(times) > 0.0):
             raise InputError(name, "times must increase")
-        return cls(np.zeros((len(columns), 4)), *thinned(times, values, tolerance))
+        return cls(no_harmonics(len(columns)), *thinned(times, values, tolerance))
 
     @classmethod
     def from_held_values(cls, knots: Array, values: Array) -> Signal:
         """Return signals that are held between knots, shape (m + 1,), s, at values of shape (m, k)."""
         coefficients = np.zeros((ORDER, *values.shape))
         coefficients[-1] = values
-        return cls(np.zeros((values.shape[1], 4)), knots, coefficients)
+        return cls(no_harmonics(values.shape[1]), knots, coefficients)
 
     @classmethod
     def from_signals(cls, signals: Sequence[Signal]) -> Signal:
@@ -116,9 +118,10 @@ class Signal:
     def at(self, time: Array | float) -> tuple[Array, Array]:
         """Return values and rates at one time, each of shape (k,), or at times of shape (m,), each (m, k)."""
         instant = np.asarray(time, dtype=float)[..., None]
-        offset, amplitude, frequency, phase = self.harmonics.T
-        value = harmonic(instant, offset, amplitude, frequency, phase)
-        rate = harmonic_rate(instant, amplitude, frequency, phase)
+        offset, amplitude, frequency, phase, begin = self.harmonics.T
+        begun = instant >= begin
+        value = np.where(begun, harmonic(instant, offset, amplitude, frequency, phase), 0.0)
+        rate = np.where(begun, harmonic_rate(instant, amplitude, frequency, phase), 0.0)
         if self.is_harmonic:
             return value, rate
         inside = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
@@ -130,11 +133,12 @@ class Signal:
     def derivative(self, time: Array | float, order: int) -> Array:
         """Return a time derivative of a given order at one time, shape (k,), or at times of shape (m,), (m, k)."""
         instant = np.asarray(time, dtype=float)[..., None]
-        offset, amplitude, frequency, phase = self.harmonics.T
+        offset, amplitude, frequency, phase, begin = self.harmonics.T
         circular = 2.0 * np.pi * frequency
         value = (offset if order == 0 else 0.0) + amplitude * circular**order * np.sin(
             circular * instant + phase + 0.5 * np.pi * order
         )
+        value = np.where(instant >= begin, value, 0.0)
         if self.is_harmonic:
             return np.asarray(value)
         inside = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
@@ -158,8 +162,12 @@ class Signal:
         Args:
             tolerance: Relative to the range of each signal.
         """
-        if self.is_harmonic:
-            return np.zeros(0)
+        begins = self.harmonics[:, HARMONIC.begin]
+        begins = np.unique(begins[np.isfinite(begins)])
+        return begins if self.is_harmonic else np.union1d(begins, self._knots_to_end_at(tolerance))
+
+    def _knots_to_end_at(self, tolerance: float) -> Array:
+        """Return the knots of `bends`."""
         length = np.diff(self.knots)[:, None]
         begin, end = self.coefficients[-1], quintic(length, *self.coefficients)
         size = np.maximum(np.ptp(begin, axis=0), np.ptp(end, axis=0))
@@ -221,7 +229,34 @@ class Signal:
             return self
         harmonics = self.harmonics.copy()
         harmonics[:, HARMONIC.phase] += 2.0 * math.pi * harmonics[:, HARMONIC.frequency] * start
+        harmonics[:, HARMONIC.begin] -= start
         return replace(self, harmonics=harmonics, knots=self.knots - start)
+
+    def delayed(self, delays: Array) -> Signal:
+        """Return the signals after delays, shape (k,), s: u(t - d), and zero before t = d."""
+        late = np.flatnonzero(delays)
+        if not late.size:
+            return self
+        from scipy.interpolate import PPoly
+
+        harmonics, columns = self.harmonics.copy(), []
+        harmonics[:, HARMONIC.phase] -= 2.0 * math.pi * harmonics[:, HARMONIC.frequency] * delays
+        harmonics[late, HARMONIC.begin] = delays[late]
+        for column, delay in zip(self.coefficients.T, delays, strict=True):
+            # The piece of nothing up to the delay makes it a knot.
+            columns += [PPoly(column.T, self.knots + delay), PPoly(np.zeros((1, 1)), np.array([delay - 1.0, delay]))]
+        knots, coefficients = joined(columns)
+        coefficients = coefficients[:, :, ::2].copy()
+        for k in late:
+            coefficients[:, knots[:-1] < delays[k], k] = 0.0
+        return Signal(harmonics, knots, coefficients)
+
+
+def no_harmonics(count: int) -> Array:
+    """Return the sinusoids of signals that are polynomials alone, shape (count, 5)."""
+    harmonics = np.zeros((count, len(HARMONIC)))
+    harmonics[:, HARMONIC.begin] = -np.inf
+    return harmonics
 
 
 def _widened(marks: Flags) -> Flags:

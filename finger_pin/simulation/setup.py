@@ -83,6 +83,8 @@ class Setup:
         sampling = sampling_settings(scenario, control_period)
         if sampling is None and (loop.controller.needs_sensors or loop.controller.sensors):
             raise InputError("control_period", "is missing: a controller that reads sensors is sampled")
+        if sampling is None and loop.controller.delays is not None:
+            raise InputError("control_period", "is missing: a controller of actuators with a delay is sampled")
         positioned = bool(np.any(loop.finger.actuators.holds))
         if positioned and method not in TABLEAUS:
             raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.control.input_queue import InputQueue, input_delays
 from finger_pin.control.named_inputs import Inputs, inputs_by_name
 from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_paths
 from finger_pin.control.user_controllers import Samples
@@ -54,8 +55,7 @@ class Simulator:
     ) -> None:
         """Start at rest, at time zero.
 
-        By default the error is that of `simulate`, about 1e-5 rad on `fig6`. Rodas4 with 1e-3 for both tolerances
-        takes half as long and errs by about 1e-3 rad.
+        By default it errs as `simulate`, 1e-5 rad on `fig6`; Rodas4 with tolerances of 1e-3, half as long, 1e-3 rad.
 
         Args:
             finger: The finger, or what `Finger` takes: a description, a name, or the path of a file.
@@ -75,9 +75,8 @@ class Simulator:
         self._settings: dict[str, Any] = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
         self._family: ParametrisedScenario | None = None
         self._build(as_finger(finger))
-        self._posture = 0.5 * (self.finger.stroke_limiter.lower + self.finger.stroke_limiter.upper)
-        if position is not None:
-            self._posture = as_finite_array("position", position, self._posture.shape)
+        middle = 0.5 * (self.finger.stroke_limiter.lower + self.finger.stroke_limiter.upper)
+        self._posture = middle if position is None else as_finite_array("position", position, middle.shape)
         self._begin(self._at(self._posture), 0.0)
 
     def __repr__(self) -> str:
@@ -96,8 +95,7 @@ class Simulator:
         self._stepper = Stepper.from_finger(finger, control, rest, **self._settings)
         self._fresh = self._stepper.state_snapshot
         self._compiled = CompiledFinger(finger)
-        # Which of the inputs are tensions.
-        self._pulling = np.setdiff1d(np.flatnonzero(~finger.routing.winched), finger.actuators.voltages)
+        self._tensions = np.setdiff1d(np.flatnonzero(~finger.routing.winched), finger.actuators.voltages)
 
     def _at(self, position: Array) -> Array:
         """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
@@ -111,6 +109,7 @@ class Simulator:
         """Go on from a state at a time, with a new record and nothing held."""
         tips = len(self.finger.mechanism.body.tips)
         self._tension = np.zeros(self.finger.mechanism.channels)
+        self._queue = InputQueue(input_delays(self.finger.description, self.finger.routing))
         self._force = self._unloaded = np.zeros(3 if tips == 1 else (tips, 3))
         # Not even what was loaded once is remembered.
         self._stepper.restore(self._fresh)
@@ -121,19 +120,16 @@ class Simulator:
         """Reset to time zero with a new record; return the state.
 
         Args:
-            initial: The packed state, shape (size,), the state by name, or theta, shape (n,), rad, for rest there; by
-                default where the simulator began.
+            initial: The packed state, the state by name, or theta, shape (n,), rad, at rest; by default the first one.
 
         Raises:
-            InputError: If it has another size, a number is not finite, or a motor turns faster than its supply can
-                hold; nothing has changed then.
+            InputError: If it has another size, a number is not finite, or a motor turns too fast; nothing changed.
         """
         if isinstance(initial, State):
             initial = self.finger.layout.pack(initial)
-        if initial is None:
-            x = self._at(self._posture)
-        elif np.shape(initial) == self._posture.shape:
-            x = self._at(as_finite_array("initial", initial, self._posture.shape))
+        if initial is None or np.shape(initial) == self._posture.shape:
+            posture = self._posture if initial is None else initial
+            x = self._at(as_finite_array("initial", posture, self._posture.shape))
         else:
             x = as_finite_array("initial", initial, (self.finger.layout.size,))
             check_motors(self.finger, x)
@@ -147,7 +143,7 @@ class Simulator:
             values: By dotted key, as of `load_finger`, such as ``{"finger.tendon_friction.coulomb": 0.1}``.
 
         Raises:
-            InputError: Naming the entry that is wrong, or if the finger had another state; nothing has changed then.
+            InputError: Naming the entry that is wrong, or if the finger had another state; nothing changed.
         """
         if self._family is None or self._family.keys != tuple(values):
             self._family = ParametrisedScenario.from_finger(self.finger.description, tuple(values))
@@ -155,8 +151,8 @@ class Simulator:
         changed = self.finger.changed(described, self.finger.constructor_args.objects)
         if changed.layout.names != self.finger.layout.names:
             raise InputError("values", "make a finger with another state: make another simulator of it")
-        x, time = self.x, self.time
-        check_motors(changed, x, "values")
+        check_motors(changed, x := self.x, "values")
+        time = self.time
         self._build(changed)
         self._begin(x, time)
 
@@ -192,32 +188,38 @@ class Simulator:
             fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
 
         Raises:
-            InputError: If an argument is not finite or has the wrong size, or a tension is negative; nothing has moved
-                then.
+            InputError: If an argument is not finite or has the wrong size, or a tension is negative; nothing moved.
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
-        self._hold(*self._checked(inputs, dt, fingertip_force))
-        status = self._stepper.advance(self._stepper.time + dt)
-        self._log.add(self._stepper.time, self._tension, self._force)
-        return self._reached(status)
+        command, force = self._checked(inputs, dt, fingertip_force)
+        end = self.time + dt
+        self._queue.add(self.time, command)
+        while True:
+            until = self._hold(force, end)
+            status = self._stepper.advance(until)
+            self._log.add(self._stepper.time, self._tension, self._force)
+            if status or until == end:
+                return self._reached(status)
 
     def _checked(self, inputs: Inputs, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
         if isinstance(inputs, Mapping):
             inputs = inputs_by_name("inputs", inputs, self.finger)
         command, force = as_finite_array("inputs", inputs, self._tension.shape), self._unloaded
-        if min(command.tolist(), default=0.0) < 0.0 and (command[self._pulling] < 0.0).any():
+        if min(command.tolist(), default=0.0) < 0.0 and (command[self._tensions] < 0.0).any():
             raise InputError("inputs", "a tension must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
-        if fingertip_force is not None:
-            force = as_finite_array("fingertip_force", fingertip_force, force.shape)
-        return command, force
+        if fingertip_force is None:
+            return command, force
+        return command, as_finite_array("fingertip_force", fingertip_force, force.shape)
 
-    def _hold(self, command: Array, force: Array) -> None:
+    def _hold(self, force: Array, end: float) -> float:
+        """Hold a force and the inputs that have arrived; return until when, s: the end, or the next arrival."""
         if force is not self._force:
             self._stepper.load(force)
-        self._tension, self._force = command, force
-        self._stepper.hold(command)
+        self._tension, self._force = self._queue.at(self.time), force
+        self._stepper.hold(self._tension)
+        return self._queue.next_arrival(self.time, end)
 
     def _reached(self, status: int) -> State:
         """Return the state after a step, unless it failed."""
@@ -228,37 +230,34 @@ class Simulator:
     def result(self, *, sample_rate: float = 1000.0, reference: Reference | Samples | None = None) -> xr.Dataset:
         """Return the Dataset of all steps so far, as `simulate` does: for figures, the viewer and `save`.
 
-        The record begins at the start, or where `x` was last set. It takes about as long as the steps did: they are
-        kept as what was held during them, and repeated bit by bit. The attribute ``custom`` marks the result.
+        The record begins at the start, or where `x` was last set. It takes about as long as the steps did, which are
+        repeated bit by bit. The attribute ``custom`` marks the result.
 
         Args:
             sample_rate: Of the signals, Hz.
-            reference: theta^d, for the record alone: an object with ``at``, or times and angles, as for `simulate`; by
-                default the posture at the start.
+            reference: theta^d, for the record alone, as for `simulate`; by default the posture at the start.
 
         Raises:
-            InputError: If nothing has been run, or the sample rate or reference is wrong.
-            IntegrationError: If there are more steps than can be kept in memory; its ``result`` holds the first.
+            InputError: If nothing has been run, or an argument is wrong.
+            IntegrationError: If memory holds only the first steps; its ``result`` has these.
         """
         return self._log.result(self.finger, {**self._settings, "sample_rate": sample_rate}, reference, self._palm)
 
     def signals(self) -> FingerSignals:
         """Return all signals at the present state, under the tensions and force of the last step."""
         mover = self._palm or self._guides
-        return self._compiled.evaluate(
-            self.x, self._tension, self._force, None if mover is None else mover.base(self.time)
-        )
+        base = None if mover is None else mover.base(self.time)
+        return self._compiled.evaluate(self.x, self._tension, self._force, base)
 
     def clone(self) -> Simulator:
         """Return an independent copy in the same state; both continue bit for bit the same."""
         twin = object.__new__(type(self))
         twin.__dict__ |= self.__dict__
         twin._compiled, twin._stepper = CompiledFinger(self.finger), self._stepper.copy()
-        twin._log = self._log.copy(twin._stepper)
+        twin._log, twin._queue = self._log.copy(twin._stepper), self._queue.copy()
         return twin
 
-    # Simulators that share what is stepped would step each other.
-    __copy__ = clone
+    __copy__ = clone  # Simulators that share what is stepped would step each other.
 
 
 def step_many(
@@ -278,8 +277,7 @@ def step_many(
         fingertip_forces: Likewise; none by default.
 
     Raises:
-        InputError: If there are not as many of each, a simulator stands there twice, or an argument is wrong; nothing
-            has moved then.
+        InputError: If numbers of them differ, a simulator stands there twice, or an argument is wrong; nothing moved.
         IntegrationError: If the integrator of one cannot go on; the others have stepped.
     """
     count = len(simulators)
@@ -287,14 +285,16 @@ def step_many(
     for name, values in (("tensions", tensions), ("fingertip_forces", forces)):
         if len(values) != count:
             raise InputError(name, f"must be {count}, one per simulator", len(values))
-    if not count:
-        return []
     if len({id(each) for each in simulators}) < count:
         raise InputError("simulators", "must differ: one stands there twice; use clone")
     acting = [one._checked(inputs, dt, force) for one, inputs, force in zip(simulators, tensions, forces, strict=True)]
-    for simulator, (command, force) in zip(simulators, acting, strict=True):
-        simulator._hold(command, force)
-    statuses = BatchStepper([each._stepper for each in simulators]).advance([each.time + dt for each in simulators])
-    for simulator in simulators:
-        simulator._log.add(simulator._stepper.time, simulator._tension, simulator._force)
+    ends, statuses, moving = [each.time + dt for each in simulators], [0] * count, [*range(count)]
+    for simulator, (command, _) in zip(simulators, acting, strict=True):
+        simulator._queue.add(simulator.time, command)
+    while moving:
+        until = [simulators[k]._hold(acting[k][1], ends[k]) for k in moving]
+        codes = BatchStepper([simulators[k]._stepper for k in moving]).advance(until)
+        for k, statuses[k] in zip(moving, codes, strict=True):
+            simulators[k]._log.add(simulators[k].time, simulators[k]._tension, simulators[k]._force)
+        moving = [k for k, reached in zip(moving, until, strict=True) if reached < ends[k] and not statuses[k]]
     return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]

@@ -12,7 +12,7 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
 
-# Flags, delays and other kinds of actuators are left out here on purpose.
+# Flags and other kinds of actuators are left out here on purpose.
 pytestmark = pytest.mark.filterwarnings("ignore:hand. not carried over")
 
 
@@ -122,20 +122,18 @@ def test_no_flag_is_passed_over():
     assert without == lossless
 
 
-def test_actuators_that_are_disabled_delayed_or_of_other_kinds_are_listed_and_the_others_keep_their_controls():
+def test_actuators_that_are_disabled_or_of_other_kinds_are_listed_and_the_others_keep_their_controls():
     text = ROUTED.replace("<option ", '<option actuatorgroupdisable="3" ')
-    text = text.replace('name="servo"', 'name="servo" group="3"').replace(
-        'name="pull"', 'name="pull" delay="0.01" nsample="8"'
-    )
+    text = text.replace('name="servo"', 'name="servo" group="3"')
     listed = fp.from_mujoco(mujoco.MjModel.from_xml_string(text)).tree.left_out
     assert "actuator servo: its group 3 is disabled in the model" in listed
-    assert "actuator pull: its control is delayed" in listed
 
 
 OTHER_ACTUATORS = """<actuator><dcmotor name="dc" joint="j" gear="3" resistance="2" motorconst="0.1"/>
 <pid name="pd" joint="k" kp="0.3" kv="0.01" ctrlrange="-0.5 0.5"/>
 <dcmotor name="wound" joint="j" resistance="2" motorconst="0.1" inductance="0.1"/>
-<pid name="pid" joint="k" kp="3" ki="1"/><plugin name="foreign" joint="j" plugin="mujoco.pid" actdim="0"/></actuator>"""
+<pid name="pid" joint="k" kp="3" ki="1" slewmax="2"/>
+<plugin name="foreign" joint="j" plugin="mujoco.pid" actdim="0"/></actuator>"""
 
 
 def test_direct_current_motors_and_pid_without_states_push_as_in_mujoco_and_those_with_states_are_named():
@@ -145,7 +143,7 @@ def test_direct_current_motors_and_pid_without_states_push_as_in_mujoco_and_thos
     assert list(description.tree.actuators) == ["dc", "pd"]
     assert [line for line in description.tree.left_out if line.startswith("actuator")] == [
         "actuator wound: it has dynamics of its own, of kind dcmotor",
-        "actuator pid: it has dynamics of its own, of kind pid",
+        "actuator pid: its PID limits the rate of its input, and has an integral part",
         "actuator foreign: a plugin computes it",
     ]
     kept = FIXED + "".join(OTHER_ACTUATORS.splitlines(keepends=True)[:2]) + "</actuator>"

@@ -20,7 +20,11 @@ def reversals(routing):
 
 def sinusoids(coupling, size, seed=12):
     draw = np.random.default_rng(seed)
-    signal = Signal(draw.uniform(0.1, 1.0, (4, size)).T, np.array([0.0, 1.0]), np.zeros((6, 1, size)))
+    signal = Signal(
+        np.hstack([draw.uniform(0.1, 1.0, (size, 4)), np.full((size, 1), -np.inf)]),
+        np.array([0.0, 1.0]),
+        np.zeros((6, 1, size)),
+    )
     return SignalReference(signal, coupling)
 
 
@@ -84,7 +88,7 @@ def test_followers_may_follow_followers_whichever_is_written_first(network, orde
     assert sorted(coupling.followers) == [1, 2]
     reference = sinusoids(coupling, 3)
     a, b, c = reference.at(0.7).position
-    offset, amplitude, frequency, phase = reference.signal.harmonics[0]
+    offset, amplitude, frequency, phase, _ = reference.signal.harmonics[0]
     own = offset + amplitude * math.sin(2.0 * math.pi * frequency * 0.7 + phase)
     assert a == pytest.approx(own, rel=1e-14)
     assert b == pytest.approx((3e-3 * a - 2.0 / 1e4) / 4e-3, rel=1e-12)

@@ -147,11 +147,30 @@ def test_the_compiled_search_finds_the_piece_of_any_time_on_uneven_knots():
     random = np.random.default_rng(1)
     for power in (1, 3, 9):
         knots = np.unique(random.uniform(-1.0, 1.0, 30) ** power)
-        signal = core.SignalTable(np.zeros((0, 4)), knots, np.zeros((6, len(knots) - 1, 0)))
+        signal = core.SignalTable(np.zeros((0, 5)), knots, np.zeros((6, len(knots) - 1, 0)))
         for time in (*random.uniform(-1.2, 1.2, 50), *knots):
             piece, since = core._piece.py_func(signal, time)
             expected = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
             assert piece == expected and since == np.clip(time, knots[0], knots[-1]) - knots[expected]
+
+
+@pytest.mark.parametrize("delays", [(0.0, 0.1, 0.3, 0.0), (0.2, 0.0, 0.0, 0.7)])
+def test_a_delayed_signal_is_the_same_later_and_zero_before(delays):
+    signal = Signal.from_settings([
+        ForceSignal(offset=2.0, amplitude=0.7, frequency=1.3, phase=0.4),
+        ForceSignal(kind="samples", times=[0.1, 0.4, 0.9], values=[0.3, 1.0, -0.2], amplitude=0.2, frequency=3.0),
+        ForceSignal(kind="ramp", time=-0.2, duration=0.5, height=3.0),
+        ForceSignal(kind="step", time=0.5, height=1.0, offset=-0.4),
+    ])  # fmt: skip
+    delayed = signal.delayed(np.array(delays))
+    for time in np.random.default_rng(2).uniform(0.0, 2.0, 200):
+        before = [signal.at(time - delay) for delay in delays]
+        begun = time >= np.array(delays) - np.where(np.array(delays) > 0.0, 0.0, 1.0)
+        values, rates = (np.array([each[n][k] for k, each in enumerate(before)]) * begun for n in (0, 1))
+        np.testing.assert_allclose(delayed.at(time), (values, rates), atol=1e-12)
+        np.testing.assert_allclose(delayed.derivative(time, 1), rates, atol=1e-12)
+    assert set(np.array(delays)[np.array(delays) > 0.0]) <= set(delayed.bends(1e-6))
+    np.testing.assert_allclose(delayed.delayed(-np.array(delays)).at(1.1), signal.at(1.1), atol=1e-12)
 
 
 WRONG = [

@@ -19,7 +19,7 @@ class SignalTable(NamedTuple):
     """k functions of time: a sinusoid about an offset each, plus a piecewise polynomial on shared knots.
 
     Attributes:
-        harmonics: Columns `HARMONIC`, shape (k, 4).
+        harmonics: Columns `HARMONIC`, shape (k, 5).
         knots: Shape (m,); m = 0 without polynomials. Outside, these keep their value.
         coefficients: Of (t - knot)^(5 - i), shape (6, m - 1, k).
     """
@@ -31,7 +31,7 @@ class SignalTable(NamedTuple):
 
 def no_signal() -> SignalTable:
     """Return a signal of no functions."""
-    return SignalTable(np.zeros((0, 4)), np.zeros(0), np.zeros((6, 0, 0)))
+    return SignalTable(np.zeros((0, len(HARMONIC))), np.zeros(0), np.zeros((6, 0, 0)))
 
 
 @njit_inline
@@ -66,8 +66,9 @@ def signal_values(signal: SignalTable, time: float, out: Vector) -> None:
     """Fill the values of the functions."""
     table = signal.harmonics
     for j in range(table.shape[0]):
-        out[j] = table[j, HARMONIC.offset]
-        if table[j, HARMONIC.amplitude] != 0.0:
+        begun = time >= table[j, HARMONIC.begin]
+        out[j] = table[j, HARMONIC.offset] if begun else 0.0
+        if begun and table[j, HARMONIC.amplitude] != 0.0:
             out[j] += (
                 table[j, HARMONIC.amplitude]
                 * sine_cosine(2.0 * np.pi * table[j, HARMONIC.frequency] * time + table[j, HARMONIC.phase])[0]
@@ -91,6 +92,8 @@ def signal_derivative(signal: SignalTable, j: int, time: float, order: int) -> f
     )
     if order == 0:
         value += table[j, HARMONIC.offset]
+    if time < table[j, HARMONIC.begin]:
+        value = 0.0
     if knots.size > 0 and (order == 0 or knots[0] <= time < knots[knots.size - 1]):
         piece, since = _piece(signal, time)
         polynomial = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -81,6 +81,9 @@ class Inputs:
 
     def adopt(self, scenario: Scenario, loop: ClosedLoop) -> None:
         """Go on with other numbers of the same scenario."""
+        if isinstance(loop.controller, OpenLoopTensions):
+            # The simulator delays what it is given.
+            loop = replace(loop, controller=loop.controller.as_commanded(scenario.finger))
         self._scenario, self._loop = scenario, loop
         self._coupling = scenario.coupling(loop.finger.routing)
         self._wound = wound_spools(scenario, loop.finger)
