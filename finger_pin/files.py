@@ -148,8 +148,8 @@ def _link(source: Path, target: Path) -> None:
         shutil.copy2(source, target)
 
 
-def read_text(what: str, path: Path) -> str:
-    """Return the text of a file in UTF-8.
+def read_text(what: str, path: Path, encoding: str = "utf-8-sig", hint: str = "") -> str:
+    """Return the text of a file; the hint ends the message of one in another encoding.
 
     Raises:
         InputError: If it cannot be read, is too large, or is no such text.
@@ -166,9 +166,9 @@ def read_text(what: str, path: Path) -> str:
     if len(data) > _LARGEST:
         raise InputError(what, f"is larger than {_LARGEST} bytes")
     try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(what, "is not a text file in UTF-8") from None
+        return data.decode(encoding)
+    except UnicodeError:
+        raise InputError(what, f"is not a text file in {encoding.removesuffix('-sig').upper()}{hint}") from None
 
 
 def expand(name: str) -> Path:

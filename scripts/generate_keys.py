@@ -134,7 +134,7 @@ def _default(field: FieldInfo) -> str:
         return str(value).lower()
     if isinstance(value, tuple):
         return "[" + ", ".join(f"{each:g}" if isinstance(each, float) else str(each) for each in value) + "]"
-    return f"{value:g}" if isinstance(value, float) else f"`{value}`" if value else '`""`'
+    return f"{value:g}" if isinstance(value, int | float) else f"`{value}`" if value else '`""`'
 
 
 VARIABLES_HEAD = """# All variables of a result

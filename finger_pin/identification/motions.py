@@ -17,7 +17,7 @@ from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.identification.recorded_inputs import check_references, put_inputs, with_corrected_inputs
-from finger_pin.identification.recordings import At, Recording
+from finger_pin.identification.recordings import At, Recording, comes_round
 from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
 from finger_pin.identification.starts import check_reachable, far_start, recorded_starts, starts_to_find
 from finger_pin.mechanism.coerce import with_parameters_of
@@ -80,7 +80,13 @@ class RecordedMotion:
         self._factor = 1.0
 
     def doubt(self, sought: Collection[str]) -> str:
-        """Return a warning about a start far from where the recording begins, unless its columns' zeros are sought."""
+        """Return a warning about angles that come round, or a start far from where the recording begins.
+
+        Nothing is said of a start whose columns' zeros are sought.
+        """
+        jumps = comes_round(self.recording)
+        if jumps:
+            return jumps
         starts = {} if self.recording.settings.start != "rest" else self._starts
         prefix = f"recordings.{self.recording.name}."
         starts = {joint: each for joint, each in starts.items() if f"{prefix}{each.column}.offset" not in sought}

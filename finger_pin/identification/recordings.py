@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.recordings.bench import Column, RecordingSettings
-from finger_pin.description.recordings.columns import Table, chosen_rows, read_columns
+from finger_pin.description.recordings.columns import Table
+from finger_pin.description.recordings.csv_files import chosen_rows, read_columns
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
 from finger_pin.exceptions import InputError
@@ -46,6 +47,8 @@ VARIABLES = {
 BEYOND = 0.2
 # By how much of its greatest reading a load cell of a slack cord may err.
 _WRONG_ZERO = 0.1
+# How far a jump of an angle that comes round may be from a turn, in turns.
+_JUMP = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,13 +171,14 @@ def read_recording(
     if data is None and settings.file is None:
         raise InputError(f"{entry}.file", "is missing: the path of a CSV file")
     path = Path(str(settings.file))
-    columns = read_columns(f"{entry}.file {path.name}", path) if data is None else data
+    columns = read_columns(f"{entry}.file {path.name}", path, settings) if data is None else data
     table = Table(entry, chosen_rows(entry, columns, settings.rows))
 
-    time, speed = np.zeros(table.rows), np.zeros(table.rows)
+    time = np.zeros(table.rows)
     if settings.time is not None:
-        time = table.times("time", settings.time)
+        time = table.times("time", settings.time, settings.repeated_times)
         time = time - time[0]
+    speed = np.zeros(table.rows)
     if isinstance(settings.speed, Column):
         speed = table.column("speed", settings.speed, "m/s")
         if np.any(speed == 0.0):
@@ -192,6 +196,18 @@ def read_recording(
             key for key, column in {**settings.inputs, **settings.outputs}.items() if not table.names_unit(column)
         ),
     )
+
+
+def comes_round(recording: Recording) -> str:
+    """Return a warning where an angle of a motion jumps by a turn between two samples; empty where none does."""
+    for name, values in recording.outputs.items():
+        there = np.flatnonzero(np.isfinite(values))
+        turns = np.abs(np.diff(values[there])) / (2.0 * np.pi)
+        jumps = np.flatnonzero(np.abs(turns - 1.0) < _JUMP)
+        if unit_of(name) == "rad" and len(jumps):
+            where = f"{recording.name}.{name} jumps by a turn after row {there[jumps[0]] + 1}"
+            return f"{where}: where its numbers come round, write their period, such as period = 4096"
+    return ""
 
 
 def check_angles(recording: Recording, scenario: Scenario) -> None:

@@ -16,7 +16,7 @@ import xarray as xr
 from finger_pin.control.build import build_controller
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.recordings.columns import read_columns
+from finger_pin.description.recordings.csv_files import read_columns
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.typing import Array
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from finger_pin.description.recordings.csv_files import TableFormat
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
 
 #: What a parameter of one recording begins with, before its name.
@@ -37,6 +38,9 @@ class Column(Description):
         strict=True,
         description="Such as mm, deg, gf; that in brackets in the header, else SI, if it is left out.",
     )
+    period: Annotated[float, real(0.0, 1e18, above=True)] | None = quantity(
+        None, unit="1", source="the encoder", doc="Where the numbers come round, before unit and scale: unwrapped."
+    )
     scale: Annotated[float, real(-1e12, 1e12)] = quantity(
         1.0, unit="1", source="calibration", doc="Factor on what the column has, in SI."
     )
@@ -58,7 +62,7 @@ class Column(Description):
         return {"column": value} if isinstance(value, str) else value
 
 
-class RecordingSettings(Description):
+class RecordingSettings(TableFormat):
     """A table of readings or of a motion. Columns are named ``variable.label`` as in a result."""
 
     file: str | None = Field(None, strict=True, description="A CSV file, relative to the file that names it.")
@@ -115,6 +119,13 @@ class RecordingSettings(Description):
             for name in ("time", "window"):
                 if getattr(self, name) is not None:
                     raise problem(name, "is for motions only")
+            if self.repeated_times != "refuse":
+                raise problem("repeated_times", "is for motions only", self.repeated_times)
+            columns: dict[str, Any] = {f"inputs.{k}": c for k, c in self.inputs.items()}
+            columns |= {f"outputs.{k}": c for k, c in self.outputs.items()} | {"speed": self.speed}
+            for name, column in columns.items():
+                if isinstance(column, Column) and column.period is not None:
+                    raise problem(f"{name}.period", "is for motions only: rows must follow each other", column.period)
             if isinstance(self.held_out, tuple):
                 raise problem("held_out", "must be true or false: only a motion has parts", list(self.held_out))
             if isinstance(self.speed, float) and (not math.isfinite(self.speed) or self.speed == 0.0):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,20 +12,33 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from finger_pin.description.recordings.bench import Column
+from finger_pin.description.recordings.csv_files import TableFormat, read_columns
 from finger_pin.description.recordings.series import Series
-from finger_pin.description.recordings.units import APPENDED, BRACKETED, check_header, in_si, split_unit
-from finger_pin.description.validation import Description, suggestion, validate
+from finger_pin.description.recordings.units import (
+    APPENDED,
+    BRACKETED,
+    UNITS,
+    check_header,
+    in_si,
+    parse_unit,
+    split_unit,
+)
+from finger_pin.description.validation import suggestion, validate
 from finger_pin.exceptions import InputError
-from finger_pin.files import expand, read_text
+from finger_pin.files import expand
 
-# What stands in a cell, besides nothing, where nothing was measured.
-_MISSING = ("na", "n/a", "null", "none", "-")
 _TIMES = ("time", "t")
-# Rows that are so far apart on average, s, over so long a time are asked about.
-_FAR_APART, _LONG = 1.0, 60.0
+# Rows that are so far apart on average, s, over so long a time are asked about; the units that they may be in.
+_FAR_APART, _LONG, _SMALL_UNITS = 1.0, 60.0, ("ms", "us", "ns")
+# Times from here on, s, are of an epoch, and counted from the first: three years are no motion.
+_EPOCH = 1e8
+# A date and a time of ISO 8601, and the difference of its zone from UTC.
+_STAMP = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)\s*(?:Z|(?:([+-])(\d\d):?(\d\d)?))?")
+# The part of a period, from one sample to the next, from which on the way round is not clear.
+_AMBIGUOUS = 0.45
 
 
-class SignalFile(Description):
+class SignalFile(TableFormat):
     """A CSV file of signals over time; its path alone will do."""
 
     path: str = Field(strict=True, description="Relative to the file that names it.")
@@ -53,6 +65,8 @@ class Table:
         if len({values.shape for values in self._columns.values()}) != 1:
             raise InputError(entry, "all columns must have as many rows")
         self.rows = len(next(iter(self._columns.values())))
+        # The number of the instant of every row, where several have one time.
+        self._instants: NDArray[np.intp] | None = None
         split = [(name, *split_unit(name, BRACKETED)) for name in self._columns]
         bare = [each[1] for each in split]
         self._headers = {short: (name, unit) for name, short, unit in split if bare.count(short) == 1}
@@ -70,55 +84,85 @@ class Table:
         Raises:
             InputError: If there is no such column, a cell is no number, or the unit does not fit.
         """
+        values = self._all_rows(key, column, si, missing=missing)
+        return values if self._instants is None else _means(values, self._instants)
+
+    def _all_rows(self, key: str, column: Column, si: str, *, missing: bool = False) -> NDArray[np.float64]:
+        """Return a column in SI with a number for every row, of those of one time as well."""
         entry = f"{self.entry}.{key}"
-        if column.column not in self._headers:
-            allowed = f"no such column; there are {', '.join(self._columns)}{suggestion(column.column, self._columns)}"
-            raise InputError(entry, allowed, column.column)
-        name, header_unit = self._headers[column.column]
+        name, header_unit = self._find(entry, column)
         cells = self._columns[name]
         if cells.dtype == object:
             row = next(k for k, cell in enumerate(cells) if isinstance(cell, str))
             raise InputError(entry, f"column {name} has no number in row {row + 1}", cells[row])
         unit = column.unit or header_unit
-        if column.unit is None:
+        if column.unit is None and not (column.scale != 1.0 and header_unit and parse_unit(header_unit) is None):
             check_header(entry, name, header_unit, si, asked=column.scale == 1.0)
+        elif column.unit is None:
+            # The scale leads from a unit of its own, such as ticks, to SI.
+            unit = None
         factor = 1.0 if unit is None else in_si(f"{entry}.unit" if column.unit else entry, unit, si)
         if column.unit is None and factor != 1.0 and column.scale != 1.0:
             raise InputError(entry, f"has a scale, and its header a unit; write unit too, such as {unit}", column.scale)
         wrong = np.flatnonzero(np.isinf(cells) if missing else ~np.isfinite(cells))
         if len(wrong):
             raise InputError(entry, f"column {name} has no number in row {wrong[0] + 1}")
+        if column.period is not None:
+            cells = _unwrapped(f"{entry}.period", cells, column.period)
         values: NDArray[np.float64] = column.scale * factor * cells
         if column.supply is not None:
             if si != "V" or unit is not None:
                 raise InputError(f"{entry}.supply", "is for a part of a voltage, without a unit", column.supply)
-            values = values * self.column(f"{key}.supply", Column(column=column.supply), "V")
-        values = values + column.offset
-        return values
+            values = values * self._all_rows(f"{key}.supply", Column(column=column.supply), "V")
+        return values + column.offset
+
+    def _find(self, entry: str, column: Column) -> tuple[str, str | None]:
+        """Return the name of a column in the header, and its unit there."""
+        if column.column not in self._headers:
+            allowed = f"no such column; there are {', '.join(self._columns)}{suggestion(column.column, self._columns)}"
+            raise InputError(entry, allowed, column.column)
+        return self._headers[column.column]
 
     def names_unit(self, column: Column) -> bool:
         """Return whether a column that is there has a unit or a scale, in its header or beside its name."""
         return column.unit is not None or column.scale != 1.0 or self._headers[column.column][1] is not None
 
-    def times(self, key: str, column: Column) -> NDArray[np.float64]:
-        """Return a column of times, s, shape (m,).
+    def times(self, key: str, column: Column, repeated: str = "refuse") -> NDArray[np.float64]:
+        """Return a column of times, s, shape (m,); dates, and seconds of an epoch, are counted from the first.
+
+        Args:
+            key: Where it is asked for, below the table's entry.
+            column: Numbers, or dates and times of ISO 8601.
+            repeated: ``mean`` where the mean of rows of one time is one row from now on, in all columns.
 
         Raises:
             InputError: Also if they do not increase, or seem to be milliseconds and no unit says that they are not.
         """
-        entry, times = f"{self.entry}.{key}", self.column(key, column, "s")
+        entry = f"{self.entry}.{key}"
         if column.delay:
             raise InputError(f"{entry}.delay", "is for signals, not for their times", column.delay)
+        name, header_unit = self._find(entry, column)
+        dated = self._columns[name].dtype == object
+        times = _dates(entry, column, name, self._columns[name]) if dated else self.column(key, column, "s")
+        if abs(times[0]) >= _EPOCH:
+            times = times - times[0]
+        steps = np.diff(times)
+        if repeated == "mean" and np.any(steps == 0.0) and not np.any(steps < 0.0):
+            self._instants = np.append(0, np.cumsum(steps > 0.0))
+            times = _means(times, self._instants)
+            self.rows = len(times)
         back = np.flatnonzero(np.diff(times) <= 0.0)
         if len(times) < 2 or len(back):
             where = f", and do not from row {back[0] + 1} to the next" if len(back) else ""
+            if len(back) and steps[back[0]] == 0.0:
+                where += ', which has the same time; repeated_times = "mean" takes the mean of such rows'
             raise InputError(entry, f"times must increase, two rows at least{where}")
-        length, unknown = times[-1] - times[0], (column.unit or self._headers[column.column][1]) is None
-        if unknown and column.scale == 1.0 and length >= max(_FAR_APART * (len(times) - 1), _LONG):
-            warning = (
-                f'its {len(times)} rows take {length:g} s (is it in milliseconds?); write {{ column = "{column.column}"'
-            )
-            raise InputError(entry, f'{warning}, unit = "ms" }}, or unit = "s" if they do', column.column)
+        length, unknown = times[-1] - times[0], not dated and (column.unit or header_unit) is None
+        apart = length / (len(times) - 1)
+        if unknown and column.scale == 1.0 and length >= _LONG and apart >= _FAR_APART:
+            unit = next((unit for unit in _SMALL_UNITS if apart * UNITS["s"][unit] < _FAR_APART), _SMALL_UNITS[-1])
+            warning = f'its {len(times)} rows take {length:g} s (is it in {unit}?); write {{ column = "{column.column}"'
+            raise InputError(entry, f'{warning}, unit = "{unit}" }}, or unit = "s" if they do', column.column)
         return times
 
     def signals(self, file: SignalFile) -> Iterator[tuple[str, Column]]:
@@ -155,9 +199,9 @@ def read_signals(entry: str, source: Any, folder: Path, unit_of: Callable[[str],
     if not isinstance(source, str | dict):
         raise InputError(entry, "must be the path of a CSV file, or a table with path, time and columns", source)
     file = validate(SignalFile, source, tuple(entry.split(".")))
-    table = Table(entry, read_columns(f"{entry} {file.path}", folder / expand(file.path)))
+    table = Table(entry, read_columns(f"{entry} {file.path}", folder / expand(file.path), file))
     (_, time), *signals = table.signals(file)
-    times = table.times("time", time)
+    times = table.times("time", time, file.repeated_times)
     shared = Series(times)
     samples: dict[str, dict[str, Any]] = {}
     for name, column in signals:
@@ -170,69 +214,59 @@ def read_signals(entry: str, source: Any, folder: Path, unit_of: Callable[[str],
     return samples
 
 
-def read_columns(what: str, path: Path) -> dict[str, Any]:
-    """Return the columns of a CSV file with a header, by name; empty cells are not numbers, and words stay words.
-
-    Columns stand apart by commas, semicolons or tabs; where not by commas, decimals may have one. Lines that begin with
-    # are comments. Numbers are read all at once; cell by cell is for what is missing or wrong.
+def _dates(entry: str, column: Column, name: str, cells: NDArray[Any]) -> NDArray[np.float64]:
+    """Return dates and times of ISO 8601 in seconds from the first, shape (m,); those without a zone are all of one.
 
     Raises:
-        InputError: Naming the row that is wrong.
+        InputError: If one is no such date, or has what only numbers have.
     """
-    lines = [line for line in read_text(what, path).splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    if len(lines) < 2:
-        raise InputError(what, "must have a header and rows of numbers")
-    separator = max(",;\t", key=lines[0].count)
-    header = [name.strip() for name in next(csv.reader(lines[:1], delimiter=separator))]
-    if len(set(header)) < len(header) or not all(header):
-        raise InputError(what, "the first line must name every column, each once", lines[0])
-    if separator != ",":
-        lines = [line.replace(",", ".") for line in lines]
-    try:
-        table = np.loadtxt(lines[1:], delimiter=separator, comments=None, ndmin=2, quotechar='"').T
-    except ValueError:
-        table = np.zeros((0, 0))
-    if len(table) == len(header):
-        return dict(zip(header, table, strict=True))
-    try:
-        rows = list(csv.reader(lines[1:], delimiter=separator))
-    except csv.Error as error:
-        raise InputError(what, f"is not valid CSV: {error}") from None
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(header):
-            raise InputError(what, f"row {number} has {len(row)} values, the header names {len(header)}")
-    return {name: [_cell(row[k].strip()) for row in rows] for k, name in enumerate(header)}
+    for key, default in (("unit", None), ("period", None), ("supply", None), ("scale", 1.0), ("offset", 0.0)):
+        if getattr(column, key) != default:
+            raise InputError(f"{entry}.{key}", f"is for numbers, and column {name} has dates", getattr(column, key))
+    instants = np.zeros(len(cells), dtype="datetime64[ns]")
+    zones = set()
+    for row, cell in enumerate(cells):
+        match = _STAMP.fullmatch(cell.strip()) if isinstance(cell, str) else None
+        try:
+            instants[row] = np.datetime64(match[1].replace(",", "."), "ns")  # type: ignore[index]
+        except (TypeError, ValueError):
+            allowed = f"column {name} has no number and no date of ISO 8601 in row {row + 1}"
+            raise InputError(entry, allowed, cell) from None
+        assert match is not None
+        zones.add(match[1] == match[0].strip())
+        if match[2]:
+            ahead = np.timedelta64(60 * int(match[3]) + int(match[4] or 0), "m")
+            instants[row] += ahead if match[2] == "-" else -ahead
+    if len(zones) > 1:
+        raise InputError(entry, f"column {name} has dates with a zone and dates without one")
+    seconds: NDArray[np.float64] = (instants - instants[0]).astype(float) * 1e-9
+    return seconds
 
 
-def chosen_rows(entry: str, columns: Mapping[str, Any], rows: Mapping[str, float | str]) -> Mapping[str, Any]:
-    """Return the rows of columns in which some of these have given numbers or words.
+def _unwrapped(entry: str, cells: NDArray[np.float64], period: float) -> NDArray[np.float64]:
+    """Return numbers that come round at a period without their jumps; missing ones stay so.
 
     Raises:
-        InputError: If there is no such column, or no such row.
+        InputError: If they span more than a period, or it is not clear which way they went round.
     """
-    if not rows:
-        return columns
-    chosen = np.ones(len(next(iter(columns.values()))), dtype=bool)
-    for name, value in rows.items():
-        if name not in columns:
-            allowed = f"no such column; there are {', '.join(columns)}{suggestion(name, columns)}"
-            raise InputError(f"{entry}.rows.{name}", allowed)
-        here = np.array([cell == value for cell in columns[name]])
-        if not here.any():
-            cells = list(dict.fromkeys(str(cell) for cell in columns[name]))[:12]
-            raise InputError(f"{entry}.rows.{name}", f"no row has it; there are {', '.join(cells)}", value)
-        chosen &= here
-    if not chosen.any():
-        raise InputError(f"{entry}.rows", "no row has all of them")
-    return {name: [cells[k] for k in np.flatnonzero(chosen)] for name, cells in columns.items()}
+    there = np.flatnonzero(np.isfinite(cells))
+    span = float(np.ptp(cells[there])) if len(there) else 0.0
+    if span > period:
+        raise InputError(entry, f"must be above {span:g}, the difference of the greatest number and the least", period)
+    unwrapped = cells.copy()
+    unwrapped[there] = np.unwrap(cells[there], period=period)
+    wide = np.flatnonzero(np.abs(np.diff(unwrapped[there])) > _AMBIGUOUS * period)
+    if len(wide):
+        row = there[wide[0]] + 1
+        raise InputError(entry, f"is too short to tell the way from row {row} to the next: nearly half of it", period)
+    return unwrapped
 
 
-def _cell(cell: str) -> float | str:
-    """Return the number in a cell, NaN for an empty one; a word as it stands."""
-    try:
-        return float(cell or "nan")
-    except ValueError:
-        return math.nan if cell.lower() in _MISSING else cell
+def _means(values: NDArray[np.float64], instants: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the mean of the numbers of every instant; not a number where there is none."""
+    there = np.isfinite(values)
+    count = np.bincount(instants, there)
+    return np.where(count > 0, np.bincount(instants, np.where(there, values, 0.0)) / np.maximum(count, 1), np.nan)
 
 
 def _as_array(values: Any) -> NDArray[Any]:

@@ -27,12 +27,19 @@ UNITS: dict[str, dict[str, float]] = {
     "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0},
     "A": {"A": 1.0, "mA": 1e-3},
     "V": {"V": 1.0, "mV": 1e-3},
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
 }
+# Further units, by the one above that they are so many of, and prefixes of those that have any.
+_FURTHER = {"min": ("s", 60.0), "h": ("s", 3600.0), "ozf": ("lbf", 0.0625), "dyn": ("N", 1e-5), "ft": ("in", 12.0)}
+_PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
+_PREFIXED = ("N", "m", "rad", "A", "V", "s")
+# Other spellings: of one sign, and of whole units.
+_SIGNS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u00b0": "deg", **dict.fromkeys("*\u00b7\u22c5.-_", " ")})
+_SPELLINGS = {"Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "rev/min": "rpm", "RPM": "rpm", "dps": "deg/s"}
 
 # A name in a header with its unit: in brackets, or of signals after an underscore as well.
 BRACKETED = re.compile(r"(.+?)\s*[(\[]\s*(.+?)\s*[)\]]")
-APPENDED = re.compile(r"(.+)_(s|ms|us|rad|mrad|deg|mN|gf|kgf)")
+APPENDED = re.compile(r"(.+)_(s|ms|us|ns|rad|mrad|deg|mN|gf|kgf)")
 # What stands in brackets for no unit.
 _NO_UNIT = ("1", "-")
 
@@ -44,6 +51,33 @@ def split_unit(name: str, *patterns: re.Pattern[str]) -> tuple[str, str | None]:
     return name, None
 
 
+def parse_unit(text: str) -> tuple[str, float] | None:
+    """Return the SI unit of a unit and the factor to it; None if it is unknown.
+
+    Known are `UNITS`, SI prefixes, products of a force and a length, lengths and angles per time, and signs that others
+    write, such as N*m and \N{MICRO SIGN}m.
+    """
+    spelled = " ".join(text.translate(_SIGNS).split()).replace(" / ", "/")
+    spelled = _SPELLINGS.get(spelled, spelled)
+    for si, units in UNITS.items():
+        if spelled in units:
+            return si, units[spelled]
+    if spelled in _FURTHER:
+        unit, count = _FURTHER[spelled]
+        known = parse_unit(unit)
+        return known and (known[0], count * known[1])
+    if spelled[:1] in _PREFIXES and spelled[1:] in _PREFIXED:
+        return spelled[1:], _PREFIXES[spelled[0]]
+    for sign, allowed in (("/", ("m/s", "rad/s")), (" ", ("N m", "m N"))):
+        one, found, other = spelled.partition(sign)
+        parts = [parse_unit(part) for part in (one, other)] if found else []
+        if len(parts) == 2 and parts[0] and parts[1]:
+            (first, a), (second, b) = parts[0], parts[1]
+            if f"{first}{sign}{second}" in allowed:
+                return ("N m", a * b) if sign == " " else (f"{first}/{second}", a / b)
+    return None
+
+
 def check_header(entry: str, name: str, unit: str | None, si: str, asked: bool) -> None:
     """Refuse a unit in a header that is unknown, and ask about a name that ends as another unit does.
 
@@ -51,7 +85,7 @@ def check_header(entry: str, name: str, unit: str | None, si: str, asked: bool) 
         InputError: Naming the column.
     """
     fitting = UNITS.get(si) or {each: 1.0 for units in UNITS.values() for each in units}
-    if unit is not None and not any(unit in units for units in UNITS.values()):
+    if unit is not None and parse_unit(unit) is None:
         allowed = f"column {name} is in {unit}, which is no unit known here; write unit, one of {', '.join(fitting)}"
         raise InputError(entry, allowed + suggestion(unit, fitting))
     appended = split_unit(name, APPENDED)[1] if unit is None and asked else None
@@ -66,10 +100,11 @@ def in_si(entry: str, unit: str, wanted: str) -> float:
     Raises:
         InputError: If it is no unit of that; ``entry`` says where it stands.
     """
+    known = parse_unit(unit)
+    if known is not None and (wanted == known[0] or wanted not in UNITS):
+        return known[1]
     fitting = UNITS.get(wanted) or {unit: factor for units in UNITS.values() for unit, factor in units.items()}
-    if unit in fitting:
-        return fitting[unit]
+    if known is not None:
+        raise InputError(entry, f"is a unit of what is in {known[0]}, and this is in {wanted}", unit)
     near = nearest(unit, fitting)
-    other = [si for si, units in UNITS.items() if unit in units]
-    what = f"is a unit of what is in {other[0]}, and this is in {wanted}" if other else f"must be {', '.join(fitting)}"
-    raise InputError(entry, what + (f"; did you mean {near}?" if near and not other else ""), unit)
+    raise InputError(entry, f"must be {', '.join(fitting)}" + (f"; did you mean {near}?" if near else ""), unit)
