@@ -90,8 +90,10 @@ def spring_return(finger: FingerLike, cord: str | None = None) -> SpringReturn:
     crossed = np.flatnonzero(routing.coupling[index])
     names = tuple(routing.joints[joint] for joint in crossed)
     loose = [name for name in names if finger.description.joints[name].spring is None]
-    if loose or not names:
-        raise InputError("finger.joints", f"need a spring to come back, see {', '.join(loose) or 'no joint crossed'}")
+    if not names:
+        raise InputError("cord", "must cross a joint at the same radius in every posture", routing.tendons[index])
+    if loose:
+        raise InputError("finger.joints", f"need a spring to come back, see {', '.join(loose)}")
     positions = _postures(finger, crossed, np.sign(routing.coupling[index]))
     arms, way = np.abs(routing.coupling[index, crossed]), np.sign(routing.coupling[index, crossed])
     needed = way * np.array([finger.static_torque(each) for each in positions])[:, crossed]
@@ -121,8 +123,10 @@ def _index(finger: Finger, cord: str | None) -> int:
     names = routing.tendons[: routing.actuated]
     if routing.passive or finger.description.canals:
         raise InputError("finger.tendons", "must all be actuated, none passive or of a tree: their pull is not known")
+    if not names:
+        raise InputError("finger.tendons", "must have an actuated one, against which springs return")
     if cord is None and len(names) != 1:
-        raise InputError("cord", f"must be one of {', '.join(names) or 'none, for it has no actuated tendon'}")
+        raise InputError("cord", f"must be one of {', '.join(names)}")
     if cord is not None and cord not in names:
         raise InputError("cord", f"must be one of {', '.join(names)}{suggestion(cord, names)}", cord)
     return 0 if cord is None else names.index(cord)

@@ -39,31 +39,32 @@ def with_tighter(scenario: Scenario, factor: float) -> Scenario:
 def left_open(result: xr.Dataset) -> float:
     """Return the largest share of all energy exchanged that the account leaves open; 0 for rounding.
 
-    Of bodies that exchange none, such as one that flies freely, it is the share of the most that is stored.
+    Of bodies that exchange next to none, such as one that falls freely, it is the share of the most that is stored.
     """
-    stored, exchanged = _most(result, STORED), _most(result, SUPPLIED, LOST)
-    residual, most = float(np.abs(result.variables["energy_residual"].values).max()), max(*stored, *exchanged)
+    stored, exchanged = _most(result, STORED), sum(_most(result, SUPPLIED, LOST))
+    residual, most = float(np.abs(result.variables["energy_residual"].values).max()), max(*stored, exchanged)
     if not residual > _ROUNDING * most:
         return 0.0
-    return residual / (sum(exchanged) or most)
+    return residual / (exchanged if _exchanges(result) else most)
 
 
 def _most(result: xr.Dataset, *kinds: str) -> list[float]:
     return [float(np.abs(each.values).max()) for each in entries(result, *kinds).values()]
 
 
-def _compared(result: xr.Dataset) -> str:
-    """Return the name of the energy of which `left_open` is a share."""
-    return "the energy exchanged" if any(_most(result, SUPPLIED, LOST)) else "the energy stored, as none is exchanged"
+def _exchanges(result: xr.Dataset) -> bool:
+    """Return whether the energy exchanged is more than the open part that is allowed of the energy stored."""
+    return sum(_most(result, SUPPLIED, LOST)) > _OPEN * max(_most(result, STORED))
 
 
 def open_account(result: xr.Dataset, share: float) -> str:
     """Return the warning if an energy account leaves more than a ten thousandth open; a share from `left_open`."""
     if not share > _OPEN:
         return ""
+    compared = "exchanged" if _exchanges(result) else "stored, as next to none is exchanged"
     return (
-        f"the energy account closes only to {share:.1g} of {_compared(result)}: an impact, a kink or a quick turn was "
-        "passed too coarsely; try a smaller simulation.rtol and atol_scale"
+        f"the energy account closes only to {share:.1g} of the energy {compared}: an impact, a kink or a quick turn "
+        "was passed too coarsely; try a smaller simulation.rtol and atol_scale"
     )
 
 

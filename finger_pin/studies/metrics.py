@@ -35,6 +35,7 @@ from finger_pin.typing import Array
 
 #: Greatest tension for the metric of the fingertip force, N.
 FORCE_TENSION = 20.0
+_NO_TENDONS = "needs finger.tendons, and there are none: servos and muscles of a tree pull its own cords"
 _NO_REFERENCE = "needs a reference: controller.kind is tensions, and reference.joints is empty"
 
 
@@ -48,6 +49,7 @@ class Metric:
         long_name: Its name in words.
         measure: Takes a run and returns the number. Other processes call it.
         of_reference: Whether it has no meaning without a reference of the joints.
+        of_tendons: Whether it has no meaning without tendons that ideal sources pull, or passive ones.
     """
 
     name: str
@@ -55,6 +57,13 @@ class Metric:
     long_name: str
     measure: Callable[[Run], float]
     of_reference: bool = False
+    of_tendons: bool = False
+
+    def lacks(self, scenario: Scenario) -> str:
+        """Return what the metric needs and a scenario does not have, or nothing."""
+        if self.of_reference and not has_reference(scenario):
+            return _NO_REFERENCE
+        return _NO_TENDONS if self.of_tendons and not scenario.finger.tendons else ""
 
 
 def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
@@ -86,16 +95,14 @@ def metrics_of(scenario: Scenario, names: Iterable[str | Metric] | None = None) 
     """Return metrics by name, or those of `DEFAULT_METRICS` that mean something for a scenario.
 
     Raises:
-        InputError: As `resolve_metrics`, or if one needs a reference that the scenario does not have.
+        InputError: As `resolve_metrics`, or if one needs a reference or tendons that the scenario does not have.
     """
     chosen = resolve_metrics(DEFAULT_METRICS if names is None else names)
-    if has_reference(scenario):
-        return chosen
     if names is None:
-        return tuple(metric for metric in chosen if not metric.of_reference)
+        return tuple(metric for metric in chosen if not metric.lacks(scenario))
     for metric in chosen:
-        if metric.of_reference:
-            raise InputError("metric", _NO_REFERENCE, metric.name)
+        if lacking := metric.lacks(scenario):
+            raise InputError("metric", lacking, metric.name)
     return chosen
 
 
@@ -118,12 +125,12 @@ def _errors(run: Run) -> Array:
 
 def tension_peak(run: Run) -> float:
     """Return the largest tension at either end of any tendon, N: f^a or f^m, f, f5_3 or f5_4."""
-    return float(max(np.max(ends) for ends in _ends(run.result)))
+    return float(max(np.max(ends) for ends in _ends(run) if ends.size))
 
 
 def tension_mean(run: Run) -> float:
     """Return the mean over time and tendons of the delivered tension f, N; of passive tendons f5_4."""
-    return _time_mean(run.result, np.mean(rows(run.result, "tendon_tension", "tendon"), axis=1))
+    return _time_mean(run.result, np.mean(_delivered(run), axis=1))
 
 
 def losses(run: Run) -> float:
@@ -143,7 +150,7 @@ def losses_joints(run: Run) -> float:
 
 def slack_time(run: Run) -> float:
     """Return the time with a tendon, or half of a passive one, without tension at an end, s."""
-    delivered = [np.min(rows(run.result, "tendon_tension", "tendon"), axis=1)]
+    delivered = [np.min(_delivered(run), axis=1)]
     if "spool_tension" in run.result:
         delivered.append(rows(run.result, "spool_tension", "tendon").min(axis=1))
     if "passive_tension_proximal" in run.result:
@@ -194,9 +201,16 @@ def _proximal(result: xr.Dataset) -> Array:
     return values.reshape(len(values), -1)
 
 
-def _ends(result: xr.Dataset) -> list[Array]:
+def _delivered(run: Run) -> Array:
+    """Return f, shape (m, t), N, of a run that has tendons."""
+    if not run.result.sizes["tendon"]:
+        raise InputError("metric", _NO_TENDONS, "tension")
+    return rows(run.result, "tendon_tension", "tendon")
+
+
+def _ends(run: Run) -> list[Array]:
     """Return the tensions at both ends of all tendons; planned ones of passive tendons are no commands."""
-    delivered = rows(result, "tendon_tension", "tendon")
+    result, delivered = run.result, _delivered(run)
     if "spool_tension" in result:
         return [delivered, rows(result, "spool_tension", "tendon")]
     command = rows(result, "tendon_command", "tendon")
@@ -221,12 +235,12 @@ METRICS = {
     for metric in (
         Metric("tracking_rms", "rad", "tracking error, rms over time and joints", tracking_rms, True),
         Metric("tracking_peak", "rad", "largest tracking error of any joint", tracking_peak, True),
-        Metric("tension_peak", "N", "largest tension at either end of any tendon", tension_peak),
-        Metric("tension_mean", "N", "delivered tension, mean over time and tendons", tension_mean),
+        Metric("tension_peak", "N", "largest tension at either end of any tendon", tension_peak, of_tendons=True),
+        Metric("tension_mean", "N", "delivered tension, mean over time and tendons", tension_mean, of_tendons=True),
         Metric("losses", "J", "energy lost, but for the heat in windings", losses),
         Metric("losses_tendons", "J", "energy lost to the friction of the tendons", losses_tendons),
         Metric("losses_joints", "J", "energy lost to the friction of the joints", losses_joints),
-        Metric("slack_time", "s", "time with a slack tendon", slack_time),
+        Metric("slack_time", "s", "time with a slack tendon", slack_time, of_tendons=True),
         Metric("heat", "J", "heat in the windings of the motors", heat),
         Metric("winding_temperature", "degC", "highest temperature of a winding", winding_temperature),
         Metric("fingertip_hysteresis", "m", "fingertip on the way out and back, apart at most", fingertip_hysteresis),

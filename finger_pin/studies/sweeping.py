@@ -51,8 +51,8 @@ def sweep(
         scenario: The scenario to be varied, its name, or the path of a file.
         over: A design, or the values of every key, which make a grid. Keys are those of `load_scenario`; an index as in
             ``environment.fingertip_force[2]`` means one number of a list.
-        metrics: Names of `METRICS`, or custom metrics; by default `DEFAULT_METRICS`, without tracking errors where the
-            scenario has no reference.
+        metrics: Names of `METRICS`, or custom metrics; by default those of `DEFAULT_METRICS` that the scenario has
+            references and tendons for.
         overrides: Entries of the scenario that hold at all points.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
         output: Folder for ``runs.jsonl`` and ``sweep.nc``; by default nothing is kept.

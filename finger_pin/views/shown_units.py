@@ -42,6 +42,12 @@ def joints_by_unit(result: xr.Dataset) -> dict[str, list[str]]:
     return _grouped(("m" if name in slides else "rad", name) for name in names)
 
 
+def shown_joints(result: xr.Dataset) -> dict[str, tuple[float, str]]:
+    """Return the factor and the unit in which figures show the position of each joint, by its name in their order."""
+    units = {joint: unit for unit, joints in joints_by_unit(result).items() for joint in joints}
+    return {str(name): shown_unit(units[str(name)]) for name in result["joint"].values}
+
+
 def actuators_by_unit(result: xr.Dataset, group: str) -> dict[str, list[str]]:
     """Return the names of a tree's actuators by the unit of their forces: N m on hinges, N on slides and tendons.
 

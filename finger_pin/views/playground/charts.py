@@ -40,9 +40,9 @@ class Charts:
         self._times: deque[float] = deque(maxlen=round(_WINDOW / _SAMPLE))
         self._past: deque[tuple[Array, Array, Array]] = deque(maxlen=self._times.maxlen)
         self._contacts = list(session.finger.scene.contacts.names) if session.finger.scene is not None else []
-        self._plots = [(0, self._add(gui, 0, "joint angle, °")), (1, self._add(gui, 1, "tendon tension, N"))]
-        if self._contacts:
-            self._plots.append((2, self._add(gui, 2, "contact force, N")))
+        titles = ("joint angle, °", "tendon tension, N", "contact force, N")
+        names = (self._joints, self._tendons, self._contacts)
+        self._plots = [(k, self._add(gui, k, titles[k])) for k in range(3) if names[k]]
         if self._finger is not None:
             self._finger.on_update(lambda _: self._renew())
 
@@ -88,7 +88,7 @@ class Charts:
             for which, plot in self._plots:
                 plot.data = self._data(which)[0]
         self._friction.content = self._bars(now)
-        if self._scale != self._stage.scale:
+        if self._tendons and self._scale != self._stage.scale:
             self._scale = self._stage.scale
             self._legend.content = _legend(self._scale)
 

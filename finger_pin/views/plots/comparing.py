@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.recording import is_tracking
 from finger_pin.views.plots.lines import names, times, trace
-from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
+from finger_pin.views.plots.panels import NO_TENDONS, labelled, legend, remark, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, styled, thin
+from finger_pin.views.shown_units import shown_joints
 
 
 @styled
@@ -46,16 +47,28 @@ def compare(
     figure, parts = sheet([(4.8, height)] * 3, width, titles)
     start = min(times(result)[0] for result in (first, second))
     end = max(times(result)[-1] for result in (first, second))
-    tracks, degrees = is_tracking(first) or is_tracking(second), 180.0 / np.pi
+    tracks, shown = is_tracking(first) or is_tracking(second), shown_joints(first)
+    factors, angles = np.array([factor for factor, _ in shown.values()]), [unit for _, unit in shown.values()]
+    rates = [f"{unit}/s" for unit in angles]
     columns = (
-        (joints, "°", f"(a) joint angles{', reference dashed' if tracks else ''}", "joint_position", "joint", degrees),
-        (joints, "°", "(b) tracking errors", "tracking_error", "joint", degrees)
+        (
+            joints,
+            angles,
+            f"(a) joint angles{', reference dashed' if tracks else ''}",
+            "joint_position",
+            "joint",
+            factors,
+        ),
+        (joints, angles, "(b) tracking errors", "tracking_error", "joint", factors)
         if tracks
-        else (joints, "°/s", "(b) joint velocities, without a reference", "joint_velocity", "joint", degrees),
-        (tendons, "N", "(c) delivered tensions", "tendon_tension", "tendon", 1.0),
+        else (joints, rates, "(b) joint velocities, without a reference", "joint_velocity", "joint", factors),
+        (tendons, ["N"] * len(tendons), "(c) delivered tensions", "tendon_tension", "tendon", 1.0),
     )
-    for part, (rows, unit, text, variable, coordinate, scale) in zip(parts, columns, strict=True):
-        panels = stack(part, [labelled(name, unit) for name in rows])
+    for part, (rows, units, text, variable, coordinate, scale) in zip(parts, columns, strict=True):
+        if not rows:
+            remark(part, NO_TENDONS)
+            continue
+        panels = stack(part, list(map(labelled, rows, units)))
         title(panels[0], text)
         for result, label, colour in zip((first, second), labels, (BLUE, VERMILLION), strict=True):
             time = times(result)

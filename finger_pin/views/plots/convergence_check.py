@@ -10,7 +10,7 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, times
 from finger_pin.views.plots.panels import legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import GREY, Width, colour, limit_line, styled
-from finger_pin.views.shown_units import joints_by_unit, shown_unit
+from finger_pin.views.shown_units import shown_joints
 
 # A difference changes sign all the time: on a logarithmic axis only its greatest values show something.
 _BINS = 400
@@ -28,8 +28,7 @@ def plot_convergence(result: xr.Dataset, *, width: Width = None, titles: bool = 
         titles: Whether panels have titles.
     """
     figure, (part,) = sheet([(8.0, 4.2)], width, titles)
-    units = {joint: shown_unit(unit) for unit, joints in joints_by_unit(result).items() for joint in joints}
-    factors, shown = zip(*(units[name] for name in names(result, "joint")), strict=True)
+    factors, shown = zip(*shown_joints(result).values(), strict=True)
     (axes,) = stack(part, [f"greatest difference ({' or '.join(dict.fromkeys(shown))})"])
     values = np.abs(np.array(factors) * result["convergence_difference"].transpose("time", "joint").values)
     reached = np.isfinite(values).all(axis=1)

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.analysis import SelfLockingMap, critical_friction
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import series, times
@@ -82,7 +83,13 @@ def plot_runaway(results: dict[str, xr.Dataset], *, width: Width = None, titles:
         results: Datasets of `simulate` by label.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
+
+    Raises:
+        InputError: If one is of a finger without tendons.
     """
+    for label, result in results.items():
+        if not result["tendon_command"].size:
+            raise InputError(f"results.{label}", "must be of a finger with tendons that ideal sources or motors pull")
     figure, (part,) = sheet([(7.5, 5.6)], width, titles)
     top, bottom = part.subplots(2, 1, sharex=True)
     for index, (label, result) in enumerate(results.items()):

@@ -11,10 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from finger_pin.simulation.recording import is_tracking
+from finger_pin.typing import Array
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import bundle, names, passive_proximal, times, trace
-from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
+from finger_pin.views.plots.panels import NO_TENDONS, labelled, legend, remark, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, styled, thin
+from finger_pin.views.shown_units import shown_joints
 
 _DEGREES = 180.0 / np.pi
 _DELIVERED = ("delivered tendon tensions", "tendon_tension", 1.0, "N")
@@ -57,8 +59,9 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
     height = max(6.6, 1.3 * len(tendons))
     figure, (left, right) = sheet([(5.1, height), (5.9, height)], width, titles)
     moves, tracks = bool(np.ptp(result["joint_reference"].values, axis=0).any()), is_tracking(result)
-    below = "error θᵈ \N{MINUS SIGN} θ (°)" if tracks else "velocity (°/s)"
-    angles = stack(left, ["angle θ (°)", below])
+    units = " or ".join(dict.fromkeys(unit for _, unit in shown_joints(result).values()))
+    below = f"error θᵈ \N{MINUS SIGN} θ ({units})" if tracks else f"velocity ({units.replace(' or ', '/s or ')}/s)"
+    angles = stack(left, [f"{'angle' if units == '°' else 'position'} θ ({units})", below])
     constant = "; the references are constant" if tracks and not moves else ""
     title(angles[0], f"(a) joint angles{constant}")
     _joints(angles[0], result, "joint_position")
@@ -68,6 +71,9 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
     title(angles[1], "(b) tracking errors" if tracks else "(b) joint velocities")
     _joints(angles[1], result, "tracking_error" if tracks else "joint_velocity")
     legend(left, lines)
+    if not tendons:
+        remark(right, NO_TENDONS)
+        return figure
     panels = stack(right, [labelled(name, "N") for name in tendons])
     title(panels[0], "(c) tendon tensions")
     _tensions(panels, result)
@@ -77,13 +83,19 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
 
 
 def _joints(axes: Axes, result: xr.Dataset, variable: str) -> None:
-    time, values = times(result), np.rad2deg(result[variable].transpose("time", "joint").values)
+    time, values = times(result), _shown(result, variable)
     bundle(axes, time, values, names(result, "joint"), range(values.shape[1]))
+
+
+def _shown(result: xr.Dataset, variable: str) -> Array:
+    """Return a variable of the joints, shape (m, n), in the units that are shown."""
+    factors = np.array([factor for factor, _ in shown_joints(result).values()])
+    return np.asarray(factors * result[variable].transpose("time", "joint").values)
 
 
 def _references(axes: Axes, result: xr.Dataset) -> Line2D:
     """Draw theta^d of all joints, and return a line that stands for them."""
-    time, values = times(result), np.rad2deg(result["joint_reference"].transpose("time", "joint").values)
+    time, values = times(result), _shown(result, "joint_reference")
     look: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": thin(0.7)}
     return [trace(axes, time, column, label="reference θᵈ", **look) for column in values.T][-1]
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from finger_pin.analysis import Friction, force_polytope, largest_force, tension_for_force
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 from finger_pin.views.plots.axes_3d import AXES, flexion_plane, space
@@ -29,7 +30,7 @@ _BESIDE = 0.02
 
 @styled
 def plot_force_polytope(
-    finger: Finger,
+    finger: FingerLike,
     position: Sequence[float] | Array,
     limit: float | tuple[float, ...],
     *,
@@ -41,12 +42,13 @@ def plot_force_polytope(
     (a) The frictionless polytope in space, (b) the section through zero in the flexion plane for every friction.
 
     Args:
-        finger: A finger with force closure.
+        finger: One finger with force closure, its description, its name, or the path of its file.
         position: theta, shape (n,), rad.
         limit: Greatest f^a, N, one number or one per actuated tendon.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
+    finger = as_finger(finger)
     figure, (left, right) = sheet([(5.5, 5.2), (5.5, 5.2)], width, titles)
     polytope = force_polytope(finger, position, limit)
     axes = space(left, np.vstack([polytope.vertices, np.zeros(3)]), "N")
@@ -54,6 +56,8 @@ def plot_force_polytope(
     axes.add_collection3d(Poly3DCollection(triangles, facecolors=colour(BLUE), alpha=0.18, edgecolors="none"))
     for first, second in polytope.ridges():
         axes.plot(*polytope.vertices[[first, second]].T, color=colour(BLUE), linewidth=thin(0.65))
+    if len(polytope.vertices) == 1:
+        axes.scatter(*polytope.vertices.T, color=colour(BLUE))
     axes.scatter(0.0, 0.0, 0.0, color=colour(BLACK), s=14)
     title(axes, "(a) forces within the tension limits, without friction")
     plane = right.subplots()
@@ -64,7 +68,7 @@ def plot_force_polytope(
 
 @styled
 def plot_radius_sensitivity(
-    finger: Finger,
+    finger: FingerLike,
     position: Sequence[float] | Array,
     force: Sequence[float] | Array,
     *,
@@ -74,12 +78,13 @@ def plot_radius_sensitivity(
     """Draw the derivative of the tension for a fingertip force by every winding radius, N/mm, without friction.
 
     Args:
-        finger: A finger with force closure.
+        finger: One finger with force closure, its description, its name, or the path of its file.
         position: theta, shape (n,), rad.
         force: E, shape (3,), N, base frame.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
+    finger = as_finger(finger)
     needed = tension_for_force(finger, position, force)
     names = [
         (f"{name}, {joint}", 1e-3 * needed.by_radius[row, finger.routing.joints.index(joint)])

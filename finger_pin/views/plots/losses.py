@@ -9,8 +9,19 @@ from matplotlib.figure import Figure, SubFigure
 from finger_pin.typing import Array
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, shade, times, trace
-from finger_pin.views.plots.panels import cut_spikes, flatten_rounding, labelled, legend, sheet, stack, title
+from finger_pin.views.plots.panels import (
+    NO_TENDONS,
+    cut_spikes,
+    flatten_rounding,
+    labelled,
+    legend,
+    remark,
+    sheet,
+    stack,
+    title,
+)
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, styled, thin
+from finger_pin.views.shown_units import joints_by_unit
 
 _COLUMNS = (("tendon friction", "tendon_friction", 1.0, "N"), ("joint friction", "joint_friction", 1e3, "mN m"))
 
@@ -48,6 +59,8 @@ def plot_losses(result: xr.Dataset, finger: str | None = None, *, width: Width =
 
 def _tendons(part: SubFigure, result: xr.Dataset) -> None:
     time, tendons = times(result), names(result, "tendon")
+    if not tendons:
+        return remark(part, NO_TENDONS)
     entering = "spool_tension" if "spool_tension" in result else "tendon_command"
     before = result[entering].transpose("time", "tendon").values
     after = result["tendon_tension"].transpose("time", "tendon").values
@@ -67,7 +80,8 @@ def _joints(part: SubFigure, result: xr.Dataset) -> None:
         1e3 * result[name].transpose("time", "joint").values
         for name in ("joint_torque_command", "joint_torque", "joint_friction")
     )
-    panels = stack(part, [labelled(name, "mN m") for name in joints])
+    slides = joints_by_unit(result).get("m", [])
+    panels = stack(part, [labelled(name, "mN" if name in slides else "mN m") for name in joints])
     for index, axes in enumerate(panels):
         trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=thin())
         net = torque[:, index] - friction[:, index]

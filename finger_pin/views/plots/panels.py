@@ -14,7 +14,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from finger_pin.typing import Array
-from finger_pin.views.plots.style import Width, inches, new_figure, power_of_ten, settings
+from finger_pin.views.plots.style import GREY, Width, colour, inches, new_figure, power_of_ten, settings
 
 # Panels are drawn at this share of their width before they go below each other.
 _NARROWEST = 0.62
@@ -23,6 +23,9 @@ _LOWER = 0.82
 
 # Most letters in a line of a strip's label.
 _LINE = 13
+
+#: Said where tensions of tendons would be drawn.
+NO_TENDONS = "no tensions: no tendon is passive, or pulled by an ideal source or a motor"
 
 # What is below this in the unit of a panel is zero.
 _ROUNDING = 1e-9
@@ -102,6 +105,13 @@ def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[flo
     panels[-1].set_xlabel("time (s)")
     part.align_ylabels(panels)
     return panels
+
+
+def remark(part: Figure | SubFigure, text: str) -> None:
+    """Write in the middle of a part why nothing is drawn there."""
+    axes = part.subplots()
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, textwrap.fill(text, 3 * _LINE), transform=axes.transAxes, ha="center", color=colour(GREY))
 
 
 def title(axes: Axes, text: str) -> None:

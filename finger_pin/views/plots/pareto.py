@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from finger_pin.exceptions import InputError
 from finger_pin.views.plots.panels import grid, legend, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin
 from finger_pin.views.shown_units import in_shown_units
@@ -34,7 +35,12 @@ def plot_pareto(result: xr.Dataset, *, width: Width = None, titles: bool = True)
         result: Dataset of `optimise`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
+
+    Raises:
+        InputError: If the Dataset is of another kind.
     """
+    if "minimise" not in result.attrs:
+        raise InputError("result", "must be of optimise")
     result = in_shown_units(result)
     names = [name for kind in ("minimise", "maximise") for name in result.attrs[kind].split(", ") if name]
     if len(names) == 1:

@@ -44,13 +44,24 @@ R = TypeVar("R")
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Return a function that draws in this style, beneath the user's own settings of matplotlib."""
+    """Return a function that draws in this style, beneath the user's own settings of matplotlib.
+
+    It refuses a Dataset that lacks a variable, as one of another kind or with some variables only does.
+    """
 
     @wraps(draw)
     def drawn(*arguments: P.args, **options: P.kwargs) -> R:
         style = {**STYLE, "font.size": _TEXT if options.get("width") is None else _SMALL_TEXT}
         with matplotlib.rc_context({key: each for key, each in style.items() if settings[key] == _DEFAULTS[key]}):
-            return draw(*arguments, **options)
+            try:
+                return draw(*arguments, **options)
+            except KeyError as error:
+                # xarray's; what is missing may be in `error` under no other name than in its sentence.
+                _, found, after = str(error.args[0]).partition("No variable named '")
+                if not found:
+                    raise
+                name = after.partition("'")[0]
+                raise InputError(f"result.{name}", f"is missing, and {draw.__name__} draws it") from None
 
     return drawn
 

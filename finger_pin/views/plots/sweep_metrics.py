@@ -13,6 +13,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullLocator
 
+from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 from finger_pin.views.plots.panels import grid, heading, labelled, plain, title
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, Width, colour, inches, new_figure, styled
@@ -42,7 +43,12 @@ def plot_sweep(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
         result: Dataset of `sweep`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
+
+    Raises:
+        InputError: If the Dataset is of another kind.
     """
+    if "status" not in result:
+        raise InputError("result", "must be of sweep")
     keys = [str(name) for name in result.coords]
     result = _numbered(in_shown_units(result))
     if "sample" not in result.dims:
