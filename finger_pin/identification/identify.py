@@ -25,6 +25,7 @@ from finger_pin.identification.prediction import check_predictable, predictions
 from finger_pin.identification.problem import Problem, Stopped
 from finger_pin.identification.recordings import read_recording
 from finger_pin.identification.result_dataset import results, write_results
+from finger_pin.identification.scenario_parameters import key_in
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.studies.fingerprint import digest as content_digest
 from finger_pin.typing import Array
@@ -104,7 +105,8 @@ def identify(
     other_laws(problem, settings)
     check_predictable(scenario, held_out, custom_finger)
     for name in dict.fromkeys(each.recording.name for each in problem.models):
-        doubts = (each.doubt(problem.keys) for each in problem.models if each.recording.name == name)
+        keys = [key_in(key, name) for key in problem.keys]
+        doubts = (each.doubt(keys) for each in problem.models if each.recording.name == name)
         doubt = next(filter(None, doubts), "")
         if doubt:
             warnings.warn(doubt, ScenarioWarning, stacklevel=2)

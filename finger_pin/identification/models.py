@@ -40,6 +40,8 @@ def build_problem(
 def held_out_rows(recording: Recording) -> NDArray[np.bool_]:
     """Return a mask of the rows of a recording that are not fitted, shape (m,)."""
     part, time = recording.settings.held_out, recording.time
+    if isinstance(part, dict):
+        return recording.held_out
     return np.full(len(time), part) if isinstance(part, bool) else (time >= part[0]) & (time <= part[1])
 
 

@@ -19,7 +19,7 @@ from finger_pin.identification.misfit import scatter as scatter_of
 from finger_pin.identification.models import held_out_rows, recording_models
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import Recording, read_recording
-from finger_pin.identification.scenario_parameters import bare, owner
+from finger_pin.identification.scenario_parameters import acts_on, bare, owner
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
@@ -147,7 +147,7 @@ def _problem(
     def acts(key: str) -> bool:
         of_column = bare(key).rpartition(".")[0] in {*recording.inputs, *recording.outputs}
         acting = bare(key).partition(".")[0] in Scenario.model_fields or of_column
-        return owner(key) is None or (owner(key) == recording.name and acting)
+        return owner(key) is None or (acts_on(key, recording.name) and acting)
 
     kept = [k for k, key in enumerate(result["parameter"].values) if acts(str(key))]
     estimate, upper, low, high = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,15 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.limits import Limits
 from finger_pin.identification.recordings import At, RecordedSignal, RecordingModel, unit_of
-from finger_pin.identification.scenario_parameters import ScenarioPart, check_apart, is_of_scenario, owner
+from finger_pin.identification.scenario_parameters import (
+    ScenarioPart,
+    acts_on,
+    check_apart,
+    check_single,
+    is_of_scenario,
+    key_in,
+    owner,
+)
 from finger_pin.typing import Array
 
 # Tolerances of fine and rough runs over the scenario's, and the number of means of every output that rough searches
@@ -76,6 +84,7 @@ class Problem:
         self.units = {
             f"{each.name}.{name}": unit_of(name) for each in recordings for name in (*each.inputs, *each.outputs)
         }
+        check_single(self.keys, dict.fromkeys(each.name for each in recordings))
         self._numbers = np.array(
             [k for k, key in enumerate(self.keys[: self.asked]) if is_of_scenario(key, self.units)], dtype=int
         )
@@ -93,14 +102,13 @@ class Problem:
         # Of recordings that are alike in what limits parameters one is enough.
         by_recording = {model.recording.name: k for k, model in reversed(list(enumerate(self.models)))}
         constraining = {m.recording.name for m in self.models if m.recording.settings.values} | {
-            *filter(None, map(owner, keys))
+            name for name in by_recording for key in keys if owner(key) and acts_on(key, name)
         }
         parts = [self._parts[k] for k in sorted({0, *(by_recording[name] for name in constraining)})]
         self._limits = Limits.from_parts(parts, keys, self.low[self._numbers], self.high[self._numbers])
         known: dict[str, Any] = {nuisance.key: nuisance.start for nuisance in further}
         for part_of_recording in reversed(parts):
-            values = part_of_recording.family.values
-            known |= {keys[k]: value for k, value in zip(part_of_recording.places, values, strict=True)}
+            known |= zip([keys[k] for k in part_of_recording.places], part_of_recording.family.values, strict=True)
         neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
         middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
         known_values = [known.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
@@ -243,32 +251,24 @@ class Problem:
         """Return the scenario at given values, and the numbers of recordings themselves, for every model."""
         others = sorted({*range(len(self.keys))} - {*self._numbers.tolist()})
 
-        def of(part: ScenarioPart) -> At:
+        def of(part: ScenarioPart, recording: str) -> At:
+            keys = [(k, key_in(self.keys[k], recording)) for k in others]
+
             def at(values: Array) -> tuple[Scenario, dict[str, float]]:
-                return part.at(values[self._numbers]), {self.keys[k]: float(values[k]) for k in others}
+                return part.at(values[self._numbers]), {key: float(values[k]) for k, key in keys}
 
             return at
 
-        return [of(part) for part in self._parts]
+        return [of(part, model.recording.name) for part, model in zip(self._parts, self.models, strict=True)]
 
     def subset(self, kept: Sequence[NDArray[np.bool_]]) -> Problem:
         """Return the problem with some of the samples of every signal."""
+        by_sample = ("measured", "rows", "instant", "load", "replicate")
         signals = [
-            RecordedSignal(
-                s.recording,
-                s.name,
-                s.unit,
-                s.measured[k],
-                s.rows[k],
-                s.instant[k],
-                s.load[k],
-                s.replicate[k],
-                s.ordered,
-            )
-            for s, k in zip(self.signals, kept, strict=True)
+            replace(signal, **{name: getattr(signal, name)[samples] for name in by_sample})
+            for signal, samples in zip(self.signals, kept, strict=True)
         ]
-        asked = slice(0, self.asked)
-        bounds = (self.keys[asked], self.low[asked], self.high[asked])
+        bounds = self.keys[: self.asked], self.low[: self.asked], self.high[: self.asked]
         return Problem(self.scenario, *bounds, self.models, signals, self.fixed, self.stop)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.recordings.bench import Column, RecordingSettings
 from finger_pin.description.recordings.columns import Table
-from finger_pin.description.recordings.csv_files import chosen_rows, read_columns
+from finger_pin.description.recordings.csv_files import chosen_rows, read_columns, row_mask
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
 from finger_pin.exceptions import InputError
@@ -90,6 +90,7 @@ class Recording:
         time: Of a motion, shape (m,), s, from zero.
         speed: Of steady readings, shape (m,), m/s.
         in_si: Names of inputs and outputs that are read as SI because nothing names their unit.
+        held_out: Rows that are held out by a column, shape (m,); empty where none are.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Recording:
     time: Array
     speed: Array
     in_si: frozenset[str] = frozenset()
+    held_out: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def repeats(self, other: Recording) -> bool:
         """Return whether this is a motion like another one, with equal times, inputs, values and start."""
@@ -172,12 +174,17 @@ def read_recording(
         raise InputError(f"{entry}.file", "is missing: the path of a CSV file")
     path = Path(str(settings.file))
     columns = read_columns(f"{entry}.file {path.name}", path, settings) if data is None else data
-    table = Table(entry, chosen_rows(entry, columns, settings.rows))
-
+    columns = chosen_rows(entry, columns, settings.rows)
+    table, held_out = Table(entry, columns), np.zeros(0, dtype=bool)
+    if isinstance(settings.held_out, dict):
+        held_out = row_mask(f"{entry}.held_out", columns, settings.held_out)
+        if held_out.all():
+            raise InputError(f"{entry}.held_out", "leaves no row to be fitted; write true", settings.held_out)
     time = np.zeros(table.rows)
     if settings.time is not None:
         time = table.times("time", settings.time, settings.repeated_times)
         time = time - time[0]
+        held_out = table.at_instants(held_out) > 0.0 if len(held_out) else held_out
     speed = np.zeros(table.rows)
     if isinstance(settings.speed, Column):
         speed = table.column("speed", settings.speed, "m/s")
@@ -195,6 +202,7 @@ def read_recording(
         frozenset(
             key for key, column in {**settings.inputs, **settings.outputs}.items() if not table.names_unit(column)
         ),
+        held_out,
     )
 
 

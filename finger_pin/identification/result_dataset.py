@@ -14,7 +14,6 @@ import xarray as xr
 
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
-from finger_pin.description.recordings.bench import OF_RECORDINGS
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
 from finger_pin.identification.comparison import LawComparison
@@ -22,7 +21,7 @@ from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, free_directions
 from finger_pin.identification.misfit import outliers, repeats
 from finger_pin.identification.problem import Problem, minus_twice_likelihood
-from finger_pin.identification.scenario_parameters import bare, owner
+from finger_pin.identification.scenario_parameters import bare, column_of, owner
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.keys import describe
 from finger_pin.typing import Array
@@ -133,10 +132,10 @@ def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Profi
 
 
 def _units(problem: Problem, key: str) -> str:
-    unit = problem.units.get(key.removeprefix(OF_RECORDINGS).rpartition(".")[0])
-    if unit is None:
+    column = column_of(key, problem.units)
+    if column is None:
         return describe(bare(key))["units"]
-    return {"offset": unit, "delay": "s"}.get(key.rpartition(".")[2], "1")
+    return {"offset": problem.units[column], "delay": "s"}.get(key.rpartition(".")[2], "1")
 
 
 def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +56,7 @@ class ScenarioPart:
         Raises:
             InputError: If the scenario has no such key.
         """
-        places = [k for k, key in enumerate(keys) if owner(key) in (None, recording)]
+        places = [k for k, key in enumerate(keys) if acts_on(key, recording)]
         for key in (keys[k] for k in places if owner(keys[k])):
             try:
                 ParametrisedScenario(scenario, (bare(key),))
@@ -73,8 +74,34 @@ def nuisance_value(
 
 
 def owner(key: str) -> str | None:
-    """Return the recording that a parameter is of; None if all share it."""
+    """Return the recording that a parameter is of, or the pattern of several; None if all share it."""
     return key.split(".")[1] if key.startswith(OF_RECORDINGS) else None
+
+
+def acts_on(key: str, recording: str) -> bool:
+    """Return whether a parameter is shared, of a recording, or of several of which this is one."""
+    pattern = owner(key)
+    return pattern is None or fnmatchcase(recording, pattern)
+
+
+def key_in(key: str, recording: str) -> str:
+    """Return the key of a parameter of several recordings in one of them; any other key as it is."""
+    return f"{OF_RECORDINGS}{recording}.{bare(key)}" if owner(key) and acts_on(key, recording) else key
+
+
+def check_single(keys: Sequence[str], recordings: Iterable[str]) -> None:
+    """Refuse two parameters that are one number of a recording.
+
+    Raises:
+        InputError: Naming one of them.
+    """
+    for recording in recordings:
+        known: dict[str, str] = {}
+        for key in keys:
+            one = key_in(key, recording)
+            if one in known:
+                raise InputError(entry_of(key), f"is found for {recording} as {known[one]} too; leave out one of them")
+            known[one] = key
 
 
 def bare(key: str) -> str:
@@ -85,9 +112,16 @@ def bare(key: str) -> str:
 def entry_of(key: str) -> str:
     """Return the entry of a bench that a parameter stands at."""
     recording = owner(key)
-    return (
-        f"identify.parameters.{key}" if recording is None else f"identify.recordings.{recording}.parameters.{bare(key)}"
-    )
+    shared = recording is None or {*"*?["} & {*recording}
+    return f"identify.parameters.{key}" if shared else f"identify.recordings.{recording}.parameters.{bare(key)}"
+
+
+def column_of(key: str, columns: Iterable[str]) -> str | None:
+    """Return the first column, with its recording, whose offset, scale or delay a parameter is; None if it is none."""
+    name, _, what = bare(key).rpartition(".")
+    parts = ((each, *each.split(".", 1)) for each in columns)
+    known = (each for each, recording, column in parts if column == name and acts_on(key, recording))
+    return next(known, None) if owner(key) and what in OF_COLUMNS else None
 
 
 def is_of_scenario(key: str, columns: Iterable[str]) -> bool:
@@ -100,12 +134,11 @@ def is_of_scenario(key: str, columns: Iterable[str]) -> bool:
     Raises:
         InputError: If it is neither.
     """
-    recording = owner(key)
-    name, _, what = key.removeprefix(OF_RECORDINGS).rpartition(".")
     known = sorted(columns)
-    if recording is None or (what in OF_COLUMNS and name in known):
-        return recording is None
-    if any(each.startswith(f"{recording}.") for each in known) and bare(key).partition(".")[0] in Scenario.model_fields:
+    if owner(key) is None or column_of(key, known):
+        return owner(key) is None
+    there = any(acts_on(key, each.partition(".")[0]) for each in known)
+    if there and bare(key).partition(".")[0] in Scenario.model_fields:
         return True
     allowed = f"must be a key of the scenario, or variable.label and .{', '.join(OF_COLUMNS)}; there are"
     raise InputError(entry_of(key), f"{allowed} {', '.join(known)}")
@@ -118,7 +151,7 @@ def check_apart(recording: str, settings: RecordingSettings, keys: Sequence[str]
         InputError: Naming the recording's entry.
     """
     shared = [key for key in keys if owner(key) is None]
-    recording_keys = [bare(key) for key in keys if owner(key) == recording]
+    recording_keys = [bare(key) for key in keys if owner(key) and acts_on(key, recording)]
     for group, names in (("values", settings.values), ("parameters", recording_keys)):
         for key in names:
             hidden = next((each for each in shared if _overlap(key, each)), None)

@@ -145,3 +145,74 @@ def test_what_cannot_be_held_out_is_refused_in_one_line_before_any_work(held, sa
 def test_recordings_of_which_none_is_fitted_are_refused():
     with pytest.raises(fp.InputError, match="are all held out"):
         found({"a": steady(held_out=True)}, {"a": table(1, [2.0, 3.0])})
+
+
+def line(tables):
+    """Slope and zero of out over in by least squares."""
+    load, out = (np.concatenate([each[name] for each in tables]) for name in ("in", "out"))
+    return np.linalg.lstsq(np.stack([load, np.ones(load.size)], axis=1), out, rcond=None)[0]
+
+
+def test_a_zero_that_recordings_share_is_one_number_and_counts_where_one_is_held_out():
+    loads, zeros = [3.0, 6.0, 9.0], {"cell_a": 0.5, "cell_b": 0.5, "cell_c": 0.5, "other": -0.2}
+    data = {name: table(10 + k, loads) for k, name in enumerate(zeros)}
+    for name, zero in zeros.items():
+        data[name]["out"] = data[name]["out"] + zero
+    recordings = {"cell_a": steady(), "cell_b": steady(), "cell_c": steady(held_out=True)}
+    shared = {COULOMB: (0.01, 1.0), "recordings.cell_*.tendon_tension.T1.offset": (-1.0, 1.0)}
+    result = found(recordings, data, parameters=shared)
+    share, zero = line([data["cell_a"], data["cell_b"]])
+    # The noise of every recording is estimated, so that the line is weighed by it.
+    np.testing.assert_allclose(np.exp(-float(result.estimate[0]) * TURN), share, atol=2e-3)
+    np.testing.assert_allclose(result.estimate[1], zero, atol=0.02)
+    assert str(result.units[1].values) == "N" and result.sizes["parameter"] == 2
+    predicted = float(result.estimate[1]) + np.exp(-float(result.estimate[0]) * TURN) * data["cell_c"]["in"]
+    np.testing.assert_allclose(result.predicted_value, predicted, rtol=1e-9)
+    again = fp.predict(result, {"other": steady()}, data=data)
+    np.testing.assert_allclose(again.predicted_value, predicted - float(result.estimate[1]), rtol=1e-9)
+
+
+def test_rows_of_a_table_are_held_out_by_a_column():
+    data = table(20, [3.0, 6.0, 9.0, 12.0])
+    data |= {"out": data["out"] + 0.4, "day": np.tile(["mon", "tue", "wed", "thu"], 4).tolist()}
+    zero = {"tendon_tension.T1.offset": (-1.0, 1.0)}
+    result = found({"all": steady(held_out={"day": ["tue", "thu"]}, parameters=zero)}, {"all": data})
+    apart = np.isin(data["day"], ["tue", "thu"])
+    slope, offset = line([{name: data[name][~apart] for name in ("in", "out")}])
+    np.testing.assert_allclose(
+        [np.exp(-float(result.estimate[0]) * TURN), result.estimate[1]], [slope, offset], rtol=1e-5
+    )
+    np.testing.assert_allclose(result.predicted_value, slope * data["in"][apart] + offset, rtol=1e-5)
+    np.testing.assert_array_equal(result.predicted_measured, data["out"][apart])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "more", "said"),
+    [
+        (
+            {"recordings.x*.tendon_tension.T1.offset": (-1.0, 1.0)},
+            {},
+            "identify.parameters.recordings.x*.tendon_tension",
+        ),
+        (
+            {"recordings.*.tendon_tension.T2.offset": (-1.0, 1.0)},
+            {},
+            "identify.parameters.recordings.*.tendon_tension.T2",
+        ),
+        (
+            {"recordings.*.tendon_tension.T1.offset": (-1.0, 1.0)},
+            {"parameters": {"tendon_tension.T1.offset": (-1.0, 1.0)}},
+            "is found for a as recordings.*.tendon_tension.T1.offset too",
+        ),
+        ({}, {"held_out": {"day": "fri"}}, 'a.held_out.day = "fri": no row has it; there are mon, tue'),
+        ({}, {"held_out": {"days": "mon"}}, "a.held_out.days: no such column"),
+        ({}, {"held_out": {"day": ["mon", "tue"]}}, "leaves no row to be fitted"),
+        ({}, {"held_out": {"day": []}}, "must be a number or word of that column"),
+        ({}, {"held_out": {}}, "must name a column"),
+    ],
+)
+def test_shared_zeros_and_rows_that_are_not_there_are_refused_in_one_line(parameters, more, said):
+    data = table(1, [2.0, 3.0]) | {"day": ["mon", "tue"] * 4}
+    with pytest.raises(fp.InputError) as refused:
+        found({"a": steady(**more)}, {"a": data}, parameters={COULOMB: (0.01, 1.0), **parameters})
+    assert said in str(refused.value) and "\n" not in str(refused.value)

@@ -15,8 +15,16 @@ OF_RECORDINGS = "recordings."
 Bounds = dict[str, Annotated[tuple[float, float], vector(2)]]
 
 
-def _held_out(value: Any) -> bool | tuple[float, float]:
+def _held_out(value: Any) -> bool | tuple[float, float] | dict[str, Any]:
     if isinstance(value, bool):
+        return value
+    if isinstance(value, dict):
+        for name, cells in value.items():
+            listed = cells if isinstance(cells, list | tuple) else [cells]
+            if not listed or not {*map(type, listed)} <= {int, float, str}:
+                raise problem(name, "must be a number or word of that column, or a list of them", cells)
+        if not value:
+            raise problem("", "must name a column", value)
         return value
     numbers = isinstance(value, list | tuple) and len(value) == 2 and {*map(type, value)} <= {int, float}
     if not numbers or not 0.0 <= value[0] < value[1] < math.inf:
@@ -97,8 +105,10 @@ class RecordingSettings(TableFormat):
     values: dict[str, Any] = Field({}, description="By dotted key of the scenario, what holds for this one alone.")
     parameters: Bounds = Field({}, description="As identify.parameters, what is found for this one alone.")
 
-    held_out: Annotated[bool | tuple[float, float], BeforeValidator(_held_out)] = Field(
-        False, description="Whether it, or what lies between two times in s from its start, is predicted, not fitted."
+    held_out: Annotated[bool | tuple[float, float] | dict[str, Any], BeforeValidator(_held_out)] = Field(
+        False,
+        description="Whether it is predicted, not fitted; or its part between two times, s from its start; or by "
+        "column the number or word, or a list of them, in such rows.",
     )
 
     @model_validator(mode="after")

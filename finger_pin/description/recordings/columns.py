@@ -84,7 +84,10 @@ class Table:
         Raises:
             InputError: If there is no such column, a cell is no number, or the unit does not fit.
         """
-        values = self._all_rows(key, column, si, missing=missing)
+        return self.at_instants(self._all_rows(key, column, si, missing=missing))
+
+    def at_instants(self, values: NDArray[Any]) -> NDArray[np.float64]:
+        """Return numbers of all rows, or where several have one time the means of those."""
         return values if self._instants is None else _means(values, self._instants)
 
     def _all_rows(self, key: str, column: Column, si: str, *, missing: bool = False) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
 from finger_pin.description.validation import Description, choice, problem, quantity, suggestion
@@ -105,19 +106,32 @@ def chosen_rows(entry: str, columns: Mapping[str, Any], rows: Mapping[str, float
     """
     if not rows:
         return columns
+    chosen = np.flatnonzero(row_mask(f"{entry}.rows", columns, rows))
+    return {name: [cells[k] for k in chosen] for name, cells in columns.items()}
+
+
+def row_mask(entry: str, columns: Mapping[str, Any], rows: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Return the rows of columns in which all that are named have a number or word, or one of a list; shape (m,).
+
+    Raises:
+        InputError: If there is no such column, or no such row.
+    """
     chosen = np.ones(len(next(iter(columns.values()))), dtype=bool)
     for name, value in rows.items():
         if name not in columns:
             allowed = f"no such column; there are {', '.join(columns)}{suggestion(name, columns)}"
-            raise InputError(f"{entry}.rows.{name}", allowed)
-        here = np.array([cell == value for cell in columns[name]])
-        if not here.any():
-            cells = list(dict.fromkeys(str(cell) for cell in columns[name]))[:12]
-            raise InputError(f"{entry}.rows.{name}", f"no row has it; there are {', '.join(cells)}", value)
+            raise InputError(f"{entry}.{name}", allowed)
+        cells, here = columns[name], np.zeros(len(chosen), dtype=bool)
+        for one in value if isinstance(value, list | tuple) else [value]:
+            equal = np.array([cell == one for cell in cells])
+            if not equal.any():
+                known = list(dict.fromkeys(str(cell) for cell in cells))[:12]
+                raise InputError(f"{entry}.{name}", f"no row has it; there are {', '.join(known)}", one)
+            here |= equal
         chosen &= here
     if not chosen.any():
-        raise InputError(f"{entry}.rows", "no row has all of them")
-    return {name: [cells[k] for k in np.flatnonzero(chosen)] for name, cells in columns.items()}
+        raise InputError(entry, "no row has all of them")
+    return chosen
 
 
 def _cell(cell: str) -> float | str:
