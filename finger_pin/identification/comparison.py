@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.exceptions import InputError
 from finger_pin.identification.estimate import Fit, fit
-from finger_pin.identification.problem import Problem, minus_twice_likelihood
+from finger_pin.identification.likelihood import minus_twice_likelihood
+from finger_pin.identification.problem import Problem
 from finger_pin.typing import Array
 
 #: Name of the law that the scenario has as it stands.
@@ -67,7 +68,8 @@ def compare_laws(problem: Problem, settings: IdentifySettings, minimum: Fit) -> 
     for name, law in [(DESCRIBED, problem), *other_laws(problem, settings).items()]:
         best = minimum if law is problem else _best(law, minimum.weights, _places(law, problem, minimum.z))
         size = float(sum(w * len(e) for e, w in zip(best.residuals, minimum.weights, strict=True)))
-        value = minus_twice_likelihood(best.residuals, minimum.weights, law.groups) + law.asked * math.log(size)
+        misfit = minus_twice_likelihood(best.residuals, minimum.weights, law.groups, law.least_noise)
+        value = misfit + law.asked * math.log(size)
         values = dict(zip(law.keys[: law.asked], law.values(best.z).tolist(), strict=False))
         out = _held_out(law, best, minimum, folds)
         rows.append((name, law.asked, value, _scaled_rms(best.residuals, minimum.noise), out, values))

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.stats import norm
 
-from finger_pin.identification.problem import Problem, minus_twice_likelihood, pooled
+from finger_pin.identification.likelihood import minus_twice_likelihood, pooled
+from finger_pin.identification.problem import Problem
 from finger_pin.typing import Array
 
 # Rounds of weights, steps in a round, and trials in a row that may fail.
@@ -201,7 +202,7 @@ def _objective(problem: Problem, counted: Sequence[Array], shares: Array, scale:
     Where outliers count less their noise is that of the scale: an rms would be theirs.
     """
     if loss == "linear":
-        return minus_twice_likelihood(counted, shares, problem.groups)
+        return minus_twice_likelihood(counted, shares, problem.groups, problem.least_noise)
     by_signal = zip(counted, shares, scale, strict=True)
     return float(sum(w * (e @ e / s**2 + 2.0 * len(e) * math.log(s)) for e, w, s in by_signal))
 
@@ -236,8 +237,8 @@ def _counted(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[
 
 def best_of(problem: Problem, fits: Sequence[Fit]) -> Fit:
     """Return the minimum of least misfit with equal weights."""
-    equal_weights = np.ones(len(problem.signals))
-    return min(fits, key=lambda candidate: minus_twice_likelihood(candidate.residuals, equal_weights, problem.groups))
+    equal_weights, noise = np.ones(len(problem.signals)), (problem.groups, problem.least_noise)
+    return min(fits, key=lambda candidate: minus_twice_likelihood(candidate.residuals, equal_weights, *noise))
 
 
 def information(problem: Problem, minimum: Fit) -> Array:
@@ -256,12 +257,12 @@ def typical(problem: Problem, residuals: Sequence[Array]) -> Array:
 
 
 def _noise(problem: Problem, residuals: Sequence[Array], robust: bool = False) -> Array:
-    """Return the rms of the residuals of every output, or that of their median, never less than its rounding."""
+    """Return the rms of the residuals of every output, or that of their median; never below its least, or rounding."""
     groups = problem.groups
     count, square = pooled(residuals, np.ones(len(residuals)), groups)
     rms = typical(problem, residuals) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
-    least = [1e-9 * max(float(np.max(np.abs(s.measured), initial=0.0)), 1e-9) for s in problem.signals]
-    return np.maximum(rms, least)
+    rounding = [1e-9 * max(float(np.max(np.abs(s.measured), initial=0.0)), 1e-9) for s in problem.signals]
+    return np.maximum(rms, np.maximum(problem.least_noise, rounding))
 
 
 def _independent(problem: Problem, residuals: Sequence[Array]) -> tuple[Array, Array]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from finger_pin.identification.checkpoint import Checkpoint, digest
 from finger_pin.identification.comparison import other_laws
 from finger_pin.identification.estimate import LOSSES, fit
 from finger_pin.identification.models import build_problem
+from finger_pin.identification.motions import GREATEST_TOLERANCE
 from finger_pin.identification.pipeline import FitPipeline, Progress, starting_points
 from finger_pin.identification.prediction import check_predictable, predictions
 from finger_pin.identification.problem import Problem, Stopped
@@ -104,12 +106,8 @@ def identify(
     # Before any work: an entry that is wrong in them is refused now.
     other_laws(problem, settings)
     check_predictable(scenario, held_out, custom_finger)
-    for name in dict.fromkeys(each.recording.name for each in problem.models):
-        keys = [key_in(key, name) for key in problem.keys]
-        doubts = (each.doubt(keys) for each in problem.models if each.recording.name == name)
-        doubt = next(filter(None, doubts), "")
-        if doubt:
-            warnings.warn(doubt, ScenarioWarning, stacklevel=2)
+    for doubt in _doubts(problem, scenario):
+        warnings.warn(doubt, ScenarioWarning, stacklevel=2)
     problem.stop = CancelToken(stop)
     asked = digest(
         scenario,
@@ -128,6 +126,19 @@ def identify(
         if output is not None:
             write_results(result, Path(output), bench, problem)
     return result
+
+
+def _doubts(problem: Problem, scenario: Scenario) -> Iterator[str]:
+    """Yield warnings: the first one of every recording, and tolerances that are too coarse for slopes."""
+    for name in dict.fromkeys(each.recording.name for each in problem.models):
+        keys = [key_in(key, name) for key in problem.keys]
+        doubts = (each.doubt(keys) for each in problem.models if each.recording.name == name)
+        yield from itertools.islice(filter(None, doubts), 1)
+    for name in ("rtol", "atol_scale") if problem.moves else ():
+        tolerance = getattr(scenario.simulation, name)
+        if tolerance > GREATEST_TOLERANCE:
+            coarse = f"simulation.{name} = {tolerance:g}: slopes of such runs may err by as much as themselves"
+            yield f"{coarse}; {GREATEST_TOLERANCE:g} or less is fine enough"
 
 
 def _work(

@@ -60,17 +60,20 @@ def sandwich(problem: Problem, minimum: Fit, spread: Array) -> Array:
             continue
         together.update(repeated.signals)
         members = [problem.signals[k] for k in repeated.signals]
+        # Where residuals are smaller than the least noise, that counts.
+        grown = max(1.0, members[0].least_noise ** 2 / (repeated.common + repeated.scatter))
         if members[0].ordered:
             mean = np.mean([minimum.residuals[k] for k in repeated.signals], axis=0)
             shared = np.sum([scores[k] for k in repeated.signals], axis=0)
-            total += repeated.common * _correlated(shared, _process([mean]))
+            total += grown * repeated.common * _correlated(shared, _process([mean]))
             apart = [minimum.residuals[k] - mean for k in repeated.signals]
-            total += repeated.scatter * sum(_correlated(scores[k], _process(apart)) for k in repeated.signals)
+            spread_apart = sum(_correlated(scores[k], _process(apart)) for k in repeated.signals)
+            total += grown * repeated.scatter * spread_apart
         else:
             score, replicate = scores[repeated.signals[0]], members[0].replicate
             sums = np.zeros((replicate.max() + 1, score.shape[1]))
             np.add.at(sums, replicate, score)
-            total += repeated.common * sums.T @ sums + repeated.scatter * score.T @ score
+            total += grown * repeated.common * sums.T @ sums + grown * repeated.scatter * score.T @ score
     for group in np.unique(problem.groups):
         single = [k for k in np.flatnonzero(problem.groups == group).tolist() if k not in together]
         process = _process([minimum.residuals[k] for k in single if problem.signals[k].ordered])

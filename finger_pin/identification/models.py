@@ -89,7 +89,16 @@ def _signal(
     conditions = np.stack([*recording.inputs.values(), recording.speed, recording.time], axis=1)
     replicate = np.unique(conditions[at], axis=0, return_inverse=True)[1].ravel()
     return RecordedSignal(
-        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], replicate, ordered=not steady
+        recording.name,
+        name,
+        unit_of(name),
+        values[at],
+        there,
+        instant[at],
+        load[at],
+        replicate,
+        ordered=not steady,
+        least_noise=recording.settings.outputs[name].least_noise,
     )
 
 

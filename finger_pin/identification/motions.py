@@ -32,8 +32,9 @@ from finger_pin.typing import Array
 # Tolerances of runs for slopes over the scenario's: slopes err by about 1e-2, and a search needs no more, as residuals
 # and slopes are nearly orthogonal at its end.
 _SLOPE_TOLERANCE = 10.0
-# Least and greatest tolerance, unless the scenario's is beyond.
-_LEAST_TOLERANCE, _GREATEST_TOLERANCE = 1e-10, 1e-4
+# Least and greatest tolerance, unless the scenario's is beyond. Beyond the greatest, slopes of `to_and_fro` and
+# `winding` err by as much as themselves; up to it, by a tenth.
+_LEAST_TOLERANCE, GREATEST_TOLERANCE = 1e-10, 1e-4
 # Slope, in ranges of the signal over the range of the parameter, from which on it is made by runs with steps of their
 # own, and the change for that, part of the parameter's range.
 _STEEP, _LARGE_CHANGE = 30.0, 1e-3
@@ -251,7 +252,7 @@ def _tuned(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario with tolerances multiplied by a factor."""
     settings = scenario.simulation
     rtol, atol = (
-        min(max(factor * each, min(each, _LEAST_TOLERANCE)), max(each, _GREATEST_TOLERANCE))
+        min(max(factor * each, min(each, _LEAST_TOLERANCE)), max(each, GREATEST_TOLERANCE))
         for each in (settings.rtol, settings.atol_scale)
     )
     return scenario.updated(simulation={"rtol": rtol, "atol_scale": atol})

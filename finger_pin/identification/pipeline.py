@@ -19,8 +19,9 @@ from finger_pin.identification.checkpoint import Checkpoint
 from finger_pin.identification.comparison import LawComparison, compare_laws
 from finger_pin.identification.estimate import Fit, best_of, fit
 from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, profile
+from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.misfit import sandwich
-from finger_pin.identification.problem import Problem, minus_twice_likelihood
+from finger_pin.identification.problem import Problem
 from finger_pin.identification.scenario_parameters import entry_of
 from finger_pin.typing import Array
 
@@ -91,8 +92,8 @@ class FitPipeline:
 
         def one(item: tuple[int, Problem]) -> None:
             k, twin = item
-            work = partial(fit, twin, self.ledger.reached(f"start {k}", starts[k]), loss=self.loss)
-            minima[k] = self.ledger.fit(f"start {k}", twin, work)
+            start = self.ledger.reached(f"start {k}", starts[k])
+            minima[k] = self.ledger.fit(f"start {k}", twin, partial(fit, twin, start, loss=self.loss))
 
         try:
             self._side_by_side("searching", one, len(starts))
@@ -225,8 +226,9 @@ def starting_points(problem: Problem, count: int, seed: int) -> list[Array]:
 
 def _met(problem: Problem, residuals: Sequence[Array]) -> float:
     """Return minus twice the log-likelihood with equal weights; infinite if a motion fails."""
-    there = all(np.isfinite(each).all() for each in residuals)
-    return minus_twice_likelihood(residuals, np.ones(len(residuals)), problem.groups) if there else np.inf
+    if not all(np.isfinite(each).all() for each in residuals):
+        return np.inf
+    return minus_twice_likelihood(residuals, np.ones(len(residuals)), problem.groups, problem.least_noise)
 
 
 def _check_felt(problem: Problem, fits: Sequence[Fit], places: Sequence[Array]) -> None:

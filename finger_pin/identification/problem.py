@@ -15,6 +15,7 @@ from finger_pin.core.threads import in_threads
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.limits import Limits
 from finger_pin.identification.recordings import At, RecordedSignal, RecordingModel, unit_of
 from finger_pin.identification.scenario_parameters import (
@@ -135,6 +136,11 @@ class Problem:
         order = list(dict.fromkeys(names))
         return np.array([order.index(name) for name in names], dtype=np.intp)
 
+    @property
+    def least_noise(self) -> Array:
+        """The least standard deviation of every signal, shape (s,), in its unit."""
+        return np.array([signal.least_noise for signal in self.signals])
+
     def to_search(self, values: Array) -> Array:
         """Return the search variables of values: logarithms of positive ones."""
         safe = np.where(self.logarithmic, values, 1.0)
@@ -166,7 +172,7 @@ class Problem:
         residuals = self._smooth([s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)])
         if not all(np.isfinite(e).all() for e in residuals):
             return [np.full(len(e), np.inf) for e in residuals]
-        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.groups)
+        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.groups, self.least_noise)
         if objective < self.best[0]:
             self.best = (objective, z.copy())
         return residuals
@@ -282,19 +288,3 @@ def _means(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
     """Return means of consecutive samples."""
     pairs = zip(values, counts, strict=True)
     return [e[: len(e) // n * n].reshape(-1, n, *e.shape[1:]).mean(axis=1) for e, n in pairs]
-
-
-def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Return the number of independent samples of every group of signals, and their mean square."""
-    count, squares = np.zeros((2, int(groups.max(initial=-1)) + 1))
-    for e, w, group in zip(residuals, weights, groups, strict=True):
-        count[group] += w * len(e)
-        squares[group] += w * float(e @ e)
-    return count, squares / np.maximum(count, 1e-300)
-
-
-def minus_twice_likelihood(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> float:
-    """Return the sum of w n log(SSE / n), minus twice the log-likelihood; a noise for each group of signals."""
-    count, square = pooled(residuals, weights, groups)
-    there = count > 0.0
-    return float(np.sum(count[there] * np.log(np.maximum(square[there], 1e-300))))

@@ -65,6 +65,7 @@ class RecordedSignal:
         load: Input of the model there; not a number where there are several.
         replicate: The number of the group of equal readings that each is of, shape (m,).
         ordered: Whether its samples follow each other in time, so that neighbours may err alike.
+        least_noise: Standard deviation that its noise has at least, in its unit.
     """
 
     recording: str
@@ -76,6 +77,7 @@ class RecordedSignal:
     load: Array
     replicate: NDArray[np.intp]
     ordered: bool
+    least_noise: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,9 @@ from finger_pin.files import write_text
 from finger_pin.identification.comparison import LawComparison
 from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, free_directions
+from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.misfit import outliers, repeats
-from finger_pin.identification.problem import Problem, minus_twice_likelihood
+from finger_pin.identification.problem import Problem
 from finger_pin.identification.scenario_parameters import bare, column_of, owner
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.keys import describe
@@ -55,8 +56,8 @@ def results(
         for name in ("parameters", "bic", "rms", "held_out"):
             variables[f"law_{name}"] = ("law", getattr(comparison, name), {"units": "1"})
     # What is met as well as at the ends of the intervals is the same minimum.
-    met = [minus_twice_likelihood(each.residuals, best.weights, problem.groups) for each in fits]
-    least = minus_twice_likelihood(best.residuals, best.weights, problem.groups)
+    met = [minus_twice_likelihood(each.residuals, best.weights, problem.groups, problem.least_noise) for each in fits]
+    least = minus_twice_likelihood(best.residuals, best.weights, problem.groups, problem.least_noise)
     searches_alike = sum(each < least + LEVEL for each in met)
     attrs = {
         "scenario": problem.scenario.name,

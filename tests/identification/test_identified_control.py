@@ -6,9 +6,9 @@ import pytest
 import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.limits import Limits
 from finger_pin.identification.models import build_problem
-from finger_pin.identification.problem import minus_twice_likelihood
 from finger_pin.identification.recordings import read_recording
 from finger_pin.identification.scenario_parameters import ScenarioPart
 
@@ -68,7 +68,8 @@ def test_profiles_follow_a_likelihood_that_errors_of_runs_do_not_make_jump():
     problem, jumps = build_problem(scenario, settings, taken), []
     for each in (problem, problem.fine()):
         along = [problem.start + 1e-6 * k for k in range(9)]
-        met = [minus_twice_likelihood(each.residuals(z), np.ones(len(SEEN)), problem.groups) for z in along]
+        noise = np.ones(len(SEEN)), problem.groups, problem.least_noise
+        met = [minus_twice_likelihood(each.residuals(z), *noise) for z in along]
         jumps.append(np.max(np.abs(np.diff(met, 2))))
     # What is a four-hundredth of the 3.84 that ends an interval is rounding, and may be as large either way.
     assert jumps[1] < max(0.5 * jumps[0], 0.01)

@@ -19,7 +19,8 @@ def stub(residual, slopes, *, ordered=True, replicate=None, weight=1.0):
     settings = SimpleNamespace(values={}, start="rest")
     recording = SimpleNamespace(name="one", settings=settings, inputs={}, time=np.arange(count))
     signal = SimpleNamespace(
-        recording="one", name="out", instant=np.arange(count), replicate=replicate, ordered=ordered, measured=residual
+        **{"recording": "one", "name": "out", "instant": np.arange(count), "replicate": replicate, "ordered": ordered},
+        **{"measured": residual, "least_noise": 0.0},
     )
     problem = SimpleNamespace(
         signals=[signal],

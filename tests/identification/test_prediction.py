@@ -1,10 +1,14 @@
 """Predictions of what was held out, against closed forms, and clear refusals."""
 
+import warnings
+
 import numpy as np
 import pytest
+from scipy.stats import norm
 from scipy.stats import t as student
 
 import finger_pin as fp
+from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.views.report import summarize_identification, write_report
 
 COULOMB = "finger.tendon_friction.coulomb"
@@ -209,6 +213,7 @@ def test_rows_of_a_table_are_held_out_by_a_column():
         ({}, {"held_out": {"day": ["mon", "tue"]}}, "leaves no row to be fitted"),
         ({}, {"held_out": {"day": []}}, "must be a number or word of that column"),
         ({}, {"held_out": {}}, "must name a column"),
+        ({}, {"inputs": {"tendon_command.T1": {"column": "in", "least_noise": 1.0}}}, "is for outputs only"),
     ],
 )
 def test_shared_zeros_and_rows_that_are_not_there_are_refused_in_one_line(parameters, more, said):
@@ -216,3 +221,48 @@ def test_shared_zeros_and_rows_that_are_not_there_are_refused_in_one_line(parame
     with pytest.raises(fp.InputError) as refused:
         found({"a": steady(**more)}, {"a": data}, parameters={COULOMB: (0.01, 1.0), **parameters})
     assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_the_least_noise_of_signals_weighs_them_and_widens_intervals_and_bands():
+    """A line through the origin by two load cells of known noise: weighted least squares with known variances."""
+    rng, cells, data = np.random.default_rng(30), {"fine": (0.05, 0.0), "coarse": (0.2, 0.01)}, {}
+    for name, (_, bias) in cells.items():
+        load = rng.uniform(3.0, 12.0, 200)
+        data[name] = {"in": load, "out": load * (np.exp(-TRUE * TURN) + bias) + rng.normal(0.0, 0.02, load.size)}
+    outputs = {name: {"tendon_tension.T1": {"column": "out", "least_noise": s}} for name, (s, _) in cells.items()}
+    recordings = {name: steady(outputs=columns) for name, columns in outputs.items()}
+    result = found(recordings, data)
+    pairs = [(data[name]["in"] / s, data[name]["out"] / s) for name, (s, _) in cells.items()]
+    information = sum(load @ load for load, _ in pairs)
+    share = sum(load @ out for load, out in pairs) / information
+    np.testing.assert_allclose(result.estimate, [-np.log(share) / TURN], rtol=1e-5)
+    np.testing.assert_array_equal(result.noise, [0.05, 0.2])
+    # mu = -log(share) / turn, and by 400 readings Student's t hardly differs from the normal distribution.
+    deviation = 1.0 / np.sqrt(information) / share / TURN
+    for ends in ((result.lower, result.upper), (result.linear_lower, result.linear_upper)):
+        np.testing.assert_allclose(float(ends[1][0] - ends[0][0]) / (2 * 1.96 * deviation), 1.0, rtol=0.02)
+    later = fp.predict(result, {"coarse": recordings["coarse"]}, data=data)
+    np.testing.assert_allclose(later.predicted_band, 1.96 * 0.2, rtol=0.02)
+    loose = found({name: steady() for name in cells}, data)
+    # Noises that are estimated weigh the coarse cell more.
+    assert abs(float(loose.estimate[0] - result.estimate[0])) > 1e-4
+
+
+def test_a_least_noise_joins_the_estimated_one_smoothly():
+    """By the normal density: minus twice its logarithm at the best deviation that is not below the least."""
+    residuals = [np.array([0.1, -0.2, 0.2])]
+    for least in (0.0, 0.1, np.sqrt(0.03), 0.3, 2.0):
+        deviation = max(least, np.sqrt(0.09 / 3))
+        density = norm.logpdf(residuals[0], scale=deviation).sum() + 1.5 * (1.0 + np.log(2.0 * np.pi))
+        value = minus_twice_likelihood(residuals, np.ones(1), np.zeros(1, dtype=int), np.array([least]))
+        assert value == pytest.approx(-2.0 * density, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_tolerances_that_are_too_coarse_for_slopes_are_told():
+    data = {"first": ramp(3)}
+    for rtol, told in ((1e-3, True), (1e-4, False)):
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            found({"first": motion()}, data, overrides={"simulation.rtol": rtol}, profiles=False)
+        assert any("simulation.rtol = 0.001: slopes of such runs" in str(each.message) for each in seen) == told

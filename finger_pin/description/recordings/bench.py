@@ -60,6 +60,9 @@ class Column(Description):
         max_length=200,
         description="Another column that it is multiplied by: the voltage, V, that a pulse width is a part of.",
     )
+    least_noise: Annotated[float, real(0.0, 1e12)] = quantity(
+        0.0, unit="SI", source="the sensor", doc="Outputs: the standard deviation that the fit must not go below."
+    )
     delay: Annotated[float, real(-10.0, 10.0)] = quantity(
         0.0, unit="s", source="calibration", doc="Delay of the column behind its quantity; motions only."
     )
@@ -116,6 +119,9 @@ class RecordingSettings(TableFormat):
         if self.held_out is True and self.parameters:
             raise problem("parameters", "are for a recording that is fitted, and this one is held out")
         _check_ordered(self.parameters)
+        for name, column in {**{f"inputs.{k}": c for k, c in self.inputs.items()}, "time": self.time}.items():
+            if column is not None and column.least_noise:
+                raise problem(f"{name}.least_noise", "is for outputs only", column.least_noise)
         for key, value in self.values.items():
             if isinstance(value, dict):
                 raise problem(f"values.{key}", "must be one value, not a table: write its dotted key in quotes")
