@@ -1,9 +1,9 @@
 """MJCF of a finger: the part of the model that MuJoCo can express, as text. MuJoCo itself is not needed here.
 
 Exported are the rigid body, the routing, the passive tendons with their lumped mass, the springs of joints, viscous
-friction, gravity and the shapes; on request law (9) too, which MuJoCo then needs `finger_pin.mujoco` for. MuJoCo has no
-counterpart of the stroke limiters (2) and of the cut at zero of a delivered tension (12); they are left out, and the
-file says so at its head.
+friction, gravity and the shapes; on request law (9) too, which MuJoCo then needs `finger_pin.mujoco` for, and soft
+constraints for the stroke limiters (2). MuJoCo has no counterpart of the cut at zero of a delivered tension (12); it is
+left out, and the file says so at its head.
 """
 
 from __future__ import annotations
@@ -15,15 +15,18 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from finger_pin.description.finger import FingerDescription, HandSettings
-from finger_pin.description.loading import DescriptionLike
+from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.parameters import Link
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
+from finger_pin.exchange.mjcf_compliance import soft
 from finger_pin.exchange.mjcf_friction import add_friction_elements
+from finger_pin.exchange.mjcf_tree import tree_to_mjcf
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.urdf import BASE_FRAME, TENSION_LIMIT, TIP_FRAME, exported
+from finger_pin.mechanism.urdf import BASE_FRAME, TENSION_LIMIT, TIP_FRAME, build_rigid_body
+from finger_pin.mechanism.xml_numbers import numbers as _numbers
 from finger_pin.typing import Array
 
 #: Time step, s, of a model without lumped masses.
@@ -43,8 +46,7 @@ _NOTES = """
 {friction}
   Left out, because MuJoCo has no counterpart:{rough}{held}
   - the cut of a delivered tension at zero (viscous drag can make a tendon push when its control is near zero);
-  - the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false", and limited="true" makes them
-    MuJoCo's own soft constraints;
+  - {stops};
   - an external force at the fingertip: apply it to the site "{tip}".{servos}
   Added: controls are clamped to 0 to {limit:g} N; shapes touch other objects, not each other.
 """
@@ -54,6 +56,8 @@ _ROUGH = """
   Friction of tendons and joints (the dynamic friction law) is the plugin "finger_pin.friction": import
   finger_pin.mujoco in Python before loading this file.
 """
+_OPEN = 'the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false"'
+_SOFT = "what stops take of an impact by its depth (Hunt-Crossley); they are critically damped soft constraints"
 _HELD = """
   - what springs of joints and passive tendons hold against their motion (hysteresis);"""
 _SERVOS = """
@@ -73,11 +77,12 @@ def to_mjcf(
     massless: bool = False,
     shapes: bool = True,
     friction: bool = False,
+    limits: bool | None = None,
 ) -> str:
     """Return the MJCF of a finger as text, or of a hand with its palm at rest.
 
     The coordinates are the joints in order, then one slide per passive tendon: its position p_5. Bodies and frames
-    are named as in the URDF. Numbers are written so that reading them gives the same floats.
+    are named as in the URDF, those of a tree as there. Numbers are written so that reading them gives the same floats.
 
     Args:
         description: The finger or hand, its name, the path of its file, or the scenario that has it.
@@ -88,23 +93,31 @@ def to_mjcf(
         massless: Replace each passive tendon by one spring K_t (5): coarser, with steps of 0.1 ms, not microseconds.
         shapes: Whether to write the shapes.
         friction: Whether to write law (9) of tendons and joints, with which the model loads only where
-            `finger_pin.mujoco` has been imported.
+            `finger_pin.mujoco` has been imported. Not of a tree.
+        limits: Whether joints stop at the ends of their ranges, as softly as by (2); by default those of a tree alone.
 
     Raises:
-        InputError: If it is no finger or hand, it has a tree of bodies or a joint without a link, the posture has the
-            wrong size, or the time step is not positive.
+        InputError: If it is no finger or hand, a joint has no link, an entry has no counterpart in MuJoCo, the posture
+            has the wrong size, or the time step is not positive.
     """
-    description = exported(description)
+    description = describe(description.finger if isinstance(description, Scenario) else description)
+    if timestep is not None and not timestep > 0.0:
+        raise InputError("timestep", "must be above 0", timestep)
+    if description.tree.bodies:
+        if friction:
+            allowed = (
+                "of a tree is added by finger_pin.mujoco.add_friction to a mujoco.MjSpec of what is written without"
+            )
+            raise InputError("friction", allowed)
+        return tree_to_mjcf(description, posture, timestep, integrator, limits is not False, shapes)
     tendons = Tendons.from_description(description)
     links = _links(description)
     position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)
     if position.shape != (len(links),):
         raise InputError("posture", f"must be {len(links)} numbers, one per joint", posture)
     step = _stable_step(tendons, massless) if timestep is None else timestep
-    if not step > 0.0:
-        raise InputError("timestep", "must be above 0", timestep)
     root = ET.Element("mujoco", model=description.name)
-    root.append(ET.Comment(_notes(description, tendons, massless, friction)))
+    root.append(ET.Comment(_notes(description, tendons, massless, friction, bool(limits))))
     ET.SubElement(root, "compiler", angle="radian", eulerseq="XYZ")
     option = {"timestep": _numbers(step), "gravity": _numbers(*description.gravity), "integrator": integrator}
     ET.SubElement(root, "option", option)
@@ -112,9 +125,9 @@ def to_mjcf(
         root.append(_materials())
     world = ET.SubElement(root, "worldbody")
     if description.hand is not None:
-        _add_hand(world, description.hand, shapes)
+        _add_hand(world, description.hand, shapes, bool(limits))
     else:
-        _add_links(ET.SubElement(world, "body", name=BASE_FRAME), description, links, shapes)
+        _add_links(ET.SubElement(world, "body", name=BASE_FRAME), description, links, shapes, bool(limits))
     if not massless:
         _add_masses(world, description, tendons)
     _add_tendons(root, tendons, massless)
@@ -126,12 +139,13 @@ def to_mjcf(
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _notes(description: FingerDescription, tendons: Tendons, massless: bool, friction: bool) -> str:
+def _notes(description: FingerDescription, tendons: Tendons, massless: bool, friction: bool, limits: bool) -> str:
     """Return the comment that says what of the description the model has and lacks."""
     notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
     notes |= {"friction": _ROUGH, "rough": ""} if friction else {"friction": "", "rough": _SMOOTH}
     springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
     notes["held"] = _HELD if any(springs) or tendons.hysteresis.any() else ""
+    notes["stops"] = _SOFT if limits else _OPEN
     notes["servos"] = _SERVOS if description.actuators else ""
     if tendons.routing.passive:
         notes["passive"] = _MASSLESS if massless else _MASSIVE
@@ -163,7 +177,7 @@ def _stable_step(tendons: Tendons, massless: bool) -> float:
     return min(TIMESTEP, float(f"{0.8 / fastest:.0e}"))
 
 
-def _add_hand(world: ET.Element, hand: HandSettings, shapes: bool) -> None:
+def _add_hand(world: ET.Element, hand: HandSettings, shapes: bool, limits: bool) -> None:
     """Add the palm and, on it, the fingers; names of a finger begin with its own and a dot."""
     palm = ET.SubElement(world, "body", name="palm")
     if shapes and all(hand.palm.size):
@@ -172,17 +186,27 @@ def _add_hand(world: ET.Element, hand: HandSettings, shapes: bool) -> None:
         placed = hand.fingers[name]
         place = {"pos": _numbers(*placed.position), "euler": _numbers(*placed.orientation)}
         base = ET.SubElement(palm, "body", {"name": f"{name}.{BASE_FRAME}", **place})
-        _add_links(base, finger, _links(finger), shapes, f"{name}.")
+        _add_links(base, finger, _links(finger), shapes, limits, f"{name}.")
 
 
 def _add_links(
-    body: ET.Element, description: FingerDescription, links: dict[str, Link], shapes: bool, prefix: str = ""
+    body: ET.Element,
+    description: FingerDescription,
+    links: dict[str, Link],
+    shapes: bool,
+    limits: bool,
+    prefix: str = "",
 ) -> None:
     """Nest the links: a body's frame is its joint's, the axis is z and the link runs along x."""
     size = len(links)
     first, last = next(iter(links)), next(reversed(links.values()))
     drawn = link_shapes(description, links)
     damping = expand(description.joint_friction.viscous, size)
+    stops, mobility = (
+        description.stroke_limiter,
+        np.linalg.inv(build_rigid_body(description).mass_matrix(np.zeros(size))),
+    )
+    stiffness, damper = expand(stops.stiffness, size), expand(stops.viscous, size)
     if shapes:
         _add_shapes(body, palm_shapes(description, first, links[first]))
     place, twist = (0.0, 0.0, 0.0), 0.0
@@ -192,7 +216,10 @@ def _add_links(
         axial, transverse = link.inertia
         inertia = {"pos": _numbers(link.mass_centre, 0, link.offset), "mass": _numbers(link.mass)}
         ET.SubElement(body, "inertial", {**inertia, "diaginertia": _numbers(axial, transverse, transverse)})
-        bounds = {"range": _numbers(*description.joints[name].range), "limited": "false"}
+        limited = limits and description.joints[name].limited
+        bounds = {"range": _numbers(*description.joints[name].range), "limited": str(limited).lower()}
+        if limited:
+            bounds |= soft(stiffness[index], damper[index], mobility[index, index], "limit", stop=True)
         hinge = {"name": f"{prefix}{name}", "type": "hinge", "axis": _numbers(0, 0, 1), **bounds}
         spring = description.joints[name].spring
         if spring is not None:
@@ -271,7 +298,3 @@ def _add_shapes(body: ET.Element, shapes: Iterable[Shape], place: Sequence[float
         frame = {"pos": _numbers(*centre), "euler": _numbers(*shape.rotation), "material": shape.material}
         contact = {"mass": "0", "contype": "0", "conaffinity": str(int(shape.collides))}
         ET.SubElement(body, "geom", {"type": shape.kind, "size": _numbers(*size), **frame, **contact})
-
-
-def _numbers(*values: float) -> str:
-    return " ".join(repr(float(value)) for value in values)

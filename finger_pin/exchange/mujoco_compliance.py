@@ -12,8 +12,8 @@ from finger_pin.typing import Array
 
 # Between these MuJoCo keeps the impedance.
 _IMPEDANCES = 1e-4, 0.9999
-# Speed of an impact that contacts throw back alike, m/s, and the least share of it.
-_IMPACT, _LEAST_SHARE = 0.1, 0.05
+#: Speed of an impact that contacts throw back alike, m/s, and the least share of it.
+IMPACT, LEAST_SHARE = 0.1, 0.05
 # What descriptions have at most, N/m or N m/rad.
 _STIFFEST = 1e7
 
@@ -53,7 +53,7 @@ def contact_numbers(read: ElementReader, solref: Array, solimp: Array, mobility:
     """
     spring, _, stiffness, damping = _unbounded(read, solref, solimp, mobility)
     share = restitution(0.5 * damping / math.sqrt(stiffness))
-    return spring, impact_damping(max(share, _LEAST_SHARE)) / _IMPACT
+    return spring, impact_damping(max(share, LEAST_SHARE)) / IMPACT
 
 
 def restitution(ratio: float) -> float:

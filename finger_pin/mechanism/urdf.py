@@ -17,6 +17,8 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
+from finger_pin.mechanism.urdf_tree import tree_to_urdf
+from finger_pin.mechanism.xml_numbers import numbers as _numbers
 
 BASE_FRAME = "base"
 TIP_FRAME = "fingertip"
@@ -41,11 +43,15 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
         description: The finger, its name, the path of its file, or the scenario that has it; not a hand of several.
         drawn: With shapes, and indented. Its motion needs neither.
 
+    Of a tree of bodies, links have the names of these, and the frame of their last joint; tendons, actuators and what
+    else a URDF has no place for are named in it.
+
     Raises:
-        InputError: If it is no finger, it has a tree of bodies or a joint without a link, or a name that the URDF
-            needs itself.
+        InputError: If it is no finger, it has a joint without a link, or a name that the URDF needs itself.
     """
-    description = exported(description)
+    description = describe(description.finger if isinstance(description, Scenario) else description)
+    if description.tree.bodies:
+        return tree_to_urdf(description, drawn, BASE_FRAME, TIP_FRAME, TENSION_LIMIT, VELOCITY_LIMIT)
     if description.hand is not None:
         allowed = "is a hand; write its fingers one by one: description.hand.built()"
         raise InputError("finger", allowed, description.name)
@@ -71,19 +77,6 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
     if drawn:
         ET.indent(robot)
     return ET.tostring(robot, encoding="unicode") + "\n"
-
-
-def exported(described: DescriptionLike | Scenario) -> FingerDescription:
-    """Return the description of a finger, or of a hand's fingers together, for a file of another program.
-
-    Raises:
-        InputError: If it is none of them, or has a tree of bodies.
-    """
-    described = describe(described.finger if isinstance(described, Scenario) else described)
-    if described.tree.bodies:
-        allowed = "is not written: bodies in place of links; a model read from MuJoCo has its own MJCF"
-        raise InputError("finger.tree", allowed, described.name)
-    return described
 
 
 def effort_limit(description: FingerDescription, joint: str) -> float:
@@ -204,10 +197,6 @@ def _add_joint(
     ET.SubElement(joint, "child", link=child)
     ET.SubElement(joint, "origin", xyz=_numbers(*place), rpy=_numbers(twist, 0, 0))
     return joint
-
-
-def _numbers(*values: float) -> str:
-    return " ".join(repr(float(value)) for value in values)
 
 
 def join_bodies(parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | None = None) -> RigidBody:

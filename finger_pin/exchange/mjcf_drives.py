@@ -1,0 +1,154 @@
+"""What drives and holds a tree of bodies, and where it starts, as MJCF: actuators, equalities, keyframes."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.tree_actuators import TreeActuator
+from finger_pin.description.tree_parts import Coupling, Keyframe
+from finger_pin.exceptions import InputError
+from finger_pin.exchange.mjcf_compliance import Mobility, soft
+from finger_pin.mechanism.xml_numbers import numbers
+
+# The highest power of a coupling in MJCF.
+_POWERS = 4
+# Controls that come late are kept for steps of this length at least, s.
+_SAMPLED = 1e-4
+# What a pull of an ideal source without a largest tension is limited to, N.
+_PULL = 1e3
+
+
+def add_equalities(
+    root: ET.Element, description: FingerDescription, bodies: Mapping[str | None, ET.Element], mobility: Mobility
+) -> None:
+    """Add couplings of joints, and loops by a site on each body.
+
+    Args:
+        root: Of the MJCF.
+        description: The finger.
+        bodies: Elements by body; that of the world by None.
+        mobility: Of its joints and bodies.
+
+    Raises:
+        InputError: If a coupling has a power that MuJoCo has not.
+    """
+    tree = description.tree
+    table = ET.SubElement(root, "equality")
+    for name, coupling in tree.couplings.items():
+        joints = [coupling.joint, *([coupling.other] if coupling.other else [])]
+        held = soft(coupling.stiffness, coupling.damping, sum(mobility.joints[joint] for joint in joints))
+        named = {f"joint{k + 1}": joint for k, joint in enumerate(joints)}
+        course = _course(f"finger.tree.couplings.{name}.powers", coupling, description)
+        ET.SubElement(table, "joint", {"name": name, **named, "polycoef": numbers(*course), **held})
+    for name, loop in tree.loops.items():
+        ends = ((loop.body, loop.position), (loop.other, loop.other_position))
+        for k, (body, place) in enumerate(ends, 1):
+            ET.SubElement(bodies[body], "site", name=f"{name}_{k}", pos=numbers(*place))
+        held = soft(loop.stiffness, loop.damping, sum(mobility.bodies[body] for body, _ in ends if body))
+        ET.SubElement(table, "connect", {"name": name, "site1": f"{name}_1", "site2": f"{name}_2", **held})
+
+
+def _course(entry: str, coupling: Coupling, description: FingerDescription) -> list[float]:
+    """Return the polynomial of a coupling in MuJoCo's terms: both joints count from their references."""
+    tree, absolute = description.tree, Polynomial([coupling.offset, coupling.slope, *coupling.higher])
+    start = tree.joints[coupling.other].reference if coupling.other else 0.0
+    course = (absolute(Polynomial([start, 1.0])) - tree.joints[coupling.joint].reference).coef
+    if np.any(course[_POWERS + 1 :]):
+        raise InputError(entry, f"is not written: MuJoCo has powers up to {_POWERS}", list(coupling.higher))
+    return [*course[: _POWERS + 1].tolist(), *[0.0] * (_POWERS + 1 - len(course))]
+
+
+def add_actuators(root: ET.Element, description: FingerDescription, step: float) -> None:
+    """Add the motors of tendons that ideal sources pull, and the actuators of a tree, for a time step, s.
+
+    Raises:
+        InputError: If MuJoCo has no actuator of an entry.
+    """
+    table = ET.SubElement(root, "actuator")
+    for name, tendon in description.tendons.items():
+        entry = f"finger.tendons.{name}"
+        if tendon.kind == "passive" or tendon.winch is not None:
+            what = "winch" if tendon.winch else "kind"
+            raise InputError(f"{entry}.{what}", "is not written: a tendon beside a tree is pulled by an ideal source")
+        limits = {"ctrllimited": "true", "ctrlrange": numbers(0.0, tendon.maximum_tension or _PULL)}
+        ET.SubElement(table, "motor", {"name": name, "tendon": tendon.along or name, "gear": "-1", **limits})
+    for name, actuator in description.tree.actuators.items():
+        attributes = {"name": name, "gear": numbers(actuator.gear)}
+        attributes |= {"joint": actuator.joint} if actuator.joint else {"tendon": str(actuator.tendon)}
+        attributes |= _limits("ctrl", actuator.input_range) | _limits("force", actuator.force_range)
+        if actuator.delay:
+            samples = math.ceil(actuator.delay / min(step, _SAMPLED)) + 2
+            attributes |= {"delay": numbers(actuator.delay), "nsample": str(samples)}
+        kind, law = _law(f"finger.tree.actuators.{name}", actuator)
+        ET.SubElement(table, kind, attributes | law)
+
+
+def _limits(what: str, ends: Sequence[float] | None) -> dict[str, str]:
+    return {f"{what}limited": "true", f"{what}range": numbers(*ends)} if ends is not None else {}
+
+
+def _law(entry: str, actuator: TreeActuator) -> tuple[str, dict[str, str]]:
+    """Return the element and the law of an actuator."""
+    if (muscle := actuator.muscle) is not None:
+        shape = {key: numbers(getattr(muscle, key)) for key in ("force", "lmin", "lmax", "vmax", "fpmax", "fvmax")}
+        shape |= {"range": numbers(*muscle.range), "lengthrange": numbers(*muscle.length_range)}
+        return "muscle", shape | {"timeconst": numbers(*muscle.time_constants), "tausmooth": numbers(muscle.smoothing)}
+    if actuator.integral or actuator.slew is not None:
+        # MuJoCo's PID knows no other.
+        if actuator.by_length != -actuator.gain or actuator.offset or actuator.time_constant:
+            allowed = "with integral or slew is written for gain = -by_length, without offset and time_constant"
+            raise InputError(entry, allowed)
+        pid = {"kp": actuator.gain, "kv": -actuator.by_speed, "ki": actuator.integral, "slewmax": actuator.slew or 0.0}
+        if actuator.state_range is not None:
+            low, high = actuator.state_range
+            if not actuator.integral or low != -high:
+                allowed = "is not written: MuJoCo's PID limits the sum of the error alike to both sides"
+                raise InputError(f"{entry}.state_range", allowed, [low, high])
+            pid["imax"] = high
+        return "pid", {key: numbers(value) for key, value in pid.items() if value}
+    affine = {"gaintype": "fixed", "gainprm": numbers(actuator.gain), "biastype": "affine"}
+    affine["biasprm"] = numbers(actuator.offset, actuator.by_length, actuator.by_speed)
+    if actuator.integrates:
+        affine["dyntype"] = "integrator"
+    elif actuator.time_constant:
+        affine |= {"dyntype": "filterexact", "dynprm": numbers(actuator.time_constant)}
+    return "general", affine | _limits("act", actuator.state_range)
+
+
+def add_keyframes(root: ET.Element, description: FingerDescription, posture: Sequence[float] | None) -> None:
+    """Add the keyframes, or one called start with a posture, shape (n,), rad, on top of the first.
+
+    Raises:
+        InputError: If the posture has the wrong size.
+    """
+    tree, table = description.tree, ET.SubElement(root, "keyframe")
+    keyframes = dict(tree.keyframes)
+    if posture is not None:
+        if len(posture) != len(tree.joints):
+            raise InputError("posture", f"must be {len(tree.joints)} numbers, one per joint", list(posture))
+        first = next(iter(keyframes.values()), Keyframe())
+        keyframes = {"start": first.updated(position=dict(zip(tree.joints, map(float, posture), strict=True)))}
+    bodies = [*root.iterfind("worldbody//body")]
+    for name, keyframe in keyframes.items():
+        qpos, qvel, objects = list[float](), list[float](), tree.objects_at(keyframe)
+        for body in bodies:
+            for joint in (each.get("name", "") for each in body.findall("joint")):
+                qpos.append(keyframe.position.get(joint, tree.joints[joint].reference))
+                qvel.append(keyframe.velocity.get(joint, 0.0))
+            if body.find("freejoint") is not None:
+                free = objects[body.get("name", "")]
+                qpos += [*free.position, *np.roll(free.quaternion, 1).tolist()]
+                qvel += [*free.velocity, *free.angular_velocity]
+        driven = root.findall("actuator/*")
+        ctrl = list[float]()
+        for element in driven:
+            # The second control of pid is a speed.
+            ctrl += [keyframe.inputs.get(element.get("name", ""), 0.0), *[0.0] * (element.tag == "pid")]
+        states = {"qpos": numbers(*qpos), "qvel": numbers(*qvel)} | ({"ctrl": numbers(*ctrl)} if driven else {})
+        ET.SubElement(table, "key", {"name": name, **states})

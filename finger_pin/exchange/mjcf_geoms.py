@@ -1,0 +1,114 @@
+"""Geoms of a tree of bodies as MJCF: solids that are drawn, shapes and objects that touch, and which pairs do."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.surface import Shaped, Surface
+from finger_pin.description.tree import Tree
+from finger_pin.description.tree_parts import Body
+from finger_pin.exceptions import InputError
+from finger_pin.exchange.mjcf_compliance import Mobility, impact_ratio, quaternion, soft
+from finger_pin.mechanism.contact_rows import law_numbers
+from finger_pin.mechanism.solids import pairs_apart
+from finger_pin.mechanism.xml_numbers import numbers
+
+#: What touches nothing, and the group of what MuJoCo's viewer does not show.
+IDLE, HIDDEN = {"contype": "0", "conaffinity": "0"}, "4"
+# What touches objects of MuJoCo's default type, and not each other.
+_TOUCHED = {"contype": "0", "conaffinity": "1"}
+
+
+def add_meshes(root: ET.Element, tree: Tree) -> None:
+    """Add the meshes of solids."""
+    assets = ET.SubElement(root, "asset")
+    for name, mesh in tree.meshes.items():
+        points, faces = mesh.unpacked()
+        corners = {"vertex": numbers(*points.ravel()), "face": " ".join(map(str, faces.ravel().tolist()))}
+        ET.SubElement(assets, "mesh", {"name": name, "inertia": "shell", **corners})
+
+
+def add_body_geoms(element: ET.Element, body: Body) -> None:
+    """Add the solids and shapes of a body; those of one name are one geom."""
+    for key, solid in body.solids.items():
+        if key not in body.shapes and solid.kind == "mesh":
+            place = {"pos": numbers(*solid.position), "quat": quaternion(solid.orientation)}
+            drawn = {"name": key, "type": "mesh", "mesh": str(solid.mesh), "mass": "0"}
+            ET.SubElement(element, "geom", drawn | place | IDLE)
+        elif key not in body.shapes:
+            sizes = solid.sides if solid.kind == "box" else (solid.radius, solid.length)
+            add_geom(element, key, solid.kind, sizes, solid.position, solid.orientation, IDLE)
+    for key, shape in body.shapes.items():
+        touches = _TOUCHED | _friction(shape.surface) | ({} if key in body.solids else {"group": HIDDEN})
+        add_geom(element, key, shape.shape, shape.sizes, shape.position, shape.orientation, touches)
+
+
+def add_geom(
+    element: ET.Element,
+    name: str,
+    kind: str,
+    sizes: Sequence[float],
+    position: Sequence[float],
+    orientation: Sequence[float],
+    attributes: Mapping[str, str],
+) -> None:
+    """Add a geom of a kind of this package, with its sizes, m, and its place in a body."""
+    size = [0.5 * each for each in sizes] if kind == "box" else [*sizes[:1], *(0.5 * each for each in sizes[1:])]
+    shape = {"type": kind, "size": numbers(*size)}
+    if kind == "half_space":
+        shape = {"type": "plane", "size": "1 1 0.1"}
+    place = {"pos": numbers(*position), "quat": quaternion(orientation)}
+    ET.SubElement(element, "geom", {"name": name, "mass": "0", **shape, **place, **attributes})
+
+
+def add_objects(world: ET.Element, tree: Tree) -> dict[str, str]:
+    """Add objects, free bodies and geoms that stand; return the names of their geoms.
+
+    Raises:
+        InputError: If one is moved along a path.
+    """
+    geoms = {}
+    for name, each in tree.objects.items():
+        if each.path:
+            raise InputError(f"finger.tree.objects.{name}.path", "is not written: MuJoCo moves no body along a path")
+        touches = _TOUCHED | _friction(each.surface)
+        geoms[name] = name
+        if each.mass is None:
+            add_geom(world, name, each.shape, each.sizes, each.position, each.orientation, touches)
+            continue
+        place = {"pos": numbers(*each.position), "quat": quaternion(each.orientation)}
+        body = ET.SubElement(world, "body", {"name": name, **place})
+        ET.SubElement(body, "freejoint")
+        inertia = {"pos": "0 0 0", "mass": numbers(each.mass), "diaginertia": numbers(*each.inertia)}
+        ET.SubElement(body, "inertial", inertia)
+        geoms[name] = f"{name}_geom"
+        add_geom(body, geoms[name], each.shape, each.sizes, (0.0,) * 3, (0.0, 0.0, 0.0, 1.0), touches)
+    return geoms
+
+
+def add_pairs(
+    contact: ET.Element, description: FingerDescription, geoms: Mapping[str, str], mobility: Mobility
+) -> None:
+    """Add the pairs that touch, with the friction, stiffness and damping of both surfaces."""
+    tree, owner = description.tree, {key: name for name, body in description.tree.bodies.items() for key in body.shapes}
+    solids: dict[str, Shaped] = {key: tree.bodies[name].shapes[key] for key, name in owner.items()} | dict(tree.objects)
+    apart = pairs_apart(tree.objects, [*solids, *tree.bodies])
+    pairs = [*tree.touching] if description.touches_itself else []
+    for k, (name, each) in enumerate(tree.objects.items()):
+        before = [other for other in [*tree.objects][:k] if each.moves or tree.objects[other].moves]
+        pairs += [(other, name) for other in (*owner, *before) if frozenset((name, other)) not in apart]
+    for pair in pairs:
+        stiffness, damping, exponent, _, mu, *_ = law_numbers(*(solids[each].surface for each in pair))
+        sliding = {"condim": "1"} if mu == 0.0 else {"condim": "3", "friction": numbers(mu, mu, 0.005, 1e-4, 1e-4)}
+        meeting = sum(mobility.bodies[owner.get(each, each)] for each in pair)
+        # A spring of Hertz's exponent has no stiffness of its own.
+        held = soft(stiffness, impact_ratio(damping), meeting, damped=True) if exponent == 1.0 else {}
+        named = {f"geom{k}": geoms.get(each, each) for k, each in enumerate(pair, 1)}
+        ET.SubElement(contact, "pair", named | sliding | held)
+
+
+def _friction(surface: Surface | None) -> dict[str, str]:
+    mu = (surface or Surface()).friction
+    return {"friction": numbers(mu, 0.005, 1e-4)} if mu else {"condim": "1"}

@@ -1,0 +1,235 @@
+"""MJCF of a tree of bodies: a hand that was read and changed, or one of your own.
+
+Bodies, joints, tendons, couplings, loops, actuators, objects and keyframes have their counterparts in MuJoCo. What
+stops, couples and holds joints and tendons is given the stiffness and damping of the description, as far as MuJoCo's
+soft constraints can have them at the model's own inertia (`mujoco_compliance`, the other way round).
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+
+import numpy as np
+
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.tree_parts import Body, TreeTendon
+from finger_pin.description.validation import expand
+from finger_pin.description.waypoints import Waypoint
+from finger_pin.exceptions import InputError
+from finger_pin.exchange.mjcf_compliance import IMPEDANCE, Mobility, quaternion, soft
+from finger_pin.exchange.mjcf_drives import add_actuators, add_equalities, add_keyframes
+from finger_pin.exchange.mjcf_geoms import HIDDEN, IDLE, add_body_geoms, add_geom, add_meshes, add_objects, add_pairs
+from finger_pin.mechanism.tendon_paths import rotation
+from finger_pin.mechanism.tree_mechanism import build_body
+from finger_pin.mechanism.xml_numbers import numbers
+
+# Steps of MuJoCo's are at most so long, s, and this part of the time 1 / omega of its stiffest spring.
+_LONGEST, _PART = 1e-3, 0.2
+# The least friction loss that MuJoCo keeps, N m, the length of a wrap, which has none here, m, and the inertia that
+# MuJoCo wants of all that moves, kg m2.
+_LEAST_LOSS, _LENGTH, _NO_INERTIA = 1e-6, 0.02, 1e-12
+_WORLD = "world"
+
+_NOTES = """
+  {title}
+
+  Written from a tree of bodies. Tendons that an ideal source pulls have a motor: its control is their tension, N.
+  Joints, tendons, couplings, actuators and keyframes are as described; ranges, couplings and loops are MuJoCo's soft
+  constraints, of the description's stiffness and damping at the model's own inertia, and so are contacts.
+  Left out, because MuJoCo has no counterpart, or is told of it otherwise:
+  - friction of tendons and joints that grows with their load: finger_pin.mujoco.add_friction adds it to a MjSpec;
+  - what takes energy from an impact on a stop by its depth: stops without a damper are critically damped;{rest}
+"""
+
+
+def tree_to_mjcf(
+    description: FingerDescription,
+    posture: Sequence[float] | None,
+    timestep: float | None,
+    integrator: str,
+    limits: bool,
+    shapes: bool,
+) -> str:
+    """Return the MJCF of a finger that has a tree of bodies, as text; arguments are those of `to_mjcf`.
+
+    Raises:
+        InputError: If MuJoCo cannot have an entry: it names it.
+    """
+    writer = _Writer(description, limits, shapes)
+    step = min(_LONGEST, float(f"{_PART / writer.fastest:.0e}")) if timestep is None else timestep
+    root = ET.Element("mujoco", model=description.name)
+    root.append(ET.Comment(_notes(description)))
+    ET.SubElement(root, "compiler", angle="radian", autolimits="false")
+    option = {"timestep": numbers(step), "gravity": numbers(*description.gravity), "integrator": integrator}
+    ET.SubElement(root, "option", option | {"cone": "elliptic", "impratio": "10"})
+    writer.write(root, step)
+    add_keyframes(root, description, posture)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _notes(description: FingerDescription) -> str:
+    rest = [f"{line};" for line in description.tree.left_out]
+    rest += ["servos, their spools and what stretches on the way;"] if description.actuators else []
+    lines = "".join(f"\n  - {line}" for line in rest)
+    return _NOTES.format(title=description.title or description.name, rest=lines).replace("--", "- -")
+
+
+class _Writer:
+    """Writes bodies, tendons and what drives and holds them."""
+
+    def __init__(self, description: FingerDescription, limits: bool, shapes: bool) -> None:
+        self.description, self.tree, self.limits, self.shapes = description, description.tree, limits, shapes
+        body, self.paths = build_body(description)
+        self.mobility = Mobility(self.tree, body, self.paths)
+        self.elements: dict[str | None, ET.Element] = {}
+        self.names = {name for each in self.tree.bodies.values() for name in (*each.solids, *each.shapes)}
+        self.placed: dict[tuple[str, Waypoint], dict[str, str]] = {}
+
+    @property
+    def fastest(self) -> float:
+        """Frequency omega of the stiffest spring against the inertia that it meets at the references, rad/s."""
+        tendons, of_tendons, of_joints = self.tree.tendons.items(), self.mobility.tendons, self.mobility.joints
+        springs = {name: joint.spring.stiffness for name, joint in self.description.joints.items() if joint.spring}
+        squares = [tendon.stiffness * of_tendons[name] for name, tendon in tendons]
+        squares += [stiffness * of_joints[name] for name, stiffness in springs.items()]
+        for each in self.tree.actuators.values():
+            mobility = of_joints[each.joint] if each.joint else of_tendons[str(each.tendon)]
+            squares.append(abs(each.by_length) * each.gear**2 * mobility)
+        stops = [tendon.limit_stiffness * of_tendons[name] for name, tendon in tendons if tendon.range]
+        if self.limits:
+            stiffness = expand(self.description.stroke_limiter.stiffness, len(of_joints))
+            stops += (stiffness * [*of_joints.values()]).tolist()
+        squares += [(1.0 - IMPEDANCE) / IMPEDANCE**2 * square for square in stops]
+        return math.sqrt(max(1.0, *squares))
+
+    def write(self, root: ET.Element, step: float) -> None:
+        """Write all but the keyframes; controls that come late are kept for steps of a length, s."""
+        tree = self.tree
+        if any(each.solids or each.shapes for each in tree.bodies.values()) and tree.meshes:
+            add_meshes(root, tree)
+        world = self.elements[None] = ET.SubElement(root, "worldbody")
+        for name, body in tree.bodies.items():
+            self._add_body(name, body)
+        tip = self.elements[tree.tip.body]
+        ET.SubElement(tip, "site", name="fingertip", pos=numbers(*tree.tip.position))
+        if self.shapes:
+            geoms = add_objects(world, tree)
+            add_pairs(ET.SubElement(root, "contact"), self.description, geoms, self.mobility)
+        tendons = ET.SubElement(root, "tendon")
+        for name, tendon in tree.tendons.items():
+            self._add_tendon(tendons, name, tendon)
+        for name, pulled in self.description.tendons.items():
+            if pulled.along is None:
+                fixed = ET.SubElement(tendons, "fixed", name=name)
+                for joint, crossing in pulled.crossings.items():
+                    ET.SubElement(fixed, "joint", joint=joint, coef=numbers(-crossing.radius))
+        add_equalities(root, self.description, self.elements, self.mobility)
+        add_actuators(root, self.description, step)
+
+    def _add_body(self, name: str, body: Body) -> None:
+        parent = self.elements[body.parent]
+        still = body.parent is None and not any(joint.body == name for joint in self.tree.joints.values())
+        if still and name == _WORLD:
+            self.elements[name] = parent
+            if self.shapes:
+                add_body_geoms(parent, body)
+            return
+        place = {"pos": numbers(*body.position), "quat": quaternion(body.orientation)}
+        lifted = {"gravcomp": numbers(body.gravity_compensation)} if body.gravity_compensation else {}
+        element = self.elements[name] = ET.SubElement(parent, "body", {"name": name, **place, **lifted})
+        if body.mass or any(body.inertia):
+            inertia = {"pos": numbers(*body.centre), "mass": numbers(body.mass), "fullinertia": numbers(*body.inertia)}
+            ET.SubElement(element, "inertial", inertia)
+        elif not still:
+            least = {"pos": "0 0 0", "mass": numbers(_NO_INERTIA), "diaginertia": numbers(*[_NO_INERTIA] * 3)}
+            ET.SubElement(element, "inertial", least)
+        friction, size = self.description.joint_friction, len(self.tree.joints)
+        loss = np.maximum(expand(friction.floor, size), expand(friction.drag, size))
+        for k, (joint, moved) in enumerate(self.tree.joints.items()):
+            if moved.body == name:
+                about = {"name": joint, "type": moved.kind, "axis": numbers(*moved.axis), "pos": numbers(*moved.anchor)}
+                about |= {"ref": numbers(moved.reference), "armature": numbers(moved.armature)}
+                about["frictionloss"] = numbers(loss[k] if moved.bearing and loss[k] >= _LEAST_LOSS else 0.0)
+                ET.SubElement(element, "joint", about | self._joint(k, joint))
+        if self.shapes:
+            add_body_geoms(element, body)
+
+    def _joint(self, k: int, name: str) -> dict[str, str]:
+        """Return spring, damper and range of a joint."""
+        joint, size = self.description.joints[name], len(self.tree.joints)
+        viscous = float(expand(self.description.joint_friction.viscous, size)[k]) * self.tree.joints[name].bearing
+        spring = joint.spring
+        attributes = {"damping": numbers(viscous + (spring.damping if spring else 0.0))}
+        if spring is not None:
+            attributes |= {"stiffness": numbers(spring.stiffness), "springref": numbers(spring.rest)}
+        limited = joint.limited and self.limits
+        attributes |= {"range": numbers(*joint.range), "limited": str(limited).lower()}
+        if limited:
+            stops = self.description.stroke_limiter
+            stiffness, damper = (float(expand(each, size)[k]) for each in (stops.stiffness, stops.viscous))
+            attributes |= soft(stiffness, damper, self.mobility.joints[name], "limit", stop=True)
+        return attributes
+
+    def _add_tendon(self, table: ET.Element, name: str, tendon: TreeTendon) -> None:
+        if tendon.path is not None and any((tendon.joints or {}).values()):
+            allowed = "is not written: a tendon of MuJoCo has joints or a path"
+            raise InputError(f"finger.tree.tendons.{name}.joints", allowed)
+        rest = tendon.rest
+        if tendon.slack is not None:
+            rest = (-1e3, float(self.paths.reference_lengths[name]) + tendon.slack)
+        attributes = {"stiffness": numbers(tendon.stiffness), "springlength": numbers(*rest)}
+        attributes |= {"damping": numbers(tendon.damping), "frictionloss": numbers(tendon.friction)}
+        attributes["limited"] = str(tendon.range is not None).lower()
+        if tendon.range is not None:
+            attributes["range"] = numbers(*tendon.range)
+            stop = tendon.limit_stiffness, tendon.limit_viscous, self.mobility.tendons[name]
+            attributes |= soft(*stop, "limit", stop=True)
+        kind = "fixed" if tendon.path is None else "spatial"
+        element = ET.SubElement(table, kind, {"name": name, **attributes})
+        for joint, gain in (tendon.joints or {}).items() if kind == "fixed" else ():
+            ET.SubElement(element, "joint", joint=joint, coef=numbers(gain))
+        for point, waypoint in (tendon.path or {}).items():
+            self._add_waypoint(element, f"{name}_{point}", point, waypoint)
+
+    def _add_waypoint(self, path: ET.Element, full: str, name: str, waypoint: Waypoint) -> None:
+        """Add a piece of a path; tendons share the sites and wraps of one name at one place."""
+        if waypoint.kind == "pulley":
+            ET.SubElement(path, "pulley", divisor=numbers(waypoint.divisor))
+            return
+        if (name, waypoint) not in self.placed:
+            self.placed[name, waypoint] = self._place_waypoint(name, full, waypoint)
+        ET.SubElement(path, "site" if waypoint.kind == "point" else "geom", self.placed[name, waypoint])
+
+    def _is_drawn(self, name: str, wrap: Waypoint) -> bool:
+        """Return whether a wrap is a solid of its body, which is written already."""
+        solid = self.tree.bodies[wrap.body].solids.get(name) if wrap.body and self.shapes else None
+        placed = ("kind", "radius", "position", "orientation")
+        return solid is not None and all(getattr(solid, key) == getattr(wrap, key) for key in placed)
+
+    def _place_waypoint(self, name: str, full: str, waypoint: Waypoint) -> dict[str, str]:
+        """Add the site or geom of a waypoint, and the site at its side; return what its path says of them."""
+        carrier, wraps = self.elements[waypoint.body], waypoint.kind != "point"
+        drawn = wraps and self._is_drawn(name, waypoint)
+        label = full if name in self.names and not drawn else name
+        self.names.add(label)
+        if not wraps:
+            ET.SubElement(carrier, "site", name=label, pos=numbers(*waypoint.position))
+            return {"site": label}
+        if not drawn:
+            sizes = (waypoint.radius, _LENGTH)[: 1 + (waypoint.kind == "cylinder")]
+            place, hidden = (waypoint.position, waypoint.orientation), {**IDLE, "group": HIDDEN}
+            add_geom(carrier, label, waypoint.kind, sizes, *place, hidden)
+        position = np.array(waypoint.position)
+        if waypoint.side is not None:
+            position = position + rotation(waypoint.orientation) @ np.array(waypoint.side)
+        elif waypoint.side_point is not None:
+            carrier, position = self.elements[waypoint.side_point.body], np.array(waypoint.side_point.position)
+        else:
+            return {"geom": label}
+        side = f"{full}_side" if f"{label}_side" in self.names else f"{label}_side"
+        self.names.add(side)
+        ET.SubElement(carrier, "site", name=side, pos=numbers(*position))
+        return {"geom": label, "sidesite": side}
