@@ -244,7 +244,7 @@ def test_columns_of_a_recording_have_the_unit_of_their_header_and_are_asked_abou
     bare = {name.partition(" ")[0]: values for name, values in data.items()}
     change = {"time": "t", "inputs": {"tendon_command.T1": "in"}, "outputs": {"joint_position.medial": "q"}}
     for more, said in [
-        ({}, r'recordings.pull.time = "t": its 3 rows take 100000 s \(is it in milliseconds\?\); write { column = "t"'),
+        ({}, r'recordings.pull.time = "t": its 3 rows take 100000 s \(is it in microseconds\?\); write { column = "t"'),
         (
             {"time": {"column": "t", "unit": "ms"}},
             r"medial = 180.0: angles must be at most 12.5 rad \(is it in degrees",

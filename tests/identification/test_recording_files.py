@@ -114,6 +114,15 @@ def test_times_are_dates_epochs_and_timers_that_come_round(cells, column):
     assert times[0] == 0.0 or "period" in column
 
 
+@pytest.mark.parametrize(
+    ("apart", "unit"), [(20.0, "milliseconds"), (5e4, "microseconds"), (2e7, "nanoseconds"), (2e13, "nanoseconds")]
+)
+def test_times_a_minute_long_are_asked_about_in_the_unit_that_makes_samples_of_them(apart, unit):
+    with pytest.raises(InputError, match=f"is it in {unit}"):
+        Table("x", {"t": apart * np.arange(10.0)}).times("time", Column(column="t"))
+    assert Table("x", {"t": apart * np.arange(10.0)}).times("time", Column(column="t", unit="s"))[1] == apart
+
+
 def test_an_epoch_in_a_file_of_signals_begins_at_zero(tmp_path):
     (tmp_path / "a.csv").write_bytes("rig µ\ntime,medial (°)\n1763300000,0\n1763300002,90\n".encode("cp1252"))
     source = {"path": "a.csv", "encoding": "cp1252", "skip_rows": 1}

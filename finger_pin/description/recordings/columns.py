@@ -29,7 +29,8 @@ from finger_pin.files import expand
 
 _TIMES = ("time", "t")
 # Rows that are so far apart on average, s, over so long a time are asked about; the units that they may be in.
-_FAR_APART, _LONG, _SMALL_UNITS = 1.0, 60.0, ("ms", "us", "ns")
+_FAR_APART, _LONG = 1.0, 60.0
+_SMALL_UNITS = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 # Times from here on, s, are of an epoch, and counted from the first: three years are no motion.
 _EPOCH = 1e8
 # A date and a time of ISO 8601, and the difference of its zone from UTC.
@@ -163,9 +164,10 @@ class Table:
         length, unknown = times[-1] - times[0], not dated and (column.unit or header_unit) is None
         apart = length / (len(times) - 1)
         if unknown and column.scale == 1.0 and length >= _LONG and apart >= _FAR_APART:
-            unit = next((unit for unit in _SMALL_UNITS if apart * UNITS["s"][unit] < _FAR_APART), _SMALL_UNITS[-1])
-            warning = f'its {len(times)} rows take {length:g} s (is it in {unit}?); write {{ column = "{column.column}"'
-            raise InputError(entry, f'{warning}, unit = "{unit}" }}, or unit = "s" if they do', column.column)
+            unit = next((unit for unit in _SMALL_UNITS if apart * UNITS["s"][unit] < _FAR_APART), "ns")
+            asked = f"its {len(times)} rows take {length:g} s (is it in {_SMALL_UNITS[unit]}?)"
+            answer = f'write {{ column = "{column.column}", unit = "{unit}" }}, or unit = "s" if they do'
+            raise InputError(entry, f"{asked}; {answer}", column.column)
         return times
 
     def signals(self, file: SignalFile) -> Iterator[tuple[str, Column]]:
