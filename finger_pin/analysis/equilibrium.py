@@ -53,7 +53,7 @@ def equilibrium(
     inputs: Mapping[str, float] | Sequence[float] | Array,
     *,
     position: Sequence[float] | Array | None = None,
-    fingertip_force: Sequence[float] | Array = (0.0, 0.0, 0.0),
+    fingertip_force: Sequence[float] | Array | None = None,
 ) -> Equilibrium:
     """Return the frictionless equilibrium under given inputs.
 
@@ -66,7 +66,7 @@ def equilibrium(
         inputs: Tensions f^a, N, or of winches what is wound in, m, then inputs of a tree's actuators, shape (u,), or by
             name.
         position: theta to begin at, shape (n,), rad; by default the angles of the ranges nearest to zero.
-        fingertip_force: F, shape (3,), N, base frame.
+        fingertip_force: F, shape (3,), of several tips (t, 3), N, base frame; none by default.
 
     Raises:
         InputError: If a size is wrong, a tension is negative, the finger has servos, free objects, rows with states of
@@ -77,7 +77,13 @@ def equilibrium(
     command = as_inputs(finger, inputs)
     if np.any(command[: finger.routing.actuated][~finger.routing.winched] < 0.0):
         raise InputError("inputs", "a tension must not be negative", command.tolist())
-    pushed = np.array(finite_vector("fingertip_force", fingertip_force, 3))
+    tips = finger.description.tree.tip_names
+    shape = (len(tips), 3) if tips else (3,)
+    force = np.zeros(shape) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
+    if force.shape != shape:
+        whose = f", a row each for {', '.join(tips)}" if tips else ""
+        raise InputError("fingertip_force", f"must have shape {shape}{whose}", force.shape)
+    pushed = np.reshape(finite_vector("fingertip_force", force.ravel(), force.size), shape)
     joints = len(finger.routing.joints)
     limiter = finger.stroke_limiter
     start = (
@@ -150,7 +156,7 @@ class _Statics:
         stored, _ = signals.mechanism.account()
         raised = finger.motion(theta, np.zeros(joints)).potential_energy
         work = (~finger.routing.winched * signals.tendons.entering[:actuated]) @ finger.excursion(theta)
-        work += self.pushed @ finger.rigid_body.tip_position(theta) + _work_of_actuators(signals)
+        work += float(np.sum(self.pushed * finger.rigid_body.tip_position(theta))) + _work_of_actuators(signals)
         return float(sum(stored.values()) + raised - work)
 
     def acceleration(self, y: Array) -> Array:

@@ -13,7 +13,7 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, at_tip, one_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.path_elements import path_kinematics
 from finger_pin.typing import Array
@@ -66,7 +66,11 @@ def _constraints(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
 
 
 def inverse_kinematics(
-    finger: FingerLike, point: Sequence[float] | Array, *, near: Sequence[float] | Array | None = None
+    finger: FingerLike,
+    point: Sequence[float] | Array,
+    *,
+    near: Sequence[float] | Array | None = None,
+    tip: str | None = None,
 ) -> TipPosture:
     """Return the posture, within the joints' ranges, whose fingertip is nearest to a point.
 
@@ -78,12 +82,13 @@ def inverse_kinematics(
         finger: One finger.
         point: Of the fingertip, shape (3,), m, base frame.
         near: theta that is preferred, shape (n,), rad; by default the angles of the ranges nearest to zero.
+        tip: Name of the fingertip, where a tree has several.
 
     Raises:
-        InputError: If the point or the preferred posture has a wrong size, it is a hand, or no posture keeps to the
-            couplings of a tree.
+        InputError: If the point or the preferred posture has a wrong size, it is a hand, there is no such fingertip, or
+            no posture keeps to the couplings of a tree.
     """
-    finger = as_finger(finger)
+    finger = at_tip(as_finger(finger), tip)
     one_finger(finger.description)
     target = np.array(finite_vector("point", point, 3))
     low, high = (np.clip(each, -np.pi, np.pi) for each in (finger.stroke_limiter.lower, finger.stroke_limiter.upper))
@@ -121,8 +126,8 @@ def inverse_kinematics(
         if near_enough and np.linalg.norm(constraints(moved @ best.x)[0]) < 0.01 * _THERE:
             break
     theta = _onto_couplings(min(solutions, key=lambda solution: solution[0])[1], constraints, low, high)
-    tip = np.asarray(body.tip_position(theta))
-    return TipPosture(theta, tip, float(np.linalg.norm(tip - target)))
+    reached = np.asarray(body.tip_position(theta))
+    return TipPosture(theta, reached, float(np.linalg.norm(reached - target)))
 
 
 def _onto_couplings(

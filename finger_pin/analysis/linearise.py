@@ -202,8 +202,8 @@ def _output_names(finger: Finger, count: int) -> list[str]:
     names = [f"{kind}.{joint}" for kind in ("joint_position", "joint_velocity") for joint in routing.joints]
     names += [f"tendon_tension.{tendon}" for tendon in routing.tendons]
     tips = (count - len(names) - len(motors)) // 3
-    for tip in range(tips):
-        names += [f"fingertip_position.{axis}" if tips == 1 else f"fingertip_position.{tip}.{axis}" for axis in "xyz"]
+    labels = [""] if tips == 1 else [f"{tip}." for tip in finger.description.tree.tip_names or range(tips)]
+    names += [f"fingertip_position.{label}{axis}" for label in labels for axis in "xyz"]
     return [*names, *(f"motor_current.{motor}" for motor in motors)]
 
 

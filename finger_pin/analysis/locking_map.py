@@ -29,7 +29,8 @@ class SelfLockingMap(BriefRepr):
             passive tendon does, so for passive tendons whose canals no joint bends it is the same everywhere.
         tension: Largest tension that the controller commands while the finger moves slowly, under its own friction
             and weight, in the direction that needs most, shape (a, b), N; infinite where it locks.
-        tip: Fingertip position, shape (a, b, 3), m, base frame. Of one joint all these lack the second dimension.
+        tip: Fingertip position, shape (a, b, 3), of several (a, b, t, 3), m, base frame. Of one joint all these
+            lack the second dimension.
         actual: The finger's largest stiction coefficient M^c, m.
     """
 
@@ -90,13 +91,14 @@ def self_locking_map(
     postures = np.tile(base, (*shape, 1))
     postures[..., columns] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     flat = (postures @ coupling.matrix.T).reshape(-1, len(base))
+    tip = np.array([finger.rigid_body.tip_position(theta) for theta in flat])
     coefficient, tension = _worst(finger, flat, expand(minimum_tension, len(routing.tendons)))
     return SelfLockingMap(
         joints=chosen,
         angles=axes,
         coefficient=coefficient.reshape(shape),
         tension=tension.reshape(shape),
-        tip=np.array([finger.rigid_body.tip_position(theta) for theta in flat]).reshape(*shape, 3),
+        tip=tip.reshape(*shape, *tip.shape[1:]),
         actual=float(np.max(finger.joint_friction.static)),
     )
 

@@ -13,7 +13,7 @@ import scipy
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, at_tip
 from finger_pin.typing import Array
 
 _RANK = 1e-6
@@ -98,6 +98,7 @@ def force_polytope(
     *,
     minimum_tension: float | tuple[float, ...] = 0.0,
     friction: Friction = Friction.NONE,
+    tip: str | None = None,
 ) -> ForcePolytope:
     """Return the forces that the fingertip can exert within tension limits, weight included.
 
@@ -110,12 +111,13 @@ def force_polytope(
         maximum_tension: Greatest f^a, N, one number or one per actuated tendon.
         minimum_tension: Least f^a, N, likewise.
         friction: NONE or HELPING.
+        tip: Name of the fingertip, where a tree has several.
 
     Raises:
         InputError: If an argument is wrong, or no tensions within the limits hold the finger without a contact or with
             one.
     """
-    finger = as_finger(finger)
+    finger = at_tip(as_finger(finger), tip)
     if friction is Friction.HINDERING:
         raise InputError("friction", "must be none or helping; hindering friction has a direction", friction.value)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)

@@ -21,7 +21,7 @@ from finger_pin.analysis.tip_statics import (
 )
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, at_tip
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
@@ -52,6 +52,7 @@ def largest_force(
     *,
     minimum_tension: float | tuple[float, ...] = 0.0,
     friction: Friction = Friction.NONE,
+    tip: str | None = None,
 ) -> float:
     """Return the largest force that the fingertip can exert straight along a direction, N; negative if only backwards.
 
@@ -62,6 +63,7 @@ def largest_force(
         maximum_tension: Greatest f^a, N, one number or one per actuated tendon.
         minimum_tension: Least f^a, N, likewise.
         friction: Of any kind.
+        tip: Name of the fingertip, where a tree has several.
 
     Returns:
         The force; infinite where the structure carries it, not a number where no force along this line can be held.
@@ -69,7 +71,7 @@ def largest_force(
     Raises:
         InputError: If an argument is wrong.
     """
-    finger = as_finger(finger)
+    finger = at_tip(as_finger(finger), tip)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
     along = _unit(direction)
     worst = np.inf
@@ -101,6 +103,7 @@ def tension_for_force(
     *,
     minimum_tension: float | tuple[float, ...] = 0.0,
     friction: Friction = Friction.NONE,
+    tip: str | None = None,
 ) -> RequiredTension:
     """Return the tensions with the least maximum at which the fingertip exerts a force.
 
@@ -110,11 +113,12 @@ def tension_for_force(
         force: E = -F, shape (3,), N, base frame; zero holds the finger against its weight.
         minimum_tension: Least f^a, N, one number or one per actuated tendon.
         friction: Of any kind; HELPING gives what holds at least, HINDERING what surely pushes.
+        tip: Name of the fingertip, where a tree has several.
 
     Raises:
         InputError: If an argument is wrong, or no tensions whatever give this force.
     """
-    finger = as_finger(finger)
+    finger = at_tip(as_finger(finger), tip)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, np.inf)
     wanted = finite_vector("force", force, 3)
     jacobian = finger.rigid_body.jacobian(theta)

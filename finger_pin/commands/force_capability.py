@@ -25,6 +25,7 @@ def force_capability(
         str, typer.Option(metavar="N|servos", help="Greatest tension, or servos for that of the finger's motors.")
     ] = "20",
     force: Annotated[str, typer.Option(metavar="X,Y,Z", help="The force whose tensions are printed, N.")] = "0,0,1",
+    tip: Annotated[str | None, typer.Option(metavar="NAME", help="Fingertip, where a tree has several.")] = None,
     output: Output = Path("results/force_capability"),
     format: Format = None,
     view: Annotated[bool, typer.Option("--view", help="Show the forces at the fingertip in the viewer.")] = False,
@@ -40,12 +41,12 @@ def force_capability(
     from finger_pin.analysis import Friction, force_polytope, tension_for_force, tension_limits
     from finger_pin.description.loading import describe
     from finger_pin.description.validation import finite_vector
-    from finger_pin.mechanism.coerce import one_finger
+    from finger_pin.mechanism.coerce import at_tip, one_finger
     from finger_pin.views.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
 
     finite_vector("--force", wish, 3)
     one_finger(described := describe(finger))
-    built = fp.Finger(described)
+    built = at_tip(fp.Finger(described), tip)
     if limit == "servos":
         most = tension_limits(built)
         if not np.isfinite(most).all():

@@ -18,6 +18,7 @@ from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import ProportionalController, RoutedController
 from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward
 from finger_pin.control.torque import FingertipForce, TorqueLaw
+from finger_pin.description.by_finger import of_finger
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
@@ -147,10 +148,12 @@ def _joint_compensation(scenario: Scenario, finger: Finger) -> JointCompensation
 
 
 def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:
-    signals = scenario.controller.fingertip_force
-    if not signals:
+    names = finger.description.tree.tip_names or ("",)
+    tips = [of_finger(scenario.controller, name).fingertip_force or {} for name in names]
+    if not any(tips):
         return None
-    wanted = Signal.from_settings([signals.get(axis, ForceSignal()) for axis in AXES], scenario.simulation.rtol)
+    settings = [signals.get(axis, ForceSignal()) for signals in tips for axis in AXES]
+    wanted = Signal.from_settings(settings, scenario.simulation.rtol)
     return FingertipForce(wanted.later(scenario.simulation.start_time), finger.rigid_body.jacobian)
 
 

@@ -181,7 +181,8 @@ class ControllerSettings(Description):
             self.distribution,
         )
         plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
-        return plain and not self.fingertip_force and all(each is None for each in added)
+        pushing = any(each.fingertip_force for each in (self, *(self.fingers or {}).values()))
+        return plain and not pushing and all(each is None for each in added)
 
 
 def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:

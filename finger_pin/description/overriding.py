@@ -125,7 +125,9 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
         present[place] = ("finger", hand) if hand else (what, as_table(finger.get(f"{what}s")))
         for key, table_of_finger in hand.items():
             present[*place, key] = what, as_table(as_table(table_of_finger).get(f"{what}s"))
-    if hand:
+    tips = {} if hand else as_table(as_table(finger.get("tree")).get("tips"))
+    if hand or tips:
+        hand = hand or tips
         present |= {("controller", "fingers"): ("finger", hand), ("environment", "fingers"): ("finger", hand)}
     present["environment", "objects"] = "object", siblings
     field = find_field(Scenario, owner) if owner else None

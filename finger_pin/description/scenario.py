@@ -167,11 +167,10 @@ class Scenario(Description):
         return {name: self._part(name, alone) for name, alone in self.hand.parts().items()}
 
     def environments(self) -> dict[str, EnvironmentSettings]:
-        """Return the environments of the fingers of a hand, by name; of a finger its own, under no name."""
+        """Return the environments of a hand's fingers or a tree's tips, by name; of a single one under no name."""
         shared = self.environment
-        if self.hand is None:
-            return {"": shared}
-        return {name: of_finger(shared, name) if shared.fingers else shared for name in self.hand.fingers}
+        names = self.finger.tree.tip_names if self.hand is None else tuple(self.hand.fingers)
+        return {name: of_finger(shared, name) if shared.fingers else shared for name in names} or {"": shared}
 
     def _part(self, name: str, alone: HandSettings) -> Scenario:
         def entries_of_finger(table: Mapping[str, _Item]) -> dict[str, _Item]:
@@ -210,7 +209,8 @@ class Scenario(Description):
         """Refuse a table for a joint or a finger that is not there."""
         initial = self.simulation.initial or InitialSettings()
         keyframes = tuple(self.finger.tree.keyframes)
-        joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
+        joints = tuple(self.finger.joints)
+        fingers = tuple(self.hand.fingers) if self.hand else self.finger.tree.tip_names
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
             "reference.joints": (self.reference.joints, "joint", joints),
             "simulation.initial.position": (initial.position, "joint", joints),
@@ -230,6 +230,8 @@ class Scenario(Description):
             "environment.fingers": (self.environment.fingers or (), "finger", fingers),
         }
         for name, settings in (self.controller.fingers or {}).items():
+            for entry in settings.model_fields_set - {"fingertip_force"} if not self.hand else ():
+                raise problem(f"controller.fingers.{name}.{entry}", "is of a hand's finger; a tip has fingertip_force")
             if "sampling" in settings.model_fields_set:
                 raise problem(f"controller.fingers.{name}.sampling", "is the same for all: set controller.sampling")
         for table, (names, what, allowed) in tables.items():

@@ -11,15 +11,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Self
 
+import numpy as np
 from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
 
 from finger_pin.description.cords import Cord, CordElement, CordPart
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.objects import Object
+from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree_actuators import TreeActuator
-from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeJoint, TreeTendon
+from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeJoint, TreeSolid, TreeTendon
 from finger_pin.description.validation import Description, Name, problem, suggestion
 from finger_pin.description.waypoints import Waypoint
+from finger_pin.typing import Array
 
 #: What is more is no radius that a cord winds at, as `Crossing` has it, m.
 LARGEST_RADIUS = 0.5
@@ -36,7 +40,8 @@ class Tree(Description):
     actuators: dict[Name, TreeActuator] = Field({}, description="By name.")
     keyframes: dict[Name, Keyframe] = Field({}, description="By name; runs start from the first, unless told else.")
     objects: dict[Name, Object] = Field({}, description="By name: what stands or lies around it in every run.")
-    tip: Tip = Tip()
+    tip: Tip | None = Field(None, description="The only fingertip; in place of tips.")
+    tips: dict[Name, Tip] = Field({}, description="Fingertips by name; without any, the ends of its chains are.")
     touching: tuple[tuple[Name, Name], ...] = Field((), description="Pairs of its own shapes that touch each other.")
     meshes: dict[Name, Mesh] = Field({}, description="Surfaces of solids, by name.")
     left_out: tuple[str, ...] = Field((), description="Elements of the model that were not carried over.")
@@ -78,8 +83,13 @@ class Tree(Description):
         for name, actuator in self.actuators.items():
             _check(f"actuators.{name}.joint", actuator.joint, self.joints, "joint")
             _check(f"actuators.{name}.tendon", actuator.tendon, self.tendons, "tendon")
-        _check("tip.body", self.tip.body, self.bodies, "body")
         self._check_shapes()
+        if self.tip is not None and self.tips:
+            raise problem("tip", "is for a single fingertip; leave it out beside tips", list(self.tips))
+        for entry, tip in (("tip", self.tip), *((f"tips.{name}", each) for name, each in self.tips.items())):
+            _check(f"{entry}.body", tip.body if tip else None, self.bodies, "body")
+        if self.tip is None and not self.tips:
+            object.__setattr__(self, "tips", self.chain_ends())
         return self
 
     def _check_shapes(self) -> None:
@@ -116,6 +126,63 @@ class Tree(Description):
         parts = [(divisor, (*arms, *trunk)), *branches]
         cord_parts = tuple(CordPart(divisor, tuple(elements)) for divisor, elements in parts)
         return Cord(cord_parts, described.curvature_offset, through_space=path is not None)
+
+    @property
+    def tip_names(self) -> tuple[str, ...]:
+        """Names of the fingertips where there are several; none of a single one."""
+        return tuple(self.tips) if len(self.tips) > 1 else ()
+
+    @property
+    def fingertips(self) -> dict[str, Tip]:
+        """Fingertips by name; a single one has none."""
+        return dict(self.tips) if self.tip_names else {"": self.tip or next(iter(self.tips.values()))}
+
+    def with_tip(self, name: str) -> Self:
+        """Return the same tree with one of its fingertips alone."""
+        return self.updated(tips={name: self.tips[name]})
+
+    def link_of(self, body: str | None) -> str | None:
+        """Return the body with joints that carries a body, which may be that one; None for the base."""
+        jointed = {joint.body for joint in self.joints.values()}
+        while body is not None and body not in jointed:
+            body = self.bodies[body].parent
+        return body
+
+    def chain_ends(self) -> dict[str, Tip]:
+        """Return the far ends of the bodies with joints that carry no others, by body."""
+        jointed = dict.fromkeys(joint.body for joint in self.joints.values())
+        carriers = {self.link_of(self.bodies[name].parent) for name in jointed}
+        return {name: Tip(body=name, position=self._far_end(name)) for name in jointed if name not in carriers}
+
+    def _far_end(self, link: str) -> tuple[float, float, float]:
+        """Return the point of a link's solids and shapes that is farthest from its origin, in its frame, m.
+
+        Of a sphere it is the centre, of a capsule and a cylinder an end of the axis, of a box the middle of a face.
+        """
+        frames, points = {link: (np.zeros(3), Rotation.identity())}, [np.zeros((1, 3))]
+        for name, body in self.bodies.items():
+            if name != link:
+                if body.parent not in frames or self.link_of(name) != link:
+                    continue
+                place, turn = frames[body.parent]
+                frames[name] = place + turn.apply(body.position), turn * Rotation.from_quat(body.orientation)
+            place, turn = frames[name]
+            solids: list[TreeSolid | BodyShape] = [*body.solids.values(), *body.shapes.values()]
+            for solid in solids:
+                inner = Rotation.from_quat(solid.orientation).apply(self._axis_ends(solid)) + solid.position
+                points.append(place + turn.apply(inner))
+        reached = np.round(np.concatenate(points), 15) + 0.0
+        x, y, z = reached[np.argmax(np.round(np.linalg.norm(reached, axis=1), 9))].tolist()
+        return x, y, z
+
+    def _axis_ends(self, solid: TreeSolid | BodyShape) -> Array:
+        """Return the ends of the axes of a solid, or the corners of a mesh, shape (k, 3), m, in its frame."""
+        mesh = getattr(solid, "mesh", None)
+        if mesh is not None:
+            return self.meshes[mesh].unpacked()[0]
+        half = np.array(solid.sides or (0.0, 0.0, 0.0)) / 2.0
+        half[2] += (solid.length or 0.0) / 2.0
+        return np.concatenate([np.diag(half), -np.diag(half)])
 
     def _legs(self, path: Mapping[str, Waypoint]) -> list[tuple[float, list[CordElement]]]:
         """Return divisor and legs of every part of a path: a leg crosses what moves one of its places and not all."""

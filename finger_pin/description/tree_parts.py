@@ -252,7 +252,7 @@ class Loop(Description):
 
 
 class Tip(Description):
-    """The point of the recorded motion and of the fingertip force."""
+    """A point whose motion is recorded, and at which a fingertip force acts."""
 
     body: Name | None = Field(None, description="Body that carries it; the base if left out.")
     position: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.meshes import Mesh
+from finger_pin.description.tree_parts import Tip
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.exchange.mujoco_actuators import ActuatorReader
@@ -29,7 +30,6 @@ from finger_pin.exchange.mujoco_shapes import Shapes
 from finger_pin.exchange.mujoco_tendons import TendonReader, within_margin
 from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest, apply_flags
 from finger_pin.mechanism.tendon_paths import rotation
-from finger_pin.typing import Array
 from finger_pin.version import installing
 
 _LEAST_FRICTION = 1e-7
@@ -84,7 +84,7 @@ def from_mujoco(
     if not isinstance(model, mujoco.MjModel):
         raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
     reader = _Reader(mujoco, model, plugins)
-    description = validate(FingerDescription, reader.table(name), ("finger",))
+    description = reader.with_tips(validate(FingerDescription, reader.table(name), ("finger",)))
     if moving := reader.rest.moving():
         warnings.warn(LeftOutWarning(f"{name}: not carried over: {'; '.join(moving)}"), stacklevel=2)
     return description
@@ -140,7 +140,6 @@ class _Reader:
                 "actuators": actuators,
                 "keyframes": keyframes,
                 "objects": objects,
-                "tip": self._tip(),
                 "touching": pairs,
                 "meshes": self._meshes(bodies),
                 "left_out": self.rest.listed(),
@@ -171,8 +170,7 @@ class _Reader:
     def _bodies(self) -> list[int]:
         """Return the bodies that move, are passed by tendons, or carry such bodies, parents first."""
         model = self.model
-        # What lies around does not carry a tip.
-        needed = self._passed() | {self._tip_body()[0]} | self.shapes.still() | linked_bodies(self.mujoco, model)
+        needed = self._passed() | self.shapes.still() | linked_bodies(self.mujoco, model)
         sides = [int(site) for site in model.wrap_prm[self._wraps()] if site >= 0]
         needed |= {int(body) for body in model.site_bodyid[sides]}
         moved: set[int] = set()
@@ -272,13 +270,20 @@ class _Reader:
             "armature": float(model.dof_armature[model.jnt_dofadr[i]]),
         }
 
-    def _tip_body(self) -> tuple[int, Array]:
-        """Return a body and a point of it: the first site called a tip, or the origin of the last body that moves."""
-        model = self.model
+    def with_tips(self, description: FingerDescription) -> FingerDescription:
+        """Return a description with fingertips: the first site called one on every link, and ends without such."""
+        model, tree, sites = self.model, description.tree, dict[str, dict[str, Tip]]()
         for i in range(model.nsite):
-            if "tip" in model.site(i).name.lower() and int(model.site_bodyid[i]) in self._moved_by_joints():
-                return int(model.site_bodyid[i]), model.site_pos[i]
-        return int(model.jnt_bodyid[(self.free.kept + self.kept_joints)[-1]]), np.zeros(3)
+            body = int(model.site_bodyid[i])
+            carrier = tree.link_of(self.names.bodies[body]) if body in self._moved_by_joints() else None
+            if "tip" in model.site(i).name.lower() and carrier is not None:
+                tip = Tip(body=self.names.bodies[body], position=model.site_pos[i].tolist())
+                named = entry_name(model.site(i).name).removesuffix("_fingertip")
+                sites.setdefault(carrier, {named: tip})
+        loose = {self.names.bodies[model.jnt_bodyid[i]] for i in self.free.kept}
+        ends = {name: {name: each} for name, each in tree.tips.items() if name not in loose or not self.kept_joints}
+        tips = {name: tip for each in (ends | sites).values() for name, tip in each.items()}
+        return description.updated(tree=tree.updated(tips=tips))
 
     def _moved_by_joints(self) -> set[int]:
         """Return the bodies that joints move which turn or slide."""
@@ -291,7 +296,3 @@ class _Reader:
         """Return a mask of the pieces of tendons' paths that are wraps."""
         wraps = self.mujoco.mjtWrap.mjWRAP_SPHERE, self.mujoco.mjtWrap.mjWRAP_CYLINDER
         return np.isin(self.model.wrap_type, [int(each) for each in wraps])
-
-    def _tip(self) -> Table:
-        body, position = self._tip_body()
-        return {**self.names.carrier(body, "body"), "position": position.tolist()}

@@ -113,8 +113,10 @@ class _Writer:
         world = self.elements[None] = ET.SubElement(root, "worldbody")
         for name, body in tree.bodies.items():
             self._add_body(name, body)
-        tip = self.elements[tree.tip.body]
-        ET.SubElement(tip, "site", name="fingertip", pos=numbers(*tree.tip.position))
+        for name, tip in ({"": tree.tip} if tree.tip else tree.tips).items():
+            # What is called a tip is read as one.
+            site = name if "tip" in name.lower() else "_".join(filter(None, (name, "fingertip")))
+            ET.SubElement(self.elements[tip.body], "site", name=site, pos=numbers(*tip.position))
         if self.shapes:
             geoms = add_objects(world, tree)
             add_pairs(ET.SubElement(root, "contact"), self.description, geoms, self.mobility)

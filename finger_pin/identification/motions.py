@@ -220,8 +220,13 @@ class RecordedMotion:
         """Return a column of a variable by its labels, or the difference of two, as in ``spool_tension.A-B``."""
         variable, _, label = name.partition(".")
         values, (dims, *_) = arrays[variable], arrays.variables[variable]
+        parts = label.split(".") if len(dims) > 2 else [label]
+        if len(parts) != max(len(dims) - 1, 1):
+            raise InputError(
+                f"{self._entry}.outputs.{name}", f"must be {'.'.join((variable, *map(str.upper, dims[1:])))}"
+            )
         for axis, dim in reversed(list(enumerate(dims))[1:]):
-            labels = [str(each) for each in arrays[dim]]
+            labels, label = [str(each) for each in arrays[dim]], parts[axis - 1]
             # A pair of bodies in contact has a name with a hyphen.
             columns = [label] if label in labels else label.split("-")
             missing = next((each for each in columns if each not in labels), None)

@@ -111,8 +111,9 @@ def _slopes(run: RunArrays, output: str) -> Array:
     """Return the derivatives of an output by the parameters, shape (p, m)."""
     variable, _, label = output.partition(".")
     slopes, dims = run.slopes[variable], run.variables[variable][0]
+    parts = label.split(".", len(dims) - 2) if len(dims) > 2 else [label]
     for axis, dim in reversed(list(enumerate(dims))[1:]):
-        labels = [str(each) for each in run[dim]]
+        labels, label = [str(each) for each in run[dim]], parts[min(axis, len(parts)) - 1]
         if label not in labels:
             raise InputError(f"outputs.{output}", f"there is no {label}; there are {', '.join(labels)}")
         slopes = np.take(slopes, labels.index(label), axis=axis + 1)

@@ -149,7 +149,8 @@ class SteadyReadings:
 
     def _settled(self, scenario: Scenario, load: Array) -> Array:
         """Return the posture at rest of every row nearest to the recorded one, shape (m, n), rad."""
-        finger, force = self._finger(scenario), np.array(scenario.environment.fingertip_force)
+        finger, forces = self._finger(scenario), [each.fingertip_force for each in scenario.environments().values()]
+        force = np.array(forces if len(forces) > 1 else forces[0])
         speeds = [None] * len(load) if self.recording.settings.speed is None else self.recording.speed.tolist()
         rows = zip(load, speeds, self._position, strict=True)
         return np.array([settled_posture(finger, each, speed, near, force) for each, speed, near in rows])

@@ -137,6 +137,22 @@ def as_inputs(finger: Finger, inputs: Mapping[str, float] | ArrayLike, name: str
     return np.array(finite_vector(name, values, finger.mechanism.channels))
 
 
+def at_tip(finger: Finger, tip: str | None) -> Finger:
+    """Return a finger with one fingertip of its tree, by name; itself if it has a single one.
+
+    Raises:
+        InputError: If there is no such fingertip, or several of which none is named.
+    """
+    names = finger.description.tree.tip_names
+    if tip is None and not names:
+        return finger
+    if tip not in names:
+        allowed = f"must be one of {', '.join(names)}" if names else "is of trees with several; leave it out"
+        raise InputError("tip", allowed, tip)
+    description = finger.description.updated(tree=finger.description.tree.with_tip(tip))
+    return finger.changed(description, finger.constructor_args.objects)
+
+
 def one_finger(description: FingerDescription) -> None:
     """Refuse to give a hand's fingers together for a single one.
 

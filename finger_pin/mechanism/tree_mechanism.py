@@ -29,14 +29,13 @@ from finger_pin.mechanism.spans import ANGLE, RISE
 from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, rotation
 from finger_pin.mechanism.tendon_wraps import find_wraps
 from finger_pin.mechanism.tendons import SOURCES
-from finger_pin.mechanism.urdf import build_rigid_body
+from finger_pin.mechanism.urdf import TIP_FRAME, build_rigid_body
 from finger_pin.typing import Array
 
 #: The tables of actuators without and with a state.
 STATELESS, STATEFUL, MUSCLES = "actuator", "actuator_with_state", "muscle"
 #: The table of tendons that stretch and only pull.
 ELASTIC = "elastic_cords"
-_TIP = "fingertip"
 # Dry friction of a tendon holds until it has slid so far, m.
 _HOLDS = 1e-4
 # How soon an actuator of limited rate follows its input, s.
@@ -109,14 +108,15 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if joint:
             model.appendBodyToJoint(joint, pin.Inertia(body.mass, np.array(body.centre), inertia), place)
-    tip = placed[tree.tip.body]
-    there = tip.frame * pin.SE3(np.eye(3), np.array(tree.tip.position))
-    model.addFrame(pin.Frame(_TIP, tip.joint, 0, there, pin.FrameType.OP_FRAME))
+    tips = {TIP_FRAME: tree.tip} if tree.tip else {f"{name}.{TIP_FRAME}": tip for name, tip in tree.tips.items()}
+    for name, tip in tips.items():
+        there = placed[tip.body].frame * pin.SE3(np.eye(3), np.array(tip.position))
+        model.addFrame(pin.Frame(name, placed[tip.body].joint, 0, there, pin.FrameType.OP_FRAME))
     pin.crba(model, data := model.createData(), pin.neutral(model))
     for name, moment in zip(tree.joints, np.diag(data.M), strict=True):
         if not moment > 0.0:
             raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
-    return RigidBody(model, _TIP), placed
+    return RigidBody(model, list(tips)), placed
 
 
 def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows) -> Rows:

@@ -34,7 +34,7 @@ def tree_to_urdf(description: FingerDescription, drawn: bool, base: str, tip: st
         description: The finger.
         drawn: With shapes.
         base: Name of the base's link.
-        tip: Name of the fingertip's link.
+        tip: Name of the fingertip's link; of several with their names and _ before it.
         effort: Effort limit of every joint, N m or N, for readers that want one.
         speed: Velocity limit, likewise.
     """
@@ -68,11 +68,12 @@ def tree_to_urdf(description: FingerDescription, drawn: bool, base: str, tip: st
             place = pin.SE3.Identity()
         placed[name] = name, place
         _add_link(root, name, body, place, drawn)
-    link, place = placed[tree.tip.body]
-    while tip in tree.bodies:
-        tip += "_"
-    _add_joint(root, f"{tip}_fixed", "fixed", link, tip, place * pin.SE3(np.eye(3), np.array(tree.tip.position)))
-    ET.SubElement(root, "link", name=tip)
+    for name, end in tree.fingertips.items():
+        (link, place), last = placed[end.body], f"{name}_{tip}" if name else tip
+        while last in tree.bodies:
+            last += "_"
+        _add_joint(root, f"{last}_fixed", "fixed", link, last, place * pin.SE3(np.eye(3), np.array(end.position)))
+        ET.SubElement(root, "link", name=last)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 

@@ -35,7 +35,8 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
             _JOINT, lambda of: of.reference.position - of.state.position, "rad", "desired less actual joint angle"
         ),
     }
-    tip = ("time", "axis") if len(loop.finger.rigid_body.tips) == 1 else ("time", "finger", "axis")
+    several = ("tip",) if loop.finger.description.tree.tip_names else ("finger",)
+    tip = ("time", *(several if len(loop.finger.rigid_body.tips) > 1 else ()), "axis")
     table |= {
         "fingertip_position": Quantity(tip, lambda of: of.motion.tip, "m", "fingertip position", "1"),
         **_of_tendons(),
@@ -255,6 +256,8 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
     labels |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
         labels["finger"] = list(scenario.hand.fingers)
+    if tips := finger.description.tree.tip_names:
+        labels["tip"] = ("tip", list(tips), {"long_name": "fingertip"})
     if finger.wraps:
         labels["wrap"] = ("wrap", list(finger.wrap_names), {"long_name": "bend of a tendon"})
     if routing.passive > 1:

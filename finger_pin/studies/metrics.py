@@ -192,8 +192,9 @@ def fingertip_force(run: Run) -> float:
 def _fingertip_force(scenario: Scenario, finger: Finger) -> float:
     times = scenario.simulation.duration * (np.arange(500) + 0.5) / 500
     posture = np.mean(SignalReference.from_scenario(scenario, finger.routing).at(times).position, axis=0)
-    offsets = force_polytope(finger, posture, FORCE_TENSION).offsets
-    return float(np.min(offsets)) if offsets.size else 0.0
+    tips = finger.description.tree.tip_names or (None,)
+    sets = [force_polytope(finger, posture, FORCE_TENSION, tip=tip).offsets for tip in tips]
+    return min(float(np.min(offsets)) if offsets.size else 0.0 for offsets in sets)
 
 
 def _proximal(result: xr.Dataset) -> Array:

@@ -98,7 +98,11 @@ def fingertip_hysteresis(run: Run) -> float:
     Raises:
         InputError: If neither moves to and fro.
     """
-    by_finger = [_hysteresis(run, name, finger) for name, (_, finger) in run.parts().items()]
+    by_finger = [
+        _hysteresis(run, name, finger, tip)
+        for name, (_, finger) in run.parts().items()
+        for tip in range(len(finger.rigid_body.tips))
+    ]
     if all(np.isnan(by_finger)):
         what = "the reference" if has_reference(run.scenario) else "without a reference the command"
         raise InputError("fingertip_hysteresis", f"{what} must move to and fro")
@@ -124,15 +128,15 @@ def _commands(result: xr.Dataset, prefix: str) -> Array:
     return np.asarray(stacked[:, span > 0.0] / span[span > 0.0])
 
 
-def _hysteresis(run: Run, name: str, finger: Finger) -> float:
-    """Return the hysteresis of one finger, m; nan where nothing goes to and fro."""
+def _hysteresis(run: Run, name: str, finger: Finger, tip_index: int) -> float:
+    """Return the hysteresis of one fingertip, m; nan where nothing goes to and fro."""
     result = run.result
     prefix = f"{name}." if any("." in str(each) for each in result["joint"].values) else ""
     of_finger = result.sel(joint=[prefix + joint for joint in finger.routing.joints])
 
     def tip_of(variable: str) -> Array:
         angles = rows(of_finger, variable, "joint")
-        return finger.motion(angles, np.zeros_like(angles)).tip.reshape(-1, 3)
+        return finger.motion(angles, np.zeros_like(angles)).tip.reshape(len(angles), -1, 3)[:, tip_index]
 
     tracked, tip = has_reference(run.scenario), tip_of("joint_position")
     course = tip_of("joint_reference") if tracked else _commands(result, prefix)

@@ -155,7 +155,8 @@ class Panel:
     def _add_springs(self) -> None:
         session, stage = self._player.session, self._stage
         hand = session.scenario.hand
-        names = [*hand.fingers] if hand is not None and len(stage.crosses) > 1 else ["fingertip"]
+        several = session.finger.description.tree.tip_names if hand is None else tuple(hand.fingers)
+        names = several if len(stage.crosses) > 1 else ("fingertip",)
         self._tips: list[Any] = []
         with self._gui.add_folder("Drag by a spring"):
             for index, cross in enumerate(stage.crosses):
