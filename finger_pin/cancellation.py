@@ -25,12 +25,12 @@ class CancelToken:
     """
 
     def __init__(self, stop: Stop | None = None) -> None:
-        """Take a caller's own condition, which is asked too, until it is true."""
+        """Take a condition of the caller's, which is checked as well."""
         self.cancelled, self._stop, self._stopped = False, stop, False
         self._caught: list[int] = []
 
     def __call__(self) -> bool:
-        """Return whether to end; once true, it stays so: threads end together."""
+        """Return whether to end; it stays true, so that all threads end."""
         if not (self.cancelled or self._stopped) and self._stop is not None:
             self._stopped = self._stop()
         return self.cancelled or self._stopped

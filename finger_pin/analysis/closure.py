@@ -65,7 +65,7 @@ class ClosureRange(BriefRepr):
 
 
 def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
-    """Return a finger whose tendons have the arms everywhere that they have at a posture, for statics there.
+    """Return a finger whose tendons keep the arms of one posture, for statics there.
 
     What this room says of a finger at a posture, such as `critical_friction` and `force_polytope`, it says of one with
     tendons along paths through ``posed(finger, position)``.
@@ -156,7 +156,7 @@ def locking_over_range(finger: FingerLike, samples: int = 64) -> tuple[CriticalF
 
 
 def _closure(finger: Finger, position: Array) -> tuple[ForceClosure, float]:
-    """Return the internal tensions at a posture, and their margin, signed if there is one balance alone."""
+    """Return the internal tensions at a posture and their margin, which has a sign if the balance is unique."""
     closure = ForceClosure.from_coupling(finger.coupling_at(position), finger.routing.tendons)
     balances = closure.null_space
     if balances.shape[1] != 1:

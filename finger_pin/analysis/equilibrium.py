@@ -142,7 +142,7 @@ class _Statics:
         return np.asarray(np.concatenate([state.position, state.passive_position]) / self.scale)
 
     def packed(self, y: Array) -> Array:
-        """Return the packed state at rest there."""
+        """Return the packed state at rest in a posture."""
         x, joints, places = self.rest.copy(), len(self.finger.routing.joints), self.scale * y
         state = self.finger.layout.unpack(x)
         state.position[:], state.passive_position[:] = places[:joints], places[joints:]
@@ -174,7 +174,7 @@ class _Statics:
 
 
 def _refuse_restless(finger: Finger) -> None:
-    """Refuse a hand, and a finger with parts whose rest the inputs alone do not determine."""
+    """Refuse a hand of several fingers, and a finger whose rest depends on more than its inputs."""
     description, tables = finger.description, finger.mechanism.rows
     driven = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
     stateful = any(table.states for table in finger.constructor_args.rows)

@@ -133,7 +133,7 @@ def inverse_kinematics(
 def _onto_couplings(
     theta: Array, constraints: Callable[[Array], tuple[Array, Array]], low: Array, high: Array
 ) -> Array:
-    """Return the posture within the ranges that keeps to a tree's couplings and loops, next to one that nearly does.
+    """Return the nearest posture within the ranges that satisfies a tree's couplings and loops.
 
     Raises:
         InputError: If there is none.

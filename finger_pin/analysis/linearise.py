@@ -142,7 +142,7 @@ def _slopes(
 
 
 def _slope(line: Callable[[Array], Array], value: Array, step: float) -> tuple[Array, int]:
-    """Return the derivative along a line, and the side it is from: 1 above, -1 below, 0 both."""
+    """Return the derivative along a line, and its side: 1 above, -1 below, 0 for a central difference."""
     centrals = []
     for h in step / _SHORTER ** np.arange(_TRIALS):
         values = line(h * _OFFSETS)

@@ -279,7 +279,7 @@ class FrictionLoop:
         return np.concatenate([share * gears[..., None], halves], axis=1)
 
     def _drags(self, position: Array, sliding: Array) -> Array:
-        """Return the drag on every strand besides, at every joint, shape (m, s, n), N."""
+        """Return the friction of every strand at every joint, shape (m, s, n), N."""
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
         lost = self.tendons.in_sliding(position, sliding)[1][:, :actuated]
         of_passive = sliding[:, actuated:] * self.tendons.drag[actuated:]

@@ -171,7 +171,7 @@ class TipStatics:
 
     @classmethod
     def from_finger(cls, finger: Finger, theta: Array, friction: Friction, slip: Slip | None = None) -> TipStatics:
-        """Collect the constraints; ``slip`` serves HINDERING alone."""
+        """Collect the constraints; ``slip`` is read for HINDERING only."""
         a, segments = finger.routing.actuated, Segments.from_tendons(finger.tendons, theta)
         s, n = segments.coupling.shape
         loss, drag = segments.loss[:, None], segments.drag[:, None]
@@ -261,7 +261,7 @@ def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> 
 
 
 def posture(finger: Finger, position: Sequence[float] | Array) -> Array:
-    """Return theta as an array of the right size, for a finger alone."""
+    """Return theta as an array of the right size; refuse a hand of several fingers."""
     one_finger(finger.description)
     refuse_without_tendons(finger.description)
     return finite_vector("position", position, len(finger.routing.joints))

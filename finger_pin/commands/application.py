@@ -77,7 +77,7 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
 
 @cache
 def _set_up_process() -> None:
-    """Set up this process for commands, whose libraries are imported after it; variables that are set stay."""
+    """Set up environment variables before libraries are imported; those already set stay."""
     # Imports make many objects that stay, and commands few cycles: garbage is looked for rarely, which saves a fifth of
     # a short command's time.
     gc.set_threshold(2_000_000)

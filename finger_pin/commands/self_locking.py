@@ -65,7 +65,7 @@ def self_locking(
 
 
 def scaled(name: str, scenario: Scenario, factor: float) -> Scenario:
-    """Return the scenario with M^c of the joints times a factor, and M^d equal to it."""
+    """Return the scenario with M^c of the joints multiplied by a factor, and M^d equal to M^c."""
     import numpy as np
 
     from finger_pin.description.loading import load_scenario

@@ -59,7 +59,7 @@ class PseudoInverse:
         return cls(np.asarray(np.linalg.pinv(routing.coupling.T)), routing.force_closure().tension)
 
     def plan(self, torque: Array, minimum: Array) -> TensionAllocation:
-        """Return f_hat of (21) with lambda of (22); nothing is short."""
+        """Return f_hat of (21) with lambda of (22), and no torque deficit."""
         minimal = torque @ self.inverse.T
         levels = internal_level(minimum, minimal, self.internal)
         tight = np.argmax(levels, axis=-1)

@@ -70,7 +70,7 @@ class PalmPath:
         return -np.roll(self.signal.derivative(time, order), 3, axis=-1)
 
     def base(self, time: Array | float) -> Array:
-        """Return the 27 numbers of `base_motion`, and accelerations of a world that it sees, shape (..., 27 or 33)."""
+        """Return the 27 numbers of `base_motion`, and six accelerations of a moving world, shape (..., 27 or 33)."""
         place, first, second, third = (np.moveaxis(self.signal.derivative(time, order), -1, 0) for order in range(4))
         turns = [each(angle) for angle in place[3:] for each in (np.sin, np.cos)]
         motion = base_motion(first, second, third, turns, self.gravity)
@@ -139,7 +139,7 @@ class PrescribedObjects:
 
 
 def at_start(finger: Finger, x: Array, palm: PalmPath | None, guides: PrescribedObjects | None) -> Array:
-    """Return a packed state with world and objects where paths have them at the start."""
+    """Return a packed state with palm and objects at the start of their paths."""
     if palm is not None:
         return palm.place_world(finger, x)
     return x if guides is None else guides.place(finger, x)

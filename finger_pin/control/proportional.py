@@ -44,7 +44,7 @@ class ProportionalController(LoopController):
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> ProportionalController:
-        """Read the paper's part of a scenario's controller; `build_controller` returns the whole."""
+        """Read the paper's controller (19)-(22) of a scenario, without additions to it."""
         gain = expand(scenario.controller.gain, len(routing.joints))
         minimum = expand(scenario.controller.minimum_tension, len(routing.tendons))
         damping = expand(scenario.controller.damping, len(routing.joints))

@@ -72,11 +72,11 @@ class UserReference:
         )
 
     def signals(self) -> tuple[Signal, ...]:
-        """Return nothing: it is Python."""
+        """Return no signals: what a custom reference or controller follows is unknown."""
         return ()
 
     def planned(self) -> None:
-        """Return None: it is Python."""
+        """Return None: a custom reference has no plan for the compiled core."""
 
     def _one(self, time: float) -> ReferenceSignals:
         answer = self.reference.at(time + self.start)

@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Island:
-    """An island's indices in the whole, in the order of the whole."""
+    """The indices of an island in the whole mechanism, in order."""
 
     coordinates: Indices
     rows: Indices
@@ -121,7 +121,7 @@ class Selection:
 
     @classmethod
     def from_island(cls, tables: Tables, island: Island) -> Selection:
-        """Return the part that an island has of tables."""
+        """Return an island's part of tables."""
         rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.prescribed)
         bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
         counts = np.diff(np.searchsorted(rows, np.append(tables.groups.first, len(tables.state))))
@@ -176,7 +176,7 @@ class Selection:
 
 @memoised(_wires)
 def selections(tables: Tables, control: InputTable) -> list[Selection]:
-    """Return the part of every island, found once for each wiring."""
+    """Return the rows and states of every island; remembered for equal wiring."""
     islands = find_islands(tables, control)
     states = np.sort(np.concatenate([each.states for each in islands]))
     if not np.array_equal(states, np.arange(len(tables.state_row))):
@@ -187,7 +187,7 @@ def selections(tables: Tables, control: InputTable) -> list[Selection]:
 
 
 def _chosen(signal: SignalTable, functions: Indices) -> SignalTable:
-    """Return some functions of a signal; none of none."""
+    """Return some functions of a signal, which may have none."""
     if not len(signal.harmonics):
         return signal
     coefficients = np.ascontiguousarray(signal.coefficients[:, :, functions])

@@ -28,7 +28,7 @@ def usable_cores() -> int:
 
 @cache
 def _share() -> float:
-    """Return the cores that a container's time is worth; infinite where it is not limited."""
+    """Return the number of cores that a container's limit of time allows; infinite without a limit."""
     try:
         time, period = _CPU_MAX.read_text().split()
         return float(time) / float(period)
@@ -71,7 +71,7 @@ def in_threads(task: Callable[[_Item], _Result], items: Sequence[_Item]) -> list
 
 @cache
 def pool() -> ThreadPoolExecutor:
-    """Return threads that stay: to start them takes longer than many a task."""
+    """Return the persistent thread pool, since starting threads takes longer than many tasks."""
     return ThreadPoolExecutor(usable_cores(), "finger_pin")
 
 

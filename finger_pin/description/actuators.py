@@ -25,7 +25,7 @@ from finger_pin.description.validation import (
 
 
 class DataSheet(Description):
-    """A maker's data sheet; K_t, R and c0 follow, and both its ends come out exactly."""
+    """A maker's data sheet, from which K_t, R and c0 follow so that stall and free speed are exact."""
 
     stall_torque: Annotated[float, real(0.0, 1e4, above=True, hint=" N m (is it in kg cm?)")] = quantity(
         ..., unit="N m", source="maker's sheet", doc="T_s, torque at rest at the voltage."

@@ -13,10 +13,10 @@ _P = ParamSpec("_P")
 
 
 class _Call(Generic[_Made]):
-    """A call, which is the same as another if its parts are: descriptions as objects, all else by value."""
+    """Key of a call: descriptions are compared by identity, all else by value."""
 
     def __init__(self, parts: tuple[object, ...], make: Callable[[], _Made]) -> None:
-        """Keep the parts: of those that have gone, others may have the identity."""
+        """Keep the parts alive, so that their identities are not reused."""
         self._parts, self._make = parts, make
         self._key = tuple([id(part) if isinstance(part, BaseModel) else part for part in parts])
 
@@ -27,7 +27,7 @@ class _Call(Generic[_Made]):
         return isinstance(other, _Call) and self._key == other._key
 
     def made(self) -> _Made:
-        """Return the value, and let go of all that it was made from besides its parts."""
+        """Return the value, and release the arguments it was computed from."""
         make = self._make
         del self._make
         return make()
@@ -74,7 +74,7 @@ class cached_property(Generic[_Made]):
     def __get__(self, instance: object, owner: type | None = None) -> _Made: ...
 
     def __get__(self, instance: object | None, owner: type | None = None) -> Self | _Made:
-        """Return the value; the object's own entry of this name, once it is there, comes before."""
+        """Compute the value; later reads find it in the object's dictionary."""
         if instance is None:
             return self
         value: _Made = vars(instance).setdefault(self._name, self._function(instance))

@@ -49,7 +49,7 @@ class CordPart(NamedTuple):
 
     @property
     def crossed(self) -> frozenset[str]:
-        """The joints that it crosses."""
+        """The joints that the cord crosses."""
         return frozenset[str]().union(*(element.crossed for element in self.elements))
 
     def sliding(self) -> tuple[CordElement, ...]:

@@ -195,7 +195,7 @@ OF_SCENARIO = (
 
 
 def idle(described: Description, rules: tuple[Rule, ...]) -> Iterator[tuple[str, Any, str]]:
-    """Yield the entries that are given and have no effect: dotted name, value, and what is to be said."""
+    """Yield the entries that are set and have no effect: dotted name, value and message."""
     for rule in rules:
         for name, table in _tables(described, rule.table):
             for entry in rule.entries or type(table).model_fields:
@@ -226,7 +226,7 @@ def refuse_idle(described: Description, rules: tuple[Rule, ...]) -> None:
 
 
 def shown(value: Any) -> Any:
-    """Return a value as messages show it; of a table nothing."""
+    """Return a value as messages show it, None for a table."""
     return None if isinstance(value, Description | dict) else value
 
 
@@ -243,7 +243,7 @@ def _tables(described: Any, name: str) -> Iterator[tuple[str, Description]]:
 
 
 def _differs(table: Description, entry: str, value: Any) -> bool:
-    """Return whether a value is another than the default, once for all or for each, and asks for anything."""
+    """Return whether a value, one number or one each, differs from the default and from zero."""
     default = type(table).model_fields[entry].default
     uniform = isinstance(value, tuple) and all(each == default for each in value)
     # Zero asks for none of what there is not.

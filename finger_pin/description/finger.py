@@ -154,7 +154,7 @@ class FingerDescription(Description):
 
     @property
     def hand(self) -> HandSettings | None:
-        """The palm and the fingers on it, if it is a hand of such."""
+        """The palm and its fingers, None for a finger alone."""
         return self._hand
 
     @property

@@ -108,7 +108,7 @@ def describe(finger: DescriptionLike) -> FingerDescription:
 
 
 def _is_scenario(name: str) -> bool:
-    """Return whether there is a scenario of a name or in a file, right or wrong."""
+    """Return whether a name or file is that of a scenario, valid or not."""
     try:
         table, _ = read_scenario_file(name, Path())
     except InputError:
@@ -191,7 +191,7 @@ def _scenario(table: Table, folder: Path, name: str, overrides: Table) -> Scenar
 
 
 def _resolved(table: Table, overrides: Table, folder: Path = Path()) -> Scenario:
-    """Return the scenario of a table, which changes; descriptions in it that no key touches stay the same ones."""
+    """Return the scenario of a table, which is changed; descriptions that no key touches stay the same objects."""
     override(overrides, table, folder)
     resolve_signals(table, Path())
     resolve_commands(table)

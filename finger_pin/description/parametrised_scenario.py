@@ -61,7 +61,7 @@ class ParametrisedScenario:
 
     @classmethod
     def from_finger(cls, description: FingerDescription, keys: Sequence[str]) -> ParametrisedScenario:
-        """Return the family of a scenario in which nothing but a finger or a hand is of account.
+        """Return the family of a scenario of which only the finger or hand matters.
 
         Raises:
             InputError: If there is no such key, or one is not of a finger or a hand.
@@ -123,7 +123,7 @@ def split(key: str) -> tuple[str, tuple[int, ...] | None]:
 
 
 def _entry(owner: Any, path: Sequence[str]) -> Any:
-    """Return the value of an entry, defaults among them; None for nothing."""
+    """Return the value of an entry, set or default; None if there is none."""
     for at, part in enumerate(path):
         if isinstance(owner, Mapping):
             # Tables of a hand have dotted names inside.

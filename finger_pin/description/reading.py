@@ -225,7 +225,7 @@ def is_other_kind(base: Table, top: Table) -> bool:
 
 
 def merge(base: Table, top: Table) -> Table:
-    """Return a table with the entries of another on top; "none" there takes away what is below it."""
+    """Return a table with the entries of another on top; the value "none" removes an entry."""
     merged = without_unread(base, top)
     for key, value in top.items():
         if key in merged and isinstance(value, str) and value == NONE:

@@ -81,7 +81,7 @@ class Scenario(Description):
         return self
 
     def _choose_kind(self) -> None:
-        """Choose the open loop for fingers of whose closed loop nothing is said, where there is no other way."""
+        """Choose the open loop for fingers without closed-loop settings that can run in open loop alone."""
         alone, chosen = {} if self.hand is None else self.hand.parts(), {}
         for name in alone or ("",):
             settings, prefix = of_finger(self.controller, name), f"{name}." if name else ""
@@ -144,12 +144,12 @@ class Scenario(Description):
         return table
 
     def _objects_beside_tree(self) -> dict[str, Object]:
-        """Return the objects of the environment less those of the tree, where they can be changed."""
+        """Return the objects of the environment without those of the tree."""
         of_tree = self.finger.tree.objects_at(self.keyframe)
         return {name: body for name, body in (self.environment.objects or {}).items() if body != of_tree.get(name)}
 
     def set_entries(self) -> dict[str, Any]:
-        """Return the entries that it was given; objects that stand in the tree stay there."""
+        """Return the entries that were set, without the objects of the tree."""
         entries = super().set_entries()
         if "environment" in entries and self.finger.tree.objects:
             entries["environment"] = self.environment.updated(objects=self._objects_beside_tree() or None)

@@ -185,7 +185,7 @@ class Tree(Description):
         return np.concatenate([np.diag(half), -np.diag(half)])
 
     def _legs(self, path: Mapping[str, Waypoint]) -> list[tuple[float, list[CordElement]]]:
-        """Return divisor and legs of every part of a path: a leg crosses what moves one of its places and not all."""
+        """Return divisor and legs of every part of a path; a leg crosses the joints that move only one of its ends."""
         parts: list[tuple[float, list[CordElement]]] = [(1.0, [])]
         before: set[str] | None = None
         wrapped: set[str] | None = None

@@ -62,7 +62,7 @@ class Muscle(Description):
 
     @property
     def optimal_length(self) -> float:
-        """L_0, m, of what it drives."""
+        """L_0, m, of the driven joint or tendon."""
         return (self.length_range[1] - self.length_range[0]) / (self.range[1] - self.range[0])
 
 
@@ -145,7 +145,7 @@ class TreeActuator(Description):
         return self
 
     def reach(self, joint: Pair | None) -> Pair | None:
-        """Return the least and the largest input: its range, or what holds a joint at the ends of its own; or None."""
+        """Return the least and largest input: its range, or the goals at the ends of a joint's range; or None."""
         if self.muscle is not None:
             return self.excitations
         if self.input_range is not None:

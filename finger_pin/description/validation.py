@@ -53,7 +53,7 @@ class Description(BaseModel):
         return self.model_copy(update=entries)
 
     def set_entries(self) -> dict[str, Any]:
-        """Return the entries that it was given, as tables have them; descriptions in them stay such."""
+        """Return the entries that were set, as in tables; nested descriptions stay objects."""
         return nested({key: getattr(self, key) for key in self.model_fields_set})
 
 

@@ -67,7 +67,7 @@ class ActuatorReader(ElementReader):
         return [i for i in self.laws if self._pulls(i)]
 
     def table(self) -> Table:
-        """Return all others, by name."""
+        """Return all actuators but the motors that only pull tendons, by name."""
         model, actuators = self.model, {}
         self._list_shared_limits()
         for i in self.laws:
@@ -112,7 +112,7 @@ class ActuatorReader(ElementReader):
         return tendons
 
     def _name(self, i: int) -> str:
-        """Return the name of an actuator; that of a motor which pulls is of no other tendon than its own."""
+        """Return the name of an actuator, made unique if a motor has that of a tendon it does not pull."""
         name, tendons = self.names.actuators[i], self.names.tendons
         if i not in self.pulling or name == tendons[self.model.actuator_trnid[i, 0]]:
             return name
@@ -169,7 +169,7 @@ class ActuatorReader(ElementReader):
         return "tendon" if of_tendon else "joint", int(self.model.actuator_trnid[i, 0])
 
     def _route(self, tendon: int, same: bool) -> Table:
-        """Return the path of a tendon, or of one that has another name the joints that it crosses and that bend it."""
+        """Return the path of a tendon; if it has another name, the joints that it crosses and that bend it."""
         around = self._around(tendon)
         if same or not around:
             return {"along": self.names.tendons[tendon]}

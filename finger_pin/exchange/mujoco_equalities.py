@@ -17,7 +17,7 @@ _WELD = 1e-3
 
 
 def linked_bodies(mujoco: Any, model: Any) -> set[int]:
-    """Return the bodies that connections and welds hold together, none that others lead, nor the world."""
+    """Return the bodies that connections and welds hold together, without mocap bodies and the world."""
     linked: set[int] = set()
     for i in (int(each) for each in np.flatnonzero(model.eq_active0)):
         if model.eq_type[i] in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):

@@ -41,7 +41,7 @@ def read_keyframes(
 
 
 def _list_rest(read: ElementReader, free: FreeBodies, name: str, k: int, act: Array) -> None:
-    """List what a keyframe says besides: activations, and speeds of free bodies in the tree."""
+    """List what of a keyframe is left out: activations, and speeds of free bodies in the tree."""
     model = read.model
     if np.any(np.abs(act) > _SAME):
         read.rest.add(f"keyframe {name}: activations of its actuators, which start at zero")

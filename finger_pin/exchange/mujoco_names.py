@@ -27,7 +27,7 @@ class Names:
 
     @classmethod
     def from_model(cls, model: Any, plugins: list[str]) -> Names:
-        """Read the names of a model; those of instances of plugins only its specification has."""
+        """Read the names of a model; names of plugin instances come from its specification."""
         return cls(
             bodies=distinct("body", [model.body(i).name for i in range(model.nbody)]),
             joints=distinct("joint", [model.joint(i).name for i in range(model.njnt)]),
@@ -75,5 +75,5 @@ def distinct(what: str, names: list[str]) -> list[str]:
 
 
 def free_name(name: str, used: Container[str], what: str) -> str:
-    """Return a name that is not used yet: with the kind of its element behind it where it is."""
+    """Return an unused name: the kind of element is appended if the name is taken."""
     return free_name(f"{name}_{what}", used, what) if name in used else name

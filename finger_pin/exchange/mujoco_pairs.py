@@ -73,7 +73,7 @@ class Pairs(ElementReader):
         return {i: {"friction": friction[i], "stiffness": stiffness[i], "damping": damping[i]} for i in friction}
 
     def _shared(self, what: str, wanted: dict[Pair, float], moves: bool = True) -> dict[int, float]:
-        """Return the least number of each geom with which no pair has less than it is to have; list those with more."""
+        """Return a number for each geom so that no pair gets too little; list the pairs that get more."""
         numbers: dict[int, float] = {}
         for pair, number in wanted.items():
             for i in pair:
@@ -120,7 +120,7 @@ class Pairs(ElementReader):
 
 
 def _kept(dim: int, friction: Array) -> Array:
-    """Return coefficients of sliding, turning and rolling as a contact of a dimension has them."""
+    """Return the coefficients of sliding, turning and rolling that a contact dimension uses, others zero."""
     return np.asarray(friction) * [dim >= 3, dim >= 4, dim >= 6]
 
 

@@ -130,7 +130,7 @@ SCHEMA: dict[str, dict[Kind, str]] = {
 
 
 def kind_of(path: tuple[str, ...], attribute: str) -> Kind | None:
-    """Return what becomes of an attribute of an element, by the names from the root to it; None if nothing is known."""
+    """Return how an attribute is treated, by the path of its element; None if it is unknown."""
     if attribute in _NO_EFFECT.split():
         return "idle"
     for end in range(len(path), 0, -1):

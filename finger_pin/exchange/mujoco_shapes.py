@@ -19,7 +19,7 @@ _UNEVEN = 0.02
 
 
 class Shapes:
-    """Spheres, capsules, boxes and cylinders that collide; all else that does is listed by name."""
+    """Colliding spheres, capsules, boxes and cylinders; other colliding geoms are listed by name."""
 
     def __init__(self, read: ElementReader) -> None:
         """Read the geoms of a model."""
@@ -161,7 +161,7 @@ class Shapes:
         return {"velocity": velocity[3:].tolist(), "angular_velocity": turned.tolist()} if velocity.any() else {}
 
     def _list_free(self, body: int, i: int, described: Table) -> None:
-        """List what a free body has and an object has not."""
+        """List properties of a free body that objects lack."""
         model, name, first = self.model, self.names.bodies[body], int(self.model.body_dofadr[body])
         turned = rotation(quaternion(model.geom_quat[i])).T @ rotation(quaternion(model.body_iquat[body]))
         moments = turned @ np.diag(model.body_inertia[body]) @ turned.T
@@ -193,7 +193,7 @@ class Shapes:
         return apart
 
     def set_apart(self, objects: Table, bodies: list[int]) -> None:
-        """Note with objects the shapes, and the objects before them, that MuJoCo does not let collide with them."""
+        """Set the entry ``apart`` of objects: what MuJoCo does not let collide with them."""
         weld, carriers = self.model.body_weldid, self.model.geom_bodyid
         shapes = {
             i: self.names.geoms[i] for i in self._colliding if self._solid(i) and int(carriers[i]) in (0, *bodies)

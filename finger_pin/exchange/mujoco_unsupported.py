@@ -87,7 +87,7 @@ class Rest:
         return list(dict.fromkeys(self._listed))
 
     def moving(self) -> list[str]:
-        """Return those among them that move or carry something, a line each."""
+        """Return the lines about elements that move or carry something."""
         return list(dict.fromkeys(self._moving))
 
     def add(self, line: str, moves: bool = True) -> None:
@@ -105,7 +105,7 @@ class Rest:
             self.add(f"{self._name(what, self.model.dof_jntid[i] if attribute.startswith('dof') else i)}: {has}")
 
     def _default(self, what: str, lossy: NDArray[np.bool_], solref: NDArray[np.float64], owner: Any) -> None:
-        """List dry friction that a time constant of its own lets creep: here it gives by a small length."""
+        """List dry friction with a ``solreffriction`` of its own, which is not read."""
         for i in np.flatnonzero(lossy & np.any(solref != _SOLREF, axis=1)):
             self.add(f"{self._name(what, owner[i])}: solreffriction, by which its dry friction creeps", moves=False)
 
@@ -168,7 +168,7 @@ def apply_flags(mujoco: Any, model: Any) -> Any:
 
 
 def _add_drives(mujoco: Any, model: Any) -> None:
-    """Add armature and damping of actuators, which act whatever these do, to those of the joints or tendons driven."""
+    """Add armature and damping of actuators to the joints or tendons that they drive."""
     for i in np.flatnonzero(model.actuator_armature + model.actuator_damping):
         at, ratio = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0]) ** 2
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:

@@ -39,7 +39,7 @@ def digest(
 
 
 class Checkpoint:
-    """Finished pieces of work by name; in memory alone without a folder."""
+    """Finished pieces of work by name, kept in a folder, or only in memory without one."""
 
     def __init__(self, folder: Path | None, asked: str, restart: bool) -> None:
         """Read the pieces of the same identification; those of another one are forgotten."""
@@ -71,7 +71,7 @@ class Checkpoint:
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
-        """Keep the finished pieces, whatever has happened; none of a wrong question."""
+        """Write the finished pieces, also after an error, unless the request itself was wrong."""
         if self._path is None:
             return
         if isinstance(error, InputError):

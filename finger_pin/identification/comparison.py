@@ -86,7 +86,7 @@ def other_laws(problem: Problem, settings: IdentifySettings) -> dict[str, Proble
 
 
 def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
-    """Return the problem under another law: some keys fixed, some with other bounds."""
+    """Return the problem under another friction law, with its fixed keys and bounds."""
     bounds = {key: (float(a), float(b)) for key, a, b in zip(*_asked(problem), strict=True)}
     fixed: dict[str, float] = {}
     for key, value in law.items():

@@ -208,7 +208,7 @@ def _objective(problem: Problem, counted: Sequence[Array], shares: Array, scale:
 
 
 def _step(problem: Problem, z: Array, free: NDArray[np.bool_], system: Array, radius: float) -> tuple[Array, float]:
-    """Return a step within the bounds, and the fall of minus twice the likelihood with it to second order."""
+    """Return a step within the bounds, and the fall of -2 log L that it predicts to second order."""
     low, high = problem.box
     width = high - low
     # Strictly apart, as `lsq_linear` asks: at a bound by what is lost when the step is added.

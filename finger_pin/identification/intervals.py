@@ -159,7 +159,7 @@ def profile(
 
 
 def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
-    """Return the crossing of the rise's root, nearly straight, with the level's, from points on either side."""
+    """Return where the root of the rise in likelihood crosses that of the level, from points on either side."""
     target = math.sqrt(LEVEL)
     if math.isinf(outer[1]) and math.isfinite(outer[0]):
         return 0.5 * (inner[0] + outer[0])

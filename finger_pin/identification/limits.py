@@ -36,7 +36,7 @@ class Limits:
 
     @classmethod
     def from_parts(cls, parts: Sequence[ScenarioPart], parameters: Sequence[str], low: Array, high: Array) -> Limits:
-        """Return limits; refuse a bound outside its own range, and all of them if no values within them go together.
+        """Return the limits of parts; refuse bounds outside a range, or without any allowed values.
 
         Raises:
             InputError: Naming the key, its bound and what is wrong with it.
@@ -71,7 +71,7 @@ class Limits:
         return None
 
     def nearest(self, values: Array, free: NDArray[np.bool_] | None = None) -> Array:
-        """Return allowed values on the way to a corner of the bounds, to a near one first; the same if there are none.
+        """Return the nearest allowed values on lines to corners of the bounds; the same values if there are none.
 
         Args:
             values: Shape (p,).

@@ -48,7 +48,7 @@ def held_out_rows(recording: Recording) -> NDArray[np.bool_]:
 def recording_models(
     scenario: Scenario, recordings: Sequence[Recording], finger: Finger | None, wanted: Sequence[NDArray[np.bool_]]
 ) -> tuple[list[RecordingModel], list[RecordedSignal]]:
-    """Return the models of recordings, one for each window that has wanted rows, and all of their outputs.
+    """Return the models of recordings, one for each window with selected rows, and all their outputs.
 
     Raises:
         InputError: If an input or output names nothing of the scenario.

@@ -109,7 +109,7 @@ class FitPipeline:
             self._cross()
 
     def _roughly(self, starts: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
-        """Return the ends of rough searches: those that may be near the best place, and the others."""
+        """Return the ends of rough searches in two groups: promising ones, and the others."""
         if not self.problem.moves:
             return starts, []
         rough, minima = self.problem.rough(), dict[int, Fit]()
@@ -256,7 +256,7 @@ def _check_felt(problem: Problem, fits: Sequence[Fit], places: Sequence[Array]) 
 
 
 def beside(problem: Problem, z: Array) -> list[Array]:
-    """Return lines of places through a minimum, shape (k, p) each, in directions that are known by cycles alone.
+    """Return lines of points through a minimum, shape (k, p) each, along directions with several minima.
 
     What cycles tell has a minimum for each of them; what means over cycles tell leaves so many of these open.
     """

@@ -178,7 +178,7 @@ def _noise(result: xr.Dataset, recording: str, name: str) -> float:
 
 
 def _beyond(result: xr.Dataset, load: Array) -> float:
-    """Return the share of loads, N, that are more or less than all that were fitted; not numbers are within."""
+    """Return the share of loads, N, outside the range of those that were fitted; nan counts as inside."""
     fitted = result["applied"].values[np.isfinite(result["applied"].values)]
     least, most = (float(fitted.min()), float(fitted.max())) if len(fitted) else (-math.inf, math.inf)
     return float(np.mean((load < least) | (load > most)))

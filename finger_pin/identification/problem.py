@@ -117,7 +117,7 @@ class Problem:
         self.start: Array = self.feasible(self.to_search(np.clip(start, self.low, self.high)))
 
     def feasible(self, z: Array, free: NDArray[np.bool_] | None = None) -> Array:
-        """Return z, shape (p,), or a place near it whose values go together; only free ones change, all by default."""
+        """Return z, shape (p,), or the nearest allowed point, by changing only the free parameters (all by default)."""
         values, places = self.values(z), self._numbers
         allowed = self._limits.nearest(values[places], None if free is None else free[places])
         changed = allowed != values[places]

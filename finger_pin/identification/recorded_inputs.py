@@ -72,7 +72,7 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
 
 
 def check_references(recording: Recording, scenario: Scenario) -> None:
-    """Refuse goals of joints that nothing reads.
+    """Refuse recorded goals of joints without a controller that reads them.
 
     Raises:
         InputError: Naming the column.

@@ -130,10 +130,10 @@ class RecordingModel(Protocol):
 
     @property
     def nuisance_parameters(self) -> tuple[NuisanceParameter, ...]:
-        """The numbers to be found for it alone."""
+        """The parameters of this recording alone."""
 
     def doubt(self, sought: Collection[str]) -> str:
-        """Return a warning about the recording where keys are sought; empty if nothing is doubtful."""
+        """Return a warning about a recording for the parameters to be found; empty if there is none."""
 
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""

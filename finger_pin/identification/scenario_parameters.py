@@ -161,7 +161,7 @@ def check_apart(recording: str, settings: RecordingSettings, keys: Sequence[str]
 
 
 def with_recorded_values(scenario: Scenario, recording: str, settings: RecordingSettings) -> Scenario:
-    """Return the scenario of a recording, with the values that hold for it alone.
+    """Return the scenario of a recording, with the parameters that belong to it alone.
 
     Raises:
         InputError: Naming the recording's entry.

@@ -21,7 +21,7 @@ _OF_MASSES = 1e-3
 
 
 def settled_posture(finger: Finger, load: Array, speed: float | None, near: Array, force: Array) -> Array:
-    """Return the stable posture at rest near another, shape (n,), rad; not numbers if there is none.
+    """Return the stable posture at rest near another, shape (n,), rad; nan if there is none.
 
     Newton's method is tried first; the descent of `equilibrium` is some five times slower, and finds it from anywhere.
 
@@ -72,7 +72,7 @@ def settled_posture(finger: Finger, load: Array, speed: float | None, near: Arra
 
 
 def _newton(acceleration: Callable[[Array], Array], start: Array) -> Array | None:
-    """Return the stable zero of accelerations that Newton's method finds from a start; None if it finds none."""
+    """Return the stable zero of accelerations near a start, by Newton's method; None if it fails."""
     y, slopes, before = start, np.zeros((0, 0)), 0.0
     for _ in range(_STEPS):
         here = acceleration(y)

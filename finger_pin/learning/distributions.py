@@ -87,7 +87,7 @@ class Choice:
     values: Sequence[Any]
 
     def __post_init__(self) -> None:
-        """Check that there is one."""
+        """Check that there is at least one value."""
         if isinstance(self.values, str) or not len(self.values):
             raise InputError("Choice.values", "must be a list of at least one value", self.values)
 

@@ -53,7 +53,7 @@ class BatchedSnapshot(SampledTrajectory):
             delattr(self, name)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all but views, which a copy makes of its own states."""
+        """Return all attributes but views, which a copy makes anew."""
         return {name: value for name, value in vars(self).items() if name in _STAYING and name != "state"}
 
 
@@ -102,7 +102,7 @@ class BatchedLoop(ClosedLoop):
         return cls(**parts, loops=loops, actions=actions, accelerated=accelerated)
 
     def replace_world(self, index: int, loop: ClosedLoop, action: Action) -> None:
-        """Put another world in the place of one; all have separate loops then."""
+        """Replace a world; all have separate loops afterwards."""
         self.loops[index], self.actions[index] = loop, action
         assert isinstance(self.dynamics, CompiledFingers)
         self.dynamics.replace(index, _compiled(loop))

@@ -162,7 +162,7 @@ TASKS = {"Reach-v0": _reach, "Press-v0": _press, "Grasp-v0": _grasp}
 
 
 def make(name: str, render_mode: str | None = None, **task: Any) -> Environment:
-    """Return a task that ships, with the given fields in place of its own."""
+    """Return the environment of a shipped task, with some fields replaced."""
     return Environment(render_mode=render_mode, **{**TASKS[name](), **task})
 
 

@@ -21,7 +21,7 @@ from finger_pin.mechanism.coerce import FingerLike
 
 
 class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
-    """Worlds of one scenario, each as `Environment` has it: world i seeded with seed + i goes as that one does.
+    """Many worlds of one scenario; world i with seed + i repeats `Environment` with that seed.
 
     The compiled core holds no lock of Python, so threads step the worlds side by side; numbers do not depend on how
     many threads there are. An episode that is over begins anew at the next step, whose action does not count.

@@ -62,7 +62,7 @@ class World:
         finger: Finger | None,
         origin: ClosedLoop | None = None,
     ) -> None:
-        """Build the scenario, unless another world's loop serves; use `from_scenario` or `twin`."""
+        """Build the scenario, or share another world's loop; use `from_scenario` or `twin`."""
         self.task, self._family, self._randomisation, self._custom_finger = task, family, randomisation, finger
         self.sampled: dict[str, Any] = {}
         self.context: dict[str, Array] = {}
@@ -223,7 +223,7 @@ class World:
         raise problem
 
     def act(self, action: Array) -> float:
-        """Take an action for a control period; return the time until which the inputs act that it begins with, s."""
+        """Begin a control period with an action; return the end of its first piece, s."""
         self.action.take(action, self.time)
         self._step += 1
         return self._next_end()

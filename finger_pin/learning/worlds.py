@@ -23,7 +23,7 @@ _Places = NDArray[np.int64]
 
 
 class Worlds:
-    """Some worlds; arrays have them in front.
+    """Batch of worlds, the first dimension of all arrays.
 
     Attributes:
         task: The task of the policy.

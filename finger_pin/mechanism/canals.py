@@ -120,7 +120,7 @@ class Canals:
     def _rub(
         self, group: str, canals: Sequence[_Canal], left: dict[str, dict[tuple[str, str], float]], first: int = 1
     ) -> None:
-        """Add tables of wraps, the first of every canal, then the second, and note by canal what changes its tension.
+        """Add the tables of friction at wraps, first to last, and note how each changes its canal's tension.
 
         Args:
             group: Name of the tables.
@@ -158,7 +158,7 @@ class Canals:
         )
 
     def _actuated(self, index: int, name: str, routes: TendonPaths, drive_matrices: Mapping[str, Array]) -> _Canal:
-        """Return the canal of an actuated tendon of the finger, pulled by its drives besides what its source leaves."""
+        """Return the canal of an actuated tendon, with all rows that pull it."""
         drives = {
             (group, self._known[group].names[k]): float(weights[index, k])
             for group, weights in drive_matrices.items()
@@ -196,7 +196,7 @@ class Canals:
         return _Canal(name, index, route, one_way, crossed, sources, 0.0, bends, tendon.friction, wraps)
 
     def _behind(self, trunk: _Canal, friction: dict[tuple[str, str], float]) -> list[_Canal]:
-        """Return the branches of a tendon: what pulls them is what the trunk's friction leaves, divided."""
+        """Return the branches of a tendon behind a pulley, pulled by the trunk's tension after friction, divided."""
         parts = self._description.cord(trunk.name).parts[1:]
         branches, behind = [], zip(trunk.route.branches, parts, strict=True)
         for number, ((divisor, legs), part) in enumerate(behind, start=1):
@@ -248,7 +248,7 @@ class Canals:
         )
 
     def _press(self, wrap_group: str, canals: Sequence[_Canal], *, whole: bool) -> None:
-        """Record how the friction of canals, and as a whole what pulls through them, load the joints they cross."""
+        """Record how tensions and friction of canals load the joints that they cross."""
         for joint, (name, rubs) in enumerate(zip(self._joints, self._description.bearings, strict=True)):
             if not rubs:
                 continue

@@ -23,12 +23,12 @@ FingerLike: TypeAlias = Finger | DescriptionLike
 
 
 def as_finger(finger: FingerLike, objects: Mapping[str, Object] | None = None) -> Finger:
-    """Return the `Finger` of any form of one; one that is built here gets the objects around it."""
+    """Return a `Finger` from a finger, a description, a name or a path; a new one gets the objects around it."""
     return finger if isinstance(finger, Finger) else Finger(finger, objects=objects)
 
 
 def description_of(finger: FingerLike) -> FingerDescription:
-    """Return the description of a finger that is given in any way; none is built."""
+    """Return the description of a finger, from a finger, a description, a name or a path."""
     return finger.description if isinstance(finger, Finger) else describe(finger)
 
 
@@ -38,7 +38,7 @@ def resolve_finger(finger: FingerLike | None, scenario: Scenario) -> Finger | No
 
 
 def with_finger(scenario: Scenario, finger: Finger | None) -> Scenario:
-    """Return a scenario with the objects and the description of the finger that replaces its own; a hand's stays."""
+    """Return a scenario with the description and objects of a finger in place of its own; a hand is kept."""
     if finger is None:
         return scenario
     replacement = {} if scenario.hand is not None else {"finger": finger.description}
@@ -154,7 +154,7 @@ def at_tip(finger: Finger, tip: str | None) -> Finger:
 
 
 def one_finger(description: FingerDescription) -> None:
-    """Refuse to give a hand's fingers together for a single one.
+    """Refuse a hand of several fingers where one finger is needed.
 
     Raises:
         InputError: If it is a hand of several fingers.

@@ -117,7 +117,7 @@ def _edges(solid: Solid, rounding: float) -> list[ContactPart]:
 
 
 def _rims(solid: Solid, rounding: float) -> list[ContactPart]:
-    """Return both rims of a cylinder, and three studs of each face, against spinning on the spot."""
+    """Return both rims of a cylinder, and three points of each face, which resist spinning on the spot."""
     radius, half = solid.sizes[0], 0.5 * solid.sizes[1] - rounding
     parts = []
     for side in (-half, half):

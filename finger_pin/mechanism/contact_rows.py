@@ -61,7 +61,7 @@ def contact_rows(
 
 
 def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> PathElement:
-    """Return the gap between a part of one solid and all of another."""
+    """Return the gap between a part of one solid and the whole of another."""
     first, second = (a.place.act(end) for end in part.ends)
     half = 0.5 * float(np.linalg.norm(second - first))
     return PathElement(

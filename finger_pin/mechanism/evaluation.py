@@ -16,7 +16,7 @@ Outputs = Literal["all", "no_acceleration", "row_forces"]
 
 
 def check_outputs(outputs: str) -> None:
-    """Refuse outputs that there are not.
+    """Refuse unknown outputs.
 
     Raises:
         InputError: Naming those that there are.

@@ -18,7 +18,7 @@ _PARAMETERS = (*PIN_FRICTION.parameters, "reversal_speed")
 
 
 def joint_law(name: str) -> Law:
-    """Return a law of joint friction by its name, or the user's by that of its module and its own.
+    """Return a law of joint friction by its name, or a user's law as "module:NAME".
 
     Raises:
         InputError: If there is none, or it cannot be the friction of a joint.

@@ -246,7 +246,7 @@ class Mechanism:
         )
 
     def _inertial(self, q: Array, v: Array, base: Array) -> Array:
-        """Return the inertial torques of a base that moves, less those of one at rest under gravity, shape (..., n)."""
+        """Return the torques that the motion of the base adds to gravity at rest, shape (..., n)."""
         if q.ndim > 1:
             return np.array([self._inertial(*each) for each in zip(q, v, base, strict=True)])
         still = np.zeros_like(v)

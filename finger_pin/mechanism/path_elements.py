@@ -112,7 +112,7 @@ Paths = Sequence[Sequence[PathTerm]]
 
 
 def moved(paths: Paths, shift: int) -> tuple[tuple[PathTerm, ...], ...]:
-    """Return paths in a model whose joints but the base are shifted by some places."""
+    """Return paths with the indices of all joints but the base shifted by a number."""
 
     @cache
     def piece_there(piece: PathElement) -> PathElement:

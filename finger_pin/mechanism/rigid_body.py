@@ -20,7 +20,7 @@ FREE_JOINTS = ("JointModelTranslation", "JointModelSpherical")
 
 
 class Topology:
-    """The identity of all bodies that differ in inertias and gravity alone."""
+    """Identity shared by all bodies that differ only in inertias and gravity."""
 
 
 class RigidBody:
@@ -196,7 +196,7 @@ class RigidBody:
         return self._of_tips([np.reshape(each, (6, -1))[:3] for each in jacobians], 3, model.nv)
 
     def _of_tips(self, values: list[Array], *shape: int) -> Array:
-        """Return values at the tips, of the given shape each; of one tip without a dimension for it."""
+        """Return values at the tips, of the given shape each; of a single tip without the dimension of tips."""
         return np.array(values).reshape(shape if len(values) == 1 else (len(values), *shape))
 
     def mass_matrix(self, q: Array) -> Array:
@@ -223,7 +223,7 @@ class RigidBody:
         return np.array([self.forward_dynamics(*each) for each in zip(q, v, torque, strict=True)])
 
     def base_dynamics(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array]:
-        """Return the wrench and the torques that move a base and the joints on it as given, by Newton-Euler.
+        """Return the wrench on the base and the torques on joints for a given motion, by Newton-Euler.
 
         Args:
             q: Shape (n,).

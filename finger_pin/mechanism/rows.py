@@ -39,7 +39,7 @@ class Energy(NamedTuple):
 
 
 def energy(entry: Energy | str) -> Energy:
-    """Return an energy; one that is given by its name has that for a label, too."""
+    """Return an energy, made from its name, which is then its label, if need be."""
     return Energy(entry, entry.replace("_", " ")) if isinstance(entry, str) else entry
 
 

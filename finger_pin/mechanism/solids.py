@@ -76,7 +76,7 @@ class Solid:
         return float(np.hypot(radius, 0.5 * length)) if self.shape == "cylinder" else radius + 0.5 * length
 
     def never_meets(self, other: Solid) -> bool:
-        """Return whether no motion can bring it to another solid."""
+        """Return whether no motion can bring the solid to another one."""
         for one, two in ((self, other), (other, self)):
             if two.shape == "half_space":
                 # One that is moved may come from anywhere.
@@ -85,7 +85,7 @@ class Solid:
         return float(np.linalg.norm(self.home - other.home)) > self.range + other.range
 
     def kept_near(self, body: RigidBody) -> Solid:
-        """Return it with the ball about the first joint that carries it, in which joints that turn keep it."""
+        """Return the solid with the ball, about its first joint, that it never leaves while hinges turn."""
         if not self.joint:
             return replace(self, home=np.array(self.place.translation), range=self.reach, prescribed=True)
         first, *others = [each for each in body.model.supports[self.joint] if each]
@@ -174,7 +174,7 @@ def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]
 
 
 def object_solid(name: str, described: Object, joint: int) -> Solid:
-    """Return an object; one that moves has the frame of the joint that carries it, one that is fixed its own place."""
+    """Return the solid of an object, in the frame of its joint if it moves, at its place if it is fixed."""
     place = pin.SE3.Identity()
     if not joint or described.frame == "world":
         place = pin.SE3(pin.Quaternion(described.quaternion).matrix(), np.array(described.position))

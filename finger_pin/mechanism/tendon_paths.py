@@ -53,7 +53,7 @@ class TendonPath:
     branches: tuple[tuple[float, tuple[PathTerm, ...]], ...] = ()
 
     def beyond(self, wrap: Wrap, coefficients: Array) -> TendonPath:
-        """Return the part from a wrap to the end, which turns at the wrap alone, with its part of the coefficients."""
+        """Return the path from a wrap to the end, with the given coefficients; only the wrap turns."""
         legs = [replace(leg, bends=leg.bends and k < wrap.last) for k, leg in enumerate(self.legs) if k >= wrap.first]
         # The leg before says which way it comes.
         before = [replace(leg, arm=0.0, bends=False) for leg in self.legs[max(wrap.first - 1, 0) : wrap.first]]

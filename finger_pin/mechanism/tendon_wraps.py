@@ -9,7 +9,7 @@ from finger_pin.description.finger import FingerDescription
 
 
 class Wrap(NamedTuple):
-    """A place where a tendon rubs: it bends there, and slides as fast as what is beyond gets shorter.
+    """A place where a tendon bends and rubs; it slides as fast as the part beyond gets shorter.
 
     Attributes:
         name: Of its first joint; along a path its number, from 1.

@@ -137,7 +137,7 @@ def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows)
 
 
 def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -> list[Rows]:
-    """Return the rows of a tree but for friction of loaded tendons, as wide as there are coordinates."""
+    """Return the rows of a tree, without the friction of loaded tendons, for a number of coordinates."""
     tree = description.tree
     joints = {name: TendonPath(row, ()) for name, row in zip(tree.joints, np.eye(len(tree.joints)), strict=True)}
 
@@ -210,7 +210,7 @@ def _couplings(tree: Tree, routes: TendonPaths, joints: Mapping[str, TendonPath]
 
 
 def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: Mapping[str, TendonPath]) -> TendonPath:
-    """Return what a coupling holds at its offset: q less all else that it is a sum of."""
+    """Return the constraint of a coupling, q - f(q_other), as a path."""
     coefficients = joints[coupling.joint].coefficients
     if coupling.other is None:
         return TendonPath(coefficients, ())

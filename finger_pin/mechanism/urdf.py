@@ -110,7 +110,7 @@ def _build(description: FingerDescription) -> RigidBody:
 
 @memoised(lambda *places: places)
 def _topology(*places: object) -> Topology:
-    """Return the topology of links of some lengths, offsets and twists, the same for the same ones."""
+    """Return the topology shared by links of equal lengths, offsets and twists."""
     return Topology()
 
 

@@ -13,7 +13,7 @@ from finger_pin.typing import Array
 
 
 def in_order(tables: Sequence[Rows]) -> tuple[Rows, ...]:
-    """Return tables in an order in which every force is known before it is read; else as they are listed.
+    """Return tables sorted so that every force is evaluated before it is read, stable otherwise.
 
     Raises:
         InputError: If forces read each other in a circle, or a table reads one that there is not; also if weights have
@@ -62,7 +62,7 @@ def replaced(tables: Sequence[Rows], replacements: Mapping[str, Callable[[Rows],
 
 
 def _check_wiring(table: Rows, tables: Sequence[Rows]) -> None:
-    """Refuse a table that reads forces or states that there are not, or with weights of the wrong shape."""
+    """Refuse a table that reads unknown forces or states, or with weights of the wrong shape."""
     for wiring in ("inputs", "loads", "readings"):
         counts = {each.group: each.count for each in tables if wiring != "readings" or each.states == each.count}
         for group, weights in getattr(table, wiring).items():

@@ -75,7 +75,7 @@ def tendon(
 
 @njit_inline
 def _turn(m: int, d: int, at: Model, of: Data, kinds: Kinds, e: int, tendon: int) -> float:
-    """Return the angle by which a path turns besides its offset, (15) or along its points: see `turn_of_path`."""
+    """Return the angle by which a path turns beyond its offset, by (15) or along its points (`turn_of_path`)."""
     if tendon >= 0 and integer_in(d, of.ten_wrapnum, tendon) > 0:
         return turn_of_path(d, of, tendon)
     p, objects, turn = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e), 0.0

@@ -19,7 +19,7 @@ def coefficient(speed: float, kinetic: float, static: float, stribeck: float, ex
 
 
 def relaxed(x: float) -> float:
-    """Return 1 - exp(-x) of x >= 0, to the last digit also where that is small."""
+    """Return 1 - exp(-x) of x >= 0, exact to rounding for small x too."""
     if x > 0.64:
         return 1.0 - math.exp(-x)
     # The series at an eighth of it, and three times 1 - exp(-2 y) = g (2 - g) with g = 1 - exp(-y).
@@ -44,7 +44,7 @@ def slide(force: float, moved: float, level: float) -> tuple[float, float]:
 
 
 def delivered(pull: float, tension: float, force: float, viscous: float, speed: float) -> tuple[float, float]:
-    """Return what friction takes of a tension, and what it leaves: against what pulls.
+    """Return the friction on a tension, and the tension behind it.
 
     Of a pulled tendon the length's speed is negative when it is wound in.
     """

@@ -39,7 +39,7 @@ _level, _law, _slide = map(inlined, (level_of, exerted, slide))
 
 @njit_inline
 def instance_of(m: int, instance: int, at: Model, kinds: Kinds) -> tuple[int, int]:
-    """Return the actuator and the tuple of an instance; -1 without them, or without friction."""
+    """Return the indices of an instance's actuator and tuple, -1 if they are missing."""
     if integer(m, at.integrator) == kinds.discrete:
         return -1, -1
     plugin, names = integers(m, at.actuator_plugin), flags(m, at.names)

@@ -55,7 +55,7 @@ def spring(m: int, d: int, at: Model, of: Data, tendon: int) -> float:
 
 @njit_inline
 def between(points: Pointer, first: int, second: int) -> tuple[float, float, float]:
-    """Return the way from one of MuJoCo's points to another, m."""
+    """Return the vector from one point of MuJoCo's to another, m."""
     return (
         points[3 * second] - points[3 * first],
         points[3 * second + 1] - points[3 * first + 1],

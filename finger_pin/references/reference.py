@@ -102,5 +102,5 @@ class SignalReference:
         return (self.signal,)
 
     def planned(self) -> SignalReference:
-        """Return it as signals."""
+        """Return the planned reference as signals."""
         return self

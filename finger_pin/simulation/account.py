@@ -92,7 +92,7 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
 
 
 def _worst(opened: Array, allowed: float) -> Iterator[NDArray[np.int64]]:
-    """Yield the spans between saved times in which the account opens most: first half of it all, then the rest.
+    """Yield the spans of saved times with the largest residuals, which make up half of it, then the others.
 
     What it opens elsewhere is less than half of what is allowed, J. What stays open where halving steps does not help
     is no error of the quadrature.

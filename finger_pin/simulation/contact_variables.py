@@ -30,7 +30,7 @@ _CONTACT, _SPACE = ("time", "contact"), ("time", "contact", "axis")
 
 
 def contact_variables(finger: Finger) -> Variables:
-    """Return the variables of contacts and free objects; none without surroundings."""
+    """Return the variables of contacts and free objects, none if there are no objects."""
     around = finger.scene
     if around is None:
         return {}

@@ -84,7 +84,7 @@ class Convergence:
         return f"<{type(self).__name__}: {self.verdict}>"
 
     def attach(self, result: xr.Dataset) -> xr.Dataset:
-        """Return a result with the difference as a variable and the rest as attributes."""
+        """Return a result with the convergence check: its difference as a variable, its numbers as attributes."""
         attributes = {"units": "rad", "long_name": "joint angle less that of the run repeated at a tighter tolerance"}
         # A run that was interrupted may be longer than its repetition, or shorter.
         values = np.full((result.sizes["time"], len(self.joints)), np.nan)

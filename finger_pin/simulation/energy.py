@@ -46,7 +46,7 @@ class Flows:
         return cls(values, flows(energies))
 
     def __getitem__(self, name: str) -> Array:
-        """Return one of them, shape (...,)."""
+        """Return one energy or power by name, shape (...,)."""
         value: Array = self.values[..., [each.name for each in self.energy_terms].index(name)]
         return value
 

@@ -96,7 +96,7 @@ class Prepared:
 
     @property
     def values(self) -> tuple[Any, ...]:
-        """The scenario's own values there."""
+        """The scenario's values at the keys."""
         return self.family.values
 
     def scenario(self, values: Sequence[Any] | None = None) -> Scenario:
@@ -115,7 +115,7 @@ class Prepared:
         stop: Stop | None = None,
         sensitivities: bool = False,
     ) -> RunArrays:
-        """Simulate, and return the recorded variables alone: bit for bit as in the result of `simulate`.
+        """Simulate, and return only the recorded variables, bit for bit those of `simulate`.
 
         Nothing is judged: whether the energy account closes, `simulate` says.
 

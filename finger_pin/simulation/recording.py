@@ -125,7 +125,7 @@ def versions() -> Mapping[str, str]:
 
 
 def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
-    """Return a result up to its first sample that is not finite, and the first variable that is not, else empty."""
+    """Return the finite part of a result, and the first variable that ceases to be finite, else an empty text."""
     length, excess = result.sizes["time"], ""
     ones = np.ones(length)
     for name in result.data_vars:

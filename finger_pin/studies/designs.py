@@ -138,7 +138,7 @@ class Range:
         return self.low + (self.high - self.low) * np.asarray(share)
 
     def share(self, value: float) -> float:
-        """Return the share of the way from low to high of a value."""
+        """Return where a value lies between low and high, from 0 to 1."""
         if self.logarithmic:
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)

@@ -1,4 +1,4 @@
-"""Tasks given to an executor of `concurrent.futures`: threads of this process, unless a caller has another one.
+"""Tasks run by an executor of `concurrent.futures`: by default threads of this process.
 
 Compiled code releases the GIL, so that threads run side by side: nothing is sent, no process is started, and a script
 needs no ``if __name__ == "__main__":``. Other executors get their tasks by value, as cloudpickle writes them: a metric

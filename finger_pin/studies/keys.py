@@ -163,7 +163,7 @@ def _leaves(entry: Any, key: str, numbers: bool) -> Iterator[str]:
 
 
 def _look_up(scenario: Scenario, key: str) -> Any:
-    """Return the entry at a key, or None; of several that it stands for the first."""
+    """Return the entry at a key, the first if it stands for several, or None."""
     name, index = split(key)
     entry: Any = scenario.model_dump(mode="python")
     for part in name.split("."):

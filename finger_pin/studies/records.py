@@ -119,7 +119,7 @@ class Study:
         return str(joblib.hash((self.digest, dict(point), content)))
 
     def append(self, record: RunRecord) -> None:
-        """Keep a record; once this returns, it is on disk."""
+        """Keep a record, also on disk if there is a folder."""
         if self.path is not None:
             with filelock.FileLock(self.path.with_name(_LOCK)), self.path.open("ab+") as file:
                 _cut_off_half_line(file)

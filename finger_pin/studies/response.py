@@ -110,7 +110,7 @@ def fingertip_hysteresis(run: Run) -> float:
 
 
 def has_reference(scenario: Scenario) -> bool:
-    """Return whether joints have angles to be at: given tensions have none, unless the scenario states them."""
+    """Return whether a scenario has references: one of given tensions has none unless it states them."""
     return scenario.controller.kind != "tensions" or bool(scenario.reference.joints)
 
 

@@ -89,7 +89,7 @@ def radii(finger: FingerLike) -> list[Variable]:
 
 
 def check_variables(variables: Sequence[Variable], base: BaseScenario) -> None:
-    """Raise unless there are variables, and each of their keys can hold a number of its range.
+    """Check that there are variables, and that their keys take numbers of their ranges.
 
     Raises:
         InputError: Naming the key.

@@ -14,7 +14,7 @@ _LEAST = 1e-9
 
 
 def summarize_locking(scenario: Scenario, locking_map: SelfLockingMap) -> str:
-    """Return the self-locking of a scenario's finger as plain text: critical frictions, postures, its own.
+    """Return the self-locking of a scenario's finger as plain text: critical frictions, postures, actual friction.
 
     Args:
         scenario: Of a finger with force closure.

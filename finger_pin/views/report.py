@@ -83,7 +83,7 @@ def _signals(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
 
 
 def _doubts(result: xr.Dataset) -> list[str]:
-    """Return sentences on why not to trust any number: signals that are not met, searches that do not agree."""
+    """Return sentences on reasons for doubt: signals that are not met, searches that do not agree."""
     doubts = []
     for k, (name, *_, unit) in enumerate(_signals(result)):
         mask = result["signal_index"].values == k
@@ -99,7 +99,7 @@ def _doubts(result: xr.Dataset) -> list[str]:
 
 
 def _outliers(result: xr.Dataset) -> list[str]:
-    """Return a sentence on the samples of every signal that alone weigh more than all others mostly do."""
+    """Return a sentence on outliers: samples that dominate the misfit of their signal."""
     words = []
     for k, (name, *_) in enumerate(_signals(result)):
         sizes = np.where(result["signal_index"].values == k, result["outlier"].values, 0.0)
@@ -172,7 +172,7 @@ def _words(result: xr.Dataset) -> list[str]:
 
 
 def _misses(result: xr.Dataset) -> list[str]:
-    """Return sentences on what repeats and the correlation of residuals say of the model."""
+    """Return sentences on the model's misfit: by repeats, and by the correlation of residuals."""
     words, following = [], list[str]()
     columns = ("signal", "replicate_noise", "noise", "lack_of_fit", "signal_correlation", "signal_steady")
     for name, repeated, noise, chance, correlation, steady in zip(
@@ -212,7 +212,7 @@ def _agreement(result: xr.Dataset) -> str:
 
 
 def _borne_out(result: xr.Dataset) -> bool:
-    """Return whether two searches at least, and half of them, end at the same place; one alone will do."""
+    """Return whether the best minimum was found by at least two searches and by half of them, or by the only one."""
     agreeing, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
     return count == 1 or (agreeing >= 2 and 2 * agreeing >= count)
 

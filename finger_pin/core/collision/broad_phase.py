@@ -94,7 +94,7 @@ def path_of(tables: Tables, e: int, pieces: PathWork) -> float:
 
 @njit_inline
 def widened(path: float, turned: float, far: float) -> float:
-    """Return a path plus that of a turn about a point as far away as the distance and the path, m."""
+    """Return the longest path of a point that moves by a path and turns at a distance, m."""
     if turned == 0.0:
         return path
     return (path + turned * far) / (1.0 - turned) if turned < 1.0 else np.inf

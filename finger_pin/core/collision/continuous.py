@@ -108,7 +108,7 @@ def _bounds(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) 
 
 @njit_always_inline
 def _clear(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) -> bool:
-    """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
+    """Return whether bodies surely neither touch nor part between two moments."""
     path, bend = _bounds(tables, pieces, e, one, two)
     if one[LOOK.gap] < 0.0 or two[LOOK.gap] < 0.0:
         return path < PARTING_PATH_PER_DEPTH * (abs(one[LOOK.gap]) + abs(two[LOOK.gap])) + MIN_PARTING_PATH
@@ -147,7 +147,7 @@ def _look(integration: Integration, model: Model, e: int, share: float, look: Ve
 
 @njit_always_inline
 def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: Vector) -> float:
-    """Return the time just after bodies have met that are apart at one moment and not at another."""
+    """Return the time just after two bodies have met, which are apart at one moment and touch at another."""
     looks = model.work.paths.looks
     early, late, middle = one[LOOK.share], two[LOOK.share], looks[LOOKS - 1]
     for _ in range(_MEETING_BISECTIONS):
@@ -191,7 +191,7 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
 
 @njit_always_inline
 def _pressed(tables: Tables, rows: Matrix, k: int) -> bool:
-    """Return whether a contact presses, or would if it were not held open."""
+    """Return whether a contact presses, or would if it were not frozen open."""
     pressed = False
     for g in range(tables.groups.first.size):
         if tables.groups.first[g] <= k < tables.groups.end[g]:

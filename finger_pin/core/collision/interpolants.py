@@ -121,7 +121,7 @@ class _Meetings:
         return float(out[GAP_OUT.gap]), middle + float(self._paths.cores[e])
 
     def _scan(self, e: int, start: float, end: float, interpolate: Interpolant) -> tuple[float, float]:
-        """Return a bound of the gap at the end, and the time at which bodies met that part again; else infinity."""
+        """Return a bound of the gap at the end, and the time of a touch that ends before it, else infinity."""
 
         def gap(time: float) -> float:
             return self._gap_and_distance(e, interpolate(np.array([time]))[0])[0]

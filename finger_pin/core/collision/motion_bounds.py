@@ -14,7 +14,7 @@ from finger_pin.typing import Array
 
 
 class Carrying(NamedTuple):
-    """Chains of bodies, with the largest motion of each by the one that carries it.
+    """Chains of bodies, with the largest motion of each body relative to its parent.
 
     Attributes:
         parents: Of each body, -1 for the base.

@@ -45,7 +45,7 @@ POWERS = StructType(Powers)
 
 @njit_inline
 def _attitude(b: Any, step: int) -> Any:
-    """Return the quaternions from which angles count in a step."""
+    """Return the reference quaternions of a step, from which angles are measured."""
     return b.attitude if step == 0 else b.attitudes[step - 1]
 
 

@@ -63,7 +63,7 @@ def freeze(address: int, _time: float) -> int:
 
 @njit_inline
 def leaving_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
-    """Return the least share of the way to here after which a frozen row leaves its branch, above 1 if none has.
+    """Return the earliest share of a step at which a frozen row leaves its branch, above 1 if none has.
 
     It is taken to go on at its mean rate.
     """

@@ -115,7 +115,7 @@ def _way_back(integration: Integration, model: Model, k: int, share: float) -> A
 
 @njit_always_inline
 def _more(tables: Tables, rows: Matrix, g: int, k: int, speed: float) -> float:
-    """Return the rate of a row's state at a speed, held on the other side, less that on this side."""
+    """Return the jump of a state's rate at a speed between the two sides of its kink."""
     branch, row_speed, more = rows[ROW.side, k], rows[ROW.speed, k], 0.0
     # As it is held, on the other side, and at last as it was.
     for weight in (-1.0, 1.0, 0.0):

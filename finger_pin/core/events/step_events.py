@@ -76,7 +76,7 @@ def find_missed_contacts(address: int, _h: float) -> int:
 
 @CompiledFunction
 def cull_contacts(address: int, _time: float) -> int:
-    """Cull and activate contact pairs at the end of a step; clear the states of those culled wherever they stand."""
+    """Cull and activate contact pairs at the end of a step; clear the states of culled ones in all vectors."""
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
     tables, paths, first = model.tables, model.work.paths, 2 * model.linear.mass.shape[0]

@@ -37,7 +37,7 @@ _PLAIN = (int, float, complex, str, bytes, bool, type(None), slice)
 
 
 class Undigestible(Exception):
-    """A thing without a lasting identity: a later process cannot recognise it."""
+    """Exception for an object that a later process could not recognise."""
 
 
 def source_digest(function: FunctionType) -> str:
@@ -121,7 +121,7 @@ def _names(code: CodeType) -> Iterator[str]:
 
 
 def _values(function: FunctionType, names: frozenset[str]) -> Iterator[tuple[str, Any]]:
-    """Yield the closure, the defaults and the globals of a function, but for what the package's files say."""
+    """Yield the closure, defaults and globals of a function, except those that the package defines."""
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         yield name, cell.cell_contents
     yield "defaults", (function.__defaults__, function.__kwdefaults__)

@@ -81,7 +81,7 @@ class CompiledFunction:
         return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double)(self.address)
 
     def compile(self) -> None:
-        """Compile it, or find it on disk."""
+        """Compile the function, or load it from the cache."""
         assert self.address
 
     @property
@@ -91,7 +91,7 @@ class CompiledFunction:
         return named is not None and _is_kept(named)
 
     def __call__(self, address: int, number: float = 0.0) -> int:
-        """Call it; other threads may run meanwhile."""
+        """Call the compiled function without holding the GIL."""
         return self._call(address, number)
 
 
@@ -142,7 +142,7 @@ def cache_place() -> Path | None:
 
 
 def _named(function: FunctionType) -> FunctionType | None:
-    """Return the function as numba is to keep it, or None if it cannot be kept."""
+    """Return the function under the name for numba's cache, or None if it cannot be cached."""
     place = cache_place()
     try:
         name = f"{function.__name__}-{source_digest(function)}"
@@ -158,7 +158,7 @@ def _named(function: FunctionType) -> FunctionType | None:
 
 @contextmanager
 def _exclusively(named: FunctionType) -> Iterator[None]:
-    """Let one process at a time compile a function that is to be kept; numba finds it on disk in those that waited."""
+    """Let one process at a time compile a function for the cache; the others then load it from disk."""
     lock = filelock.FileLock(cache_root() / f"{named.__name__.rpartition('-')[2]}.lock", timeout=_PATIENCE)
     # Where files cannot be locked, each process compiles for itself.
     with suppress(OSError, NotImplementedError):

@@ -33,7 +33,7 @@ class SampledController(Protocol):
 
     @property
     def instant(self) -> float:
-        """The next time at which it is to act, s; later after every act."""
+        """The time of the controller's next action, s."""
 
     def act(self, x: Array) -> Array:
         """Return the tensions from this instant on, shape (a,), at the packed state."""
@@ -74,11 +74,11 @@ class _Recorder:
 
     @property
     def part(self) -> IslandIntegrator:
-        """The island; a stepper that is loaded on the way replaces it."""
+        """The stepper of the island; loading a force replaces it."""
         return self._stepper.parts[self._index]
 
     def reason(self, status: int, duration: float, names: Sequence[str]) -> str:
-        """Return the reason not to go on after a status, empty if there is none; ``names`` are those of the state."""
+        """Return why a status ends the integration, empty if it does not; ``names`` are those of the state."""
         if status > core.FULL:
             return failure(self.part, status, [names[at] for at in self._stepper.places(self.part.island)])
         if self.step_count >= self.most and self.part.time < duration:
@@ -148,7 +148,7 @@ def integrate_compiled(
 
 
 def _next_end(stepper: Stepper, duration: float, controller: SampledController | None, sliced: bool) -> float:
-    """Return the time at which islands wait for each other, after a controller that is due has acted."""
+    """Let a controller that is due act, and return the next time at which islands synchronise."""
     if controller is None:
         return min(duration, stepper.time + duration / _SLICES) if sliced else duration
     if stepper.time >= controller.instant:

@@ -58,7 +58,7 @@ BETWEEN = StructType(Between)
 
 @CompiledFunction
 def interpolate_many(address: int, _time: float) -> int:
-    """Fill the states of a `Between` at an address; there must be a step."""
+    """Fill the interpolated states of a `Between` at an address; at least one step must be stored."""
     b = unpack(address, BETWEEN)
     step = -1
     for k in range(b.times.size):
@@ -78,7 +78,7 @@ def begin_of(b: Any, step: int) -> Any:
 
 @njit_inline
 def step_at(b: Any, time: float, known: int) -> Any:
-    """Return the step that a time is in, sought from one that is known, -1 for none; fill the state at its begin."""
+    """Return the index of the step that contains a time, or -1; the search starts at a known step."""
     step, last = max(known, 0), b.ends.size - 1
     while step > 0 and time < b.ends[step - 1]:
         step -= 1

@@ -156,14 +156,14 @@ class IslandIntegrator:
         return unit(block, end), int(self._record_range[0])
 
     def ready(self, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, CompiledFunction]:
-        """Return the address of the `AdvanceArgs` to be advanced, and the unit that does it; into a record if given."""
+        """Return the address of the `AdvanceArgs` and the function that advances them, with a record if given."""
         target = self._nothing if record is None else record
         self._record_range[:] = rows.indices(len(target.times))[:2]
         self._place(target)
         return self._blocks[-1].address, self._advance
 
     def _place(self, record: Record) -> None:
-        """Pass a record to compiled code, with drive loops, knots and given steps if any."""
+        """Write the addresses of a record, drive loops, knots and given steps for compiled code."""
         before, drives, knots, steps = self._placed
         if before is record and drives is self.drives and knots is self.knots and steps is self.steps:
             return

@@ -79,7 +79,7 @@ def integrate(
 
 
 def _take_step(solver: Any, renewed: Callable[[], Any], system: _System, last: float) -> tuple[Any, str]:
-    """Take a step, by a new solver where there is none under way; return it, and the step's fault, empty for none."""
+    """Take a step, with a new solver if there is none; return the solver, and the step's fault or an empty text."""
     try:
         # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
         with np.errstate(over="ignore", invalid="ignore"):

@@ -110,7 +110,7 @@ class Stepper:
         return cls(finger.mechanism, control, x, TABLEAUS[method](), rtol, tolerances, force)
 
     def _places(self, island: Island) -> NDArray[np.int64]:
-        """Return the places of an island's numbers in the state of the whole."""
+        """Return the indices of an island's numbers in the whole state."""
         return np.concatenate([island.coordinates, self._width + island.coordinates, 2 * self._width + island.states])
 
     def places(self, island: Island) -> NDArray[np.int64]:

@@ -26,7 +26,7 @@ class Statistics:
 
 
 class Apart(Protocol):
-    """Motion of an island with its own steps."""
+    """Motion of islands that have steps of their own."""
 
     @property
     def times(self) -> Array:

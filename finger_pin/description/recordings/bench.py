@@ -165,7 +165,7 @@ class IdentifySettings(Description):
 
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:
-        """The bounds of all that is found, by key; what is of one recording begins with its name."""
+        """The bounds of all parameters, by key; those of one recording begin with its name."""
         of_recordings = {
             f"{OF_RECORDINGS}{name}.{key}": each
             for name, recording in self.recordings.items()

@@ -249,7 +249,7 @@ def _dates(entry: str, column: Column, name: str, cells: NDArray[Any]) -> NDArra
 
 
 def _unwrapped(entry: str, cells: NDArray[np.float64], period: float) -> NDArray[np.float64]:
-    """Return numbers that come round at a period without their jumps; missing ones stay so.
+    """Return the unwrapped values of a periodic column; missing ones stay missing.
 
     Raises:
         InputError: If they span more than a period, or it is not clear which way they went round.

@@ -112,7 +112,7 @@ def _tangent(u: float, v: float, w: float, a: float, b: float, c: float, out: An
 
 
 def _tangent_slope(n: Any, moved: Any, growing: float, a: float, b: float, c: float, out: Any, at: int) -> None:
-    """Write the motion of a turned tangent that grows, under a motion of the normal n, into a column of ``out``."""
+    """Write the derivative of a tangent by a motion of the normal n into a column of ``out``."""
     whole = max(1.0 + _POLE_X * n[0] + _POLE_Y * n[1] + _POLE_Z * n[2], _LEAST)
     share = (a * n[0] + b * n[1] + c * n[2]) / whole
     change = (a * moved[0] + b * moved[1] + c * moved[2]) / whole + growing * share

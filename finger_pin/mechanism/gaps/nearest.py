@@ -34,7 +34,7 @@ _ROUNDING = 1e-9
 
 
 def lowered(y: Any, p: Any, s: float, square: float) -> Any:
-    """Return the part of the pull to the middle in |w|, less its most; ``square`` is |r / R|^2."""
+    """Return the regularisation that pulls to the middle in |w|, less its maximum; ``square`` is |r / R|^2."""
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
     along = EPSILON * np.sqrt(a * a + b * b + c * c)
     return p[GAP.along] * along * ((s - 0.5) * (s - 0.5) - 0.25) + 0.5 * EPSILON * p[GAP.disc] * (square - 1.0)
@@ -164,7 +164,7 @@ def _expanded(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any,
 
 
 def _along(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, start: Any, step: Any) -> Any:
-    """Return the share of a step of about the least F: of a small slope, which rises, or the whole step."""
+    """Return the share of a step at which F is about least: of a small rising slope, or the whole step."""
     f, g, e = frame
     x, y_, z = (
         step[0] * f[0] + step[1] * g[0] + step[2] * e[0],

@@ -64,13 +64,13 @@ class WoundSpan:
         return np.asarray(self.points @ np.swapaxes(rotation, -1, -2) + translation + sag)
 
     def moved(self, place: pin.SE3, first: int) -> WoundSpan:
-        """Return it in a hand, whose finger stands at a place, after the joints of other fingers."""
+        """Return the piece as part of a hand: at its finger's place, after the joints of other fingers."""
         if self.link:
             return replace(self, link=first + self.link)
         return replace(self, points=self.points @ place.rotation.T + place.translation)
 
     def turned(self, turns: Sequence[Array]) -> WoundSpan:
-        """Return it in links that are turned, each by a rotation."""
+        """Return the piece with the frames of its links turned, each by a rotation."""
         return replace(self, points=self.points @ turns[self.link].T)
 
 
@@ -109,11 +109,11 @@ class Arc:
         return np.asarray(local @ np.swapaxes(rotation @ self.frame, -1, -2) + translation)
 
     def moved(self, place: pin.SE3, first: int) -> Arc:
-        """Return it in a hand, after the joints of other fingers."""
+        """Return the piece as part of a hand, after the joints of other fingers."""
         return replace(self, joint=first + self.joint)
 
     def turned(self, turns: Sequence[Array]) -> Arc:
-        """Return it in links that are turned, each by a rotation."""
+        """Return the piece with the frames of its links turned, each by a rotation."""
         return replace(self, frame=turns[self.joint])
 
 

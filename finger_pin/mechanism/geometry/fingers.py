@@ -132,7 +132,7 @@ class WoundFinger:
         return cls(pieces, pulleys_of(arms, lanes), visuals, lanes, widths, size)
 
     def placed(self, name: str, place: pin.SE3, first: int) -> WoundFinger:
-        """Return it as part of a hand: under dotted names, on its place, with its joints after ``first`` others."""
+        """Return the finger as part of a hand: under dotted names, at its place, after ``first`` other joints."""
         lanes = replace(
             self.lanes,
             offset={(f"{name}.{tendon}", first + joint): at for (tendon, joint), at in self.lanes.offset.items()},

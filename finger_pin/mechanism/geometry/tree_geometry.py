@@ -103,7 +103,7 @@ def _winds(cord: Cord, tree: Tree) -> bool:
 
 
 def _branches(legs: Sequence[PathTerm]) -> list[list[PathTerm]]:
-    """Return the parts of a path that hang together: behind a pulley it goes on elsewhere."""
+    """Return the connected parts of a path, which pulleys divide."""
     branches: list[list[PathTerm]] = []
     for leg in legs:
         if branches and leg.follows:

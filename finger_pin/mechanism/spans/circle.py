@@ -72,7 +72,7 @@ def path(way: Any, r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
 
 
 def _around(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
-    """Return `path` of two tangents and the arc between them."""
+    """Return the path around the circle: two tangents and the arc between them, as `path` does."""
     # A point on the circle itself has no second derivative.
     h0 = max(math.sqrt((r0 - radius) * (r0 + radius)), 1e-12 * radius)
     h1 = max(math.sqrt((r1 - radius) * (r1 + radius)), 1e-12 * radius)

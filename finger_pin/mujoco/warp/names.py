@@ -18,13 +18,13 @@ class NamedModel:
     """A compiled model, in which unnamed tendons and joints are called by kind and number."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """Name all tendons and joints of a model, which stays as it is."""
+        """Name all tendons and joints of a model, without changing it."""
         self.model = model
         self.tendons = [model.tendon(i).name or f"tendon_{i}" for i in range(model.ntendon)]
         self.joints = [model.joint(i).name or f"joint_{i}" for i in range(model.njnt)]
 
     def __getattr__(self, name: str) -> Any:
-        """Return what the model has under a name."""
+        """Return an attribute of the model."""
         return getattr(self.model, name)
 
     def tendon(self, key: str | int) -> SimpleNamespace:

@@ -28,7 +28,7 @@ class Charts:
     """Bars of friction and plots of a session, of one finger of a hand at a time."""
 
     def __init__(self, gui: Any, session: Session, stage: Stage) -> None:
-        """Add all of them."""
+        """Add all charts."""
         self._session, self._stage, routing = session, stage, session.finger.routing
         self._joints, self._tendons = list(routing.joints), list(routing.tendons)
         self._scale = 0.0

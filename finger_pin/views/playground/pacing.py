@@ -27,11 +27,11 @@ class Pacer:
         self.restart()
 
     def restart(self) -> None:
-        """Start again now, with nothing owed, such as after a pause."""
+        """Restart the clock, such as after a pause."""
         self.rate, self._owed, self._begun = self.speed, 0.0, self._clock()
 
     def due(self) -> float:
-        """Begin a frame; return how much simulated time it owes, s."""
+        """Begin a frame; return the simulated time that is due, s."""
         now = self._clock()
         self._wall, self._begun = now - self._begun, now
         # What the machine could not do is not caught up with: time runs slower.

@@ -39,7 +39,7 @@ class Player(Protocol):
     playing: bool
 
     def later(self, job: Callable[[], None]) -> None:
-        """Do something between two steps; what is refused is shown."""
+        """Run a job between two steps, and show its error if it is refused."""
 
     def press(self, button: str) -> None:
         """Pause, play, step or reset."""

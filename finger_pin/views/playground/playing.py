@@ -61,7 +61,7 @@ class Playground:
         return self._pacer.rate
 
     def later(self, job: Callable[[], None]) -> None:
-        """Do something between two steps; what is refused is shown."""
+        """Run a job between two steps, and show its error if it is refused."""
         self._jobs.put(job)
 
     def press(self, button: str) -> None:
@@ -128,7 +128,7 @@ class Playground:
             self._closed.wait(self._pacer.rest())
 
     def _work(self) -> None:
-        """Do what the page has asked for; whatever is wrong with it is refused, and the playing goes on."""
+        """Run the jobs that the page has asked for; errors are shown, and playing goes on."""
         with suppress(queue.Empty):
             while True:
                 job = self._jobs.get_nowait()
@@ -162,7 +162,7 @@ class Playground:
             self.close()
 
     def close(self) -> None:
-        """End it. Closing twice is allowed."""
+        """End the playing; closing twice is allowed."""
         if not self._closed.is_set():
             self._closed.set()
             self._thread.join()
@@ -180,7 +180,7 @@ class Playground:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """End it."""
+        """End the playing."""
         self.close()
 
 

@@ -76,7 +76,7 @@ def touching(result: xr.Dataset) -> list[str]:
 
 
 def _right(part: SubFigure, below: list[str]) -> tuple[Axes, list[Axes]]:
-    """Return the panel of the cone, and panels over time below it."""
+    """Return the panel of the friction cone, and the panels over time below it."""
     cone, *others = part.subplots(1 + len(below), 1, height_ratios=[1.8, *(1.0 for _ in below)])
     for axes, label in zip(others, below, strict=True):
         axes.set_ylabel(label)

@@ -20,7 +20,7 @@ _MILLI = 1e3
 
 @styled
 def plot_critical_friction(finger: FingerLike, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw the critical coefficients of a finger: of every joint alone, and of all joints together.
+    """Draw the critical coefficients of a finger: of each joint alone, and of all joints together.
 
     Args:
         finger: A finger with force closure, its description, its name, or the path of its file.

@@ -1,4 +1,4 @@
-"""Figures of a whole hand, a row for each finger; and the part of a result that is about one of them."""
+"""Figures of a whole hand, one row per finger, and the part of its result about one finger."""
 
 from __future__ import annotations
 

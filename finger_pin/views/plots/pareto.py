@@ -86,7 +86,7 @@ def _pair(axes: Axes, result: xr.Dataset, first: str, second: str) -> None:
 
 
 def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: str) -> None:
-    """Draw the front with its numbers, and its place in the whole."""
+    """Draw the front with its numbers, and where it lies among all designs."""
     x, y, front = (result[name].values for name in (first, second, "front"))
     order = np.argsort(np.where(front > 0, front, np.inf))[: int((front > 0).sum())]
     close.set_xlabel(whole.get_xlabel())

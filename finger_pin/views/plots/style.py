@@ -107,7 +107,7 @@ def inches(width: Width) -> float | None:
 
 
 def colour(name: str) -> str:
-    """Return a colour of this style as it is in the style that is in force: the same place of its cycle."""
+    """Return the active style's colour at the place that a colour has in the cycle of this package's style."""
     if name == GREY:
         return str(settings["axes.edgecolor"])
     if name == BLACK:

@@ -129,7 +129,7 @@ class Playback:
         return float(self.tension.max(initial=0.0))
 
     def ghost(self, time: Array) -> Ghost:
-        """Return it as seen beside another motion, with frames at other times, shape (m,), s, up to its own end."""
+        """Return this animation resampled at the frames of another, shape (m,), s, up to its own end."""
         position = np.stack([np.interp(time, self.time, column) for column in self.position.T], axis=-1)
         # A palm is shown at rest beside another one.
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))

@@ -110,7 +110,7 @@ class Scene:
         self._strands = [self._strands_of(tendon["name"]) for tendon in self.tendons]
 
     def _note_on_cords(self) -> str:
-        """Return what pulls the cords whose tension is not shown; empty without any."""
+        """Return a note on what pulls the cords whose tension is not shown; empty if there are none."""
         tree = self.geometry.description.tree
         drawn = {each["name"] for each in self.tendons if len(self.strands) in each["strand"]}
         names = {name if name in tree.tendons else name.rpartition(".")[0] for name in drawn}

@@ -64,7 +64,7 @@ class SceneObjects:
     def from_result(
         cls, result: xr.Dataset, time: Array, size: float, middle: Array, palm: LinkPoses | None = None
     ) -> SceneObjects | None:
-        """Read a result at the times of the frames, which are among its samples; None if it has no contacts.
+        """Read the contacts and objects of a result at the frames' times; None if it has none.
 
         Args:
             result: Dataset that `simulate` returned or saved.
