@@ -93,7 +93,8 @@ def _routed(scenario: Scenario, finger: Finger) -> RoutedController:
         damping=expand(settings.damping, size),
         static=_static(finger, settings.gravity_compensation, settings.spring_compensation),
     )
-    return RoutedController(finger, law, expand(settings.minimum_tension, len(finger.routing.tendons)))
+    minimum = expand(settings.minimum_tension, len(finger.routing.tendons))
+    return RoutedController(finger, law, minimum, _fingertip(scenario, finger))
 
 
 def _distribution(scenario: Scenario, finger: Finger) -> TensionDistribution:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.interface import ControlSignals, LoopController
-from finger_pin.control.torque import TorqueLaw
+from finger_pin.control.torque import FingertipForce, TorqueLaw
 from finger_pin.core.inputs import InputTable, core_signal, planned_control
 from finger_pin.description.routing import ForceClosure, Routing
 from finger_pin.description.scenario import Scenario
@@ -17,6 +17,7 @@ from finger_pin.description.validation import expand
 from finger_pin.laws.input_functions import internal_level, proportional_torque
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, ReferenceSignals
+from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 
 
@@ -130,17 +131,25 @@ class RoutedController(LoopController):
         finger: The finger.
         law: tau^d.
         minimum: f0, shape (t,), N.
+        fingertip: Force that the fingertip is to exert besides; None for nothing.
     """
 
     finger: Finger
     law: TorqueLaw
     minimum: Array
+    fingertip: FingertipForce | None = None
+
+    def signals(self) -> tuple[Signal, ...]:
+        """Return the functions of time of the wanted fingertip force."""
+        return () if self.fingertip is None else (self.fingertip.wanted,)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return tau^d and tensions for shapes (..., n)."""
         torque = self.law.torque(reference, position, velocity)
+        if self.fingertip is not None:
+            torque = torque + self.fingertip.torque(time, position)
         flat = position.reshape(-1, position.shape[-1])
         planned = [self._planned(*each) for each in zip(torque.reshape(flat.shape), flat, strict=True)]
         return ControlSignals(torque, np.array(planned).reshape(*position.shape[:-1], -1))

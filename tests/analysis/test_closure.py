@@ -172,6 +172,18 @@ def test_the_controller_holds_tensions_at_the_minimum_and_follows_its_reference(
     assert np.abs(result.energy_residual).max() < 1e-6
 
 
+def test_a_wanted_fingertip_force_adds_its_torque_where_tendons_run_along_paths():
+    """F_z at the reach r from a hinge about y turns it by -r cos(theta) F_z, at theta = 0.2 for 0.5 N."""
+    pressing = scenario({}, limit=0.3).model_dump(exclude_none=True)
+    pressing["controller"]["fingertip_force"] = {"z": {"offset": 0.5}}
+    still = ReferenceSignals(np.full(1, 0.2), np.zeros(1))
+    asked = fp.control.build_controller(read_scenario(pressing)).command(0.0, still, np.full(1, 0.2), np.zeros(1))
+    expected = -REACH * np.cos(0.2) * 0.5
+    assert asked.torque[0] == pytest.approx(expected, rel=1e-12)
+    arms = finger(limit=0.3).coupling_at(np.full((1, 1), 0.2))[0, :, 0]
+    assert arms @ asked.tension == pytest.approx(expected, rel=1e-9)
+
+
 @pytest.mark.slow
 def test_servos_in_position_drive_turn_a_hinge_by_the_lengths_of_its_paths():
     """L by the law of cosines; with the arms of the middle posture spools would stand 0.095 rad from where they do."""
