@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from finger_pin.mechanism.canals import CANALS
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rows import LOST, Rows
 from finger_pin.simulation.energy import flows, stores
@@ -45,6 +46,23 @@ def extra_row_variables(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
             unit = units.get(name, "SI") if table.unit else "SI"
             quantities[f"{group}_{name}"] = Quantity(("time", group), value, unit, f"{name} of {table.law.name}")
     return quantities
+
+
+def cord_names(finger: Finger) -> list[str]:
+    """Return the names of the cords of a tree that servos, muscles and springs pull."""
+    return [name for table in finger.extra_rows if table.group == CANALS for name in table.names]
+
+
+def cord_variables(finger: Finger) -> dict[str, Quantity]:
+    """Return the tension of the cords of `cord_names`, by the name of the variable; empty if there are none."""
+    if not cord_names(finger):
+        return {}
+
+    def delivered(of: SampledTrajectory) -> Array:
+        return of.finger.mechanism.rows[CANALS]["pressing"]
+
+    text = "delivered tension of a cord that servos, muscles or springs pull; negative where a servo pushes it"
+    return {"cord_tension": Quantity(("time", "cord"), delivered, "N", text, "12")}
 
 
 def account_variables(finger: Finger) -> dict[str, Quantity]:

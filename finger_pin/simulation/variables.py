@@ -11,12 +11,10 @@ import pinocchio as pin
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.canals import CANALS
-from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rows import RowSignals
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.motor_variables import motor_variables
-from finger_pin.simulation.row_variables import account_variables, extra_row_variables
+from finger_pin.simulation.row_variables import account_variables, cord_names, cord_variables, extra_row_variables
 from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory, of_state
 from finger_pin.typing import Array
 
@@ -60,7 +58,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         table["elastic_stiction"] = of_state("elastic_stiction")
     table |= (
         _of_wraps(loop)
-        | _of_cords(loop)
+        | cord_variables(loop.finger)
         | _of_windings(loop)
         | _of_palm(loop)
         | motor_variables(loop)
@@ -155,22 +153,6 @@ def _of_wraps(loop: ClosedLoop) -> dict[str, Quantity]:
         name: Quantity(("time", "wrap"), partial(at, signal=signal), unit, text)
         for name, (signal, unit, text) in signals.items()
     }
-
-
-def _of_cords(loop: ClosedLoop) -> dict[str, Quantity]:
-    """Return the tension of the cords of a tree that servos, muscles and springs pull."""
-    if not _cords(loop.finger):
-        return {}
-    text = "delivered tension of a cord that servos, muscles or springs pull; negative where a servo pushes it"
-    return {"cord_tension": Quantity(("time", "cord"), _delivered, "N", text, "12")}
-
-
-def _cords(finger: Finger) -> list[str]:
-    return [name for table in finger.extra_rows if table.group == CANALS for name in table.names]
-
-
-def _delivered(of: SampledTrajectory) -> Array:
-    return of.finger.mechanism.rows[CANALS]["pressing"]
 
 
 def _frame(name: str, variable: Quantity) -> str:
@@ -271,7 +253,7 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
         "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
         "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
     }
-    labels |= {"cord": ("cord", cords, {"long_name": "cord of a tree"})} if (cords := _cords(finger)) else {}
+    labels |= {"cord": ("cord", cords, {"long_name": "cord of a tree"})} if (cords := cord_names(finger)) else {}
     labels |= {table.group: list(table.names) for table in finger.extra_rows} | contact_coordinates(finger)
     labels |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
