@@ -89,8 +89,8 @@ def test_postures_are_found_by_the_tip_that_is_named(hand):
 
 
 def test_forces_at_tips_are_held_up_by_the_servos(hand):
-    description, model, data = hand
-    forces = 0.1 * np.array([*_FORCES.values()])
+    description, model, _ = hand
+    data, forces = mujoco.MjData(model), 0.1 * np.array([*_FORCES.values()])
     rest = equilibrium(_alone(description), {}, fingertip_force=forces)
     for joint, angle in zip(description.joints, rest.position, strict=True):
         data.joint(joint).qpos[:] = angle

@@ -139,7 +139,7 @@ mass = 0.1
 angular_velocity = [0.001, 5, 0]
 """)
     result = fp.simulate(path)
-    assert " of the energy stored, as none is exchanged:" in result.attrs["account"]
+    assert " of the energy stored, as next to none is exchanged:" in result.attrs["account"]
 
 
 def test_an_account_that_does_not_close_is_told():
