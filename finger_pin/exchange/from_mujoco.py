@@ -273,9 +273,10 @@ class _Reader:
     def with_tips(self, description: FingerDescription) -> FingerDescription:
         """Return a description with fingertips: the first site called one on every link, and ends without such."""
         model, tree, sites = self.model, description.tree, dict[str, dict[str, Tip]]()
+        moved = self._moved_by_joints()
         for i in range(model.nsite):
             body = int(model.site_bodyid[i])
-            carrier = tree.link_of(self.names.bodies[body]) if body in self._moved_by_joints() else None
+            carrier = tree.link_of(self.names.bodies[body]) if body in moved else None
             if "tip" in model.site(i).name.lower() and carrier is not None:
                 tip = Tip(body=self.names.bodies[body], position=model.site_pos[i].tolist())
                 named = entry_name(model.site(i).name).removesuffix("_fingertip")

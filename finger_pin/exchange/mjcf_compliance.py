@@ -90,9 +90,11 @@ class Mobility:
         along = np.einsum("ti,ij,tj->t", arms, inverse, arms)
         self.joints = dict(zip(tree.joints, np.diag(inverse).tolist(), strict=True))
         self.tendons = dict(zip(tree.tendons, along.tolist(), strict=True))
+        data = body.model.createData()
+        pin.computeJointJacobians(body.model, data, q)
         self.bodies = {name: 1.0 / each.mass if each.mass else 0.0 for name, each in tree.objects.items()}
         for name, each in tree.bodies.items():
-            jacobian = _jacobian(body, q, paths.placed[name], each.centre)
+            jacobian = _jacobian(body.model, data, paths.placed[name], each.centre)
             self.bodies[name] = float(np.trace(jacobian @ inverse @ jacobian.T)) / 3.0
             if _is_slider(tree, name):
                 # MuJoCo takes these without their armatures, and alike in all directions.
@@ -105,17 +107,13 @@ def _is_slider(tree: Tree, name: str) -> bool:
     """Return whether a body is what MuJoCo calls simple: alone on slides along its axes, about its mass centre."""
     moved = [joint for joint in tree.joints.values() if joint.body == name]
     aligned = all(joint.kind == "slide" and np.count_nonzero(joint.axis) == 1 for joint in moved)
-    parent = tree.bodies[name].parent
-    while parent is not None and not any(joint.body == parent for joint in tree.joints.values()):
-        parent = tree.bodies[parent].parent
-    alone = parent is None and not any(body.parent == name for body in tree.bodies.values())
+    on_base = tree.link_of(tree.bodies[name].parent) is None
+    alone = on_base and not any(body.parent == name for body in tree.bodies.values())
     return bool(moved) and aligned and alone and not any(tree.bodies[name].centre) and tree.bodies[name].mass > 0.0
 
 
-def _jacobian(body: RigidBody, q: Array, placed: Placed, point: Sequence[float]) -> Array:
-    """Return dx/dq of a point of a body of a tree, shape (3, n)."""
-    model, data = body.model, body.model.createData()
-    pin.computeJointJacobians(model, data, q)
+def _jacobian(model: pin.Model, data: pin.Data, placed: Placed, point: Sequence[float]) -> Array:
+    """Return dx/dq of a point of a body of a tree, shape (3, n), from data with the joints' Jacobians."""
     if not placed.joint:
         return np.zeros((3, model.nv))
     frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

@@ -11,6 +11,7 @@ import pinocchio as pin
 from finger_pin.description.caching import cached_property
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
+from finger_pin.description.tree_parts import TreeJoint
 from finger_pin.description.waypoints import Waypoint
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -180,6 +181,14 @@ def rotation(quaternion: tuple[float, float, float, float]) -> Array:
     """Return the rotation of a unit quaternion x, y, z, w, shape (3, 3)."""
     matrix: Array = pin.Quaternion(np.array(quaternion)).normalized().matrix()
     return matrix
+
+
+def joint_placement(place: pin.SE3, joint: TreeJoint) -> pin.SE3:
+    """Return the placement of a joint at zero, of a body with a place: at the joint's reference the body is there."""
+    back = np.zeros(6)
+    first = 3 if joint.kind == "hinge" else 0
+    back[first : first + 3] = -joint.reference * np.array(joint.axis)
+    return place * pin.SE3(np.eye(3), np.array(joint.anchor)) * pin.exp6(back)
 
 
 class Excursions:

@@ -26,7 +26,7 @@ from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
-from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, rotation
+from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, joint_placement, rotation
 from finger_pin.mechanism.tendon_wraps import find_wraps
 from finger_pin.mechanism.tendons import SOURCES
 from finger_pin.mechanism.urdf import TIP_FRAME, build_rigid_body
@@ -94,15 +94,11 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
         place = place * pin.SE3(rotation(body.orientation), np.array(body.position))
         for joint_name, moved in tree.joints.items():
             if moved.body == name:
-                axis, to_anchor = np.array(moved.axis), pin.SE3(np.eye(3), np.array(moved.anchor))
                 hinge = moved.kind == "hinge"
-                # At its reference, the body is where its placement says.
-                back = np.zeros(6)
-                back[3 * hinge : 3 * hinge + 3] = -moved.reference * axis
-                kind = (pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned)(axis)
-                joint = model.addJoint(joint, kind, place * to_anchor * pin.exp6(back), joint_name)
+                kind = pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned
+                joint = model.addJoint(joint, kind(np.array(moved.axis)), joint_placement(place, moved), joint_name)
                 model.armature[model.joints[joint].idx_v] = moved.armature
-                place = to_anchor.inverse()
+                place = pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
         placed[name] = Placed(joint, place)
         xx, yy, zz, xy, xz, yz = body.inertia
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

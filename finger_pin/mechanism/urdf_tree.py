@@ -12,7 +12,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree_parts import Body, Coupling, TreeJoint, TreeSolid
 from finger_pin.description.validation import expand
-from finger_pin.mechanism.tendon_paths import rotation
+from finger_pin.mechanism.tendon_paths import joint_placement, rotation
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
 
 # The geometry of a solid in a body's frame: its kind, sizes, m, place and attitude.
@@ -52,17 +52,12 @@ def tree_to_urdf(description: FingerDescription, drawn: bool, base: str, tip: st
         joints = [key for key, joint in tree.joints.items() if joint.body == name]
         for key in joints:
             moved, child = tree.joints[key], name if key == joints[-1] else f"{name}_{key}"
-            to_anchor, axis = pin.SE3(np.eye(3), np.array(moved.anchor)), np.array(moved.axis)
-            # At its reference, the body is where its placement says.
-            back = np.zeros(6)
-            first = 3 if moved.kind == "hinge" else 0
-            back[first : first + 3] = -moved.reference * axis
-            joint = _add_joint(root, key, _kind(description, key), link, child, place * to_anchor * pin.exp6(back))
-            ET.SubElement(joint, "axis", xyz=_numbers(*axis))
+            joint = _add_joint(root, key, _kind(description, key), link, child, joint_placement(place, moved))
+            ET.SubElement(joint, "axis", xyz=_numbers(*moved.axis))
             _complete(joint, description, key, moved, courses.get(key), (effort, speed))
             if child != name:
                 ET.SubElement(root, "link", name=child)
-            link, place = child, to_anchor.inverse()
+            link, place = child, pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
         if not joints:
             _add_joint(root, f"{name}_fixed", "fixed", link, name, place)
             place = pin.SE3.Identity()
