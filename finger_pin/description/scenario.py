@@ -110,7 +110,7 @@ class Scenario(Description):
         return not routing.force_closure().holds and not self._tautness(routing).holds
 
     def _check_effects(self) -> None:
-        """Refuse what has no effect: on no finger of a hand, or, in a finger's own table, on that one."""
+        """Refuse entries without effect on any finger of a hand, or, in a finger's own table, on that one."""
         ineffective = {
             name: {entry: rest for entry, *rest in idle(part, OF_SCENARIO)} for name, part in self.parts().items()
         }

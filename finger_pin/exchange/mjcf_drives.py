@@ -1,4 +1,4 @@
-"""What drives and holds a tree of bodies, and where it starts, as MJCF: actuators, equalities, keyframes."""
+"""Actuators, equalities and keyframes of a tree of bodies, as MJCF."""
 
 from __future__ import annotations
 

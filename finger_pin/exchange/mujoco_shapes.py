@@ -130,7 +130,7 @@ class Shapes:
         return objects
 
     def object_states(self, keyframe: int) -> Table:
-        """Return the free bodies that are elsewhere at a keyframe, or move otherwise, than where runs start."""
+        """Return the free bodies whose place or speed at a keyframe differs from that at the start of runs."""
         start, data = (self._free_states(k) for k in (0, keyframe))
         return {name: state for name, state in data.items() if state != start[name]}
 
