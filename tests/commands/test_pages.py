@@ -46,6 +46,8 @@ SHORTER = {
     r"(identify\.py) (winding|servo_pendulum|postures|spool_finger|instrument).*": r"\1 --list any",
     # It fits a bench under every law.
     r"(compare_laws\.py) .*": r"\1 transmission",
+    # It fits for minutes.
+    r"(servo_models\.py).*": r"\1 --only M1 --generations 0",
     # Its stages have tests of their own, and it measures for minutes.
     r"(benchmark\.py).*": r"\1 --help",
     # They train for minutes, with a library that tests do without.
