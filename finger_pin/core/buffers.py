@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.evaluation.law_code import SlopeColumns, widest
+from finger_pin.core.evaluation.law_code import SLOPE_COLUMNS, widest
 from finger_pin.core.jit import Layers, Matrix, Vector
 from finger_pin.core.path_tables import PathWork, build_path_work
 from finger_pin.core.tables import Tables
@@ -118,7 +118,7 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         by_position=np.zeros((size, size)),
         by_velocity=np.zeros((size, size)),
         rows=np.zeros((columns, count)),
-        slopes=np.zeros((len(SlopeColumns._fields), count)),
+        slopes=np.zeros((SLOPE_COLUMNS, count)),
         powers=np.zeros((powers, count)),
         arm=np.zeros(len(tables.arm)),
         gradient=np.zeros(len(tables.arm)),

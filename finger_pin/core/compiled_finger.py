@@ -13,7 +13,6 @@ from finger_pin.core.evaluation.state_batches import MOTIONS, Motions, motion_ma
 from finger_pin.core.jit import Block, pack
 from finger_pin.core.tables import build_tables
 from finger_pin.description.caching import cached_property
-from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs
 from finger_pin.mechanism.finger import Finger
@@ -80,7 +79,7 @@ class CompiledMechanism:
             externals=np.empty((summed, width)),
             energy_terms=np.empty((summed, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
             # Of what touches, forces are added up.
-            touches=np.zeros((min(kept, summed), self.tables.contact_rows // CONTACT.arms, 9)),
+            touches=np.zeros((min(kept, summed), self.tables.contact_rows // self.tables.contact_arms, 9)),
         )
 
     def to_evaluation(self, buffer: SignalBuffer, at: slice | int = slice(None)) -> Evaluation:

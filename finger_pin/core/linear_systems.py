@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.islands import find_islands
 from finger_pin.core.jit import Indices, Matrix, Vector
-from finger_pin.core.path_tables import COLUMNS
 from finger_pin.core.tables import Tables
 from finger_pin.core.threads import physical_memory
 from finger_pin.exceptions import InputError
@@ -81,7 +80,7 @@ def build_blocks(tables: Tables, control: InputTable) -> Blocks:
         row_start=np.array([0, *[count] * atoms]),
         rows=np.arange(count),
         touch_start=room(atoms + 1),
-        touches=room(tables.contact_rows // COLUMNS),
+        touches=room(tables.contact_rows // tables.contact_arms),
         state_start=np.array([0, *[states] * atoms]),
         states=np.arange(states),
         place=np.arange(width),
@@ -112,6 +111,8 @@ class Linear(NamedTuple):
         load_slope: dN/dS, S the sum of earlier forces, shape (K,).
         load_by_position: dN/dq at constant S, shape (K, N).
         load_by_time: dN/dt at constant S, shape (K,).
+        contact_matrix: g - A of the states of a contact, inverted in place, shape (contact arms - 1,) twice.
+        contact_weights: Slopes of one of its rows or states by gap, speed and slips, shape (contact arms + 1,).
         gain: d phi, shape (K, full).
         state_gain: d z, shape (Z, full).
         load, command: Of one row, shape (full,).
@@ -139,6 +140,8 @@ class Linear(NamedTuple):
     load_slope: Vector
     load_by_position: Matrix
     load_by_time: Vector
+    contact_matrix: Matrix
+    contact_weights: Vector
     gain: Matrix
     state_gain: Matrix
     load: Vector
@@ -166,7 +169,7 @@ def build_linear(tables: Tables, control: InputTable) -> Linear:
     wide, reads = 2 * width + states + 1, len(tables.read_states)
     full = wide + reads
     if (needed := 8.0 * wide * max(count, wide)) > (present := physical_memory()):
-        pairs, most = tables.contact_rows // COLUMNS, present / 2**30
+        pairs, most = tables.contact_rows // tables.contact_arms, present / 2**30
         allowed = f"{pairs} pairs of bodies can touch, which needs {needed / 2**30:.3g} GiB of memory, of {most:.3g}"
         raise InputError("contacts", f"{allowed}; let fewer bodies touch")
     linear = Linear(
@@ -181,6 +184,8 @@ def build_linear(tables: Tables, control: InputTable) -> Linear:
         load_slope=np.zeros(count),
         load_by_position=np.zeros((count, width)),
         load_by_time=np.zeros(count),
+        contact_matrix=np.zeros((tables.contact_arms - 1,) * 2),
+        contact_weights=np.zeros(tables.contact_arms + 1),
         gain=np.zeros((count, full)),
         state_gain=np.zeros((states, full)),
         load=np.zeros(full),

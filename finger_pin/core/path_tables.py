@@ -38,8 +38,8 @@ class LookColumns(NamedTuple):
 
 LOOK = LookColumns(*range(len(LookColumns._fields)))
 PIECE = PieceBodies(*range(len(PieceBodies._fields)))
-# Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
-COLUMNS, WRENCH = 3, 12
+# Numbers of a wrench on the first body, then on the second: (moment, force) each.
+WRENCH = 12
 # A step is halved so often at most, less two, to look for touches.
 LOOKS = 60
 
@@ -53,7 +53,7 @@ class Paths(NamedTuple):
         rotation: Of the piece's frame in its body's, shape (E, 3, 3).
         origin: Of the piece's frame in its body's, shape (E, 3), m.
         value, slopes: Addresses of the shape of each, shape (E,).
-        columns: Number of wrenches of each, shape (E,).
+        columns: Number of wrenches of each that rows use, shape (E,).
         parameters: Shape (E, most parameters).
         reach: Shape (E,), m.
         start: First index of the coordinates that move a piece, shape (E + 1,).
@@ -130,14 +130,15 @@ class PathWork(NamedTuple):
         frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
         origin: Its origin, shape (E, 3), m.
         ends: Both points and the side point, base frame, shape (E, 9), m.
-        wrench: Unit wrenches on the first and on the second body, shape (E, COLUMNS, WRENCH).
+        wrench: Unit wrenches on the first and on the second body, shape (E, most wrenches, WRENCH).
         push: Force of a contact on the first body, shape (E, 3), N.
         length: Of every row, shape (K,).
         turn: Of every row, shape (K,).
         local_points: All three points in the piece's frame, shape (E, 9), m.
         gather: Shape (N,).
         slopes: Of a shape, shape (SLOPES,).
-        wrench_slope: Derivatives of the wrenches by the coordinates that move them, shape (entries, COLUMNS, WRENCH).
+        wrench_slope: Derivatives of the wrenches by the coordinates that move them, shape (entries, most
+            wrenches, WRENCH).
     """
 
     out: Matrix
@@ -173,6 +174,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
     parents, last, turns = chains.parents, chains.last, chains.turns
     pieces: list[PathElement] = list(dict.fromkeys(leg.piece for legs in paths for leg in legs))
     number = {piece: e for e, piece in enumerate(pieces)}
+    columns = {leg.piece: leg.column + 1 for legs in paths for leg in sorted(legs, key=lambda leg: leg.column)}
     first_row = {leg.piece: k for k, each in reversed(list(enumerate(paths))) for leg in each}
     legs = [leg for each in paths for leg in each]
     ends = [(*p.ends, Place(0, np.zeros(3)))[:3] for p in pieces]
@@ -199,7 +201,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         origin=np.array([turns[p.joint].T @ p.frame.translation for p in pieces]).reshape(-1, 3),
         value=np.array([shape_address(p.shape.value) for p in pieces], dtype=np.int64),
         slopes=np.array([shape_address(p.shape.slopes) for p in pieces], dtype=np.int64),
-        columns=np.array([p.shape.columns for p in pieces], dtype=np.int64),
+        columns=np.array([columns[p] for p in pieces], dtype=np.int64),
         parameters=parameters,
         reach=np.array([p.reach for p in pieces], dtype=float),
         start=np.cumsum([0, *(len(at) for at, _ in entries)]),
@@ -245,7 +247,7 @@ def _movers(bodies: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDAr
 
 def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
     """Allocate the memory for the pieces of K rows."""
-    pieces, entries = len(paths.columns), len(paths.at)
+    pieces, entries, columns = len(paths.columns), len(paths.at), int(paths.columns.max(initial=1))
     return PathWork(
         out=np.zeros((pieces, OUT)),
         active=np.ones(pieces, dtype=np.int64),
@@ -264,7 +266,7 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         frame=np.zeros((pieces, 3, 3)),
         origin=np.zeros((pieces, 3)),
         ends=np.zeros((pieces, 9)),
-        wrench=np.zeros((pieces, COLUMNS, WRENCH)),
+        wrench=np.zeros((pieces, columns, WRENCH)),
         push=np.zeros((pieces, 3)),
         length=np.zeros(count),
         turn=np.zeros(count),
@@ -272,5 +274,5 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         gather=np.zeros(width),
         slopes=np.zeros(SLOPES),
         turn_slope=np.zeros(entries),
-        wrench_slope=np.zeros((entries, COLUMNS, WRENCH)),
+        wrench_slope=np.zeros((entries, columns, WRENCH)),
     )

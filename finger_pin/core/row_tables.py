@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from finger_pin.core.axes import along
 from finger_pin.core.evaluation.law_code import addresses, kink_column
 from finger_pin.core.jit import Indices
+from finger_pin.laws.contact_law import CONTACT
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
 
@@ -72,6 +73,7 @@ def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
         "state_row": np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
         "touch": touch,
         "contact_rows": int(np.count_nonzero(touch)),
+        "contact_arms": max([CONTACT.arms, *(table.law.arms for table in rows)]),
     }
 
 

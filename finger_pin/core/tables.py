@@ -51,8 +51,9 @@ class Tables(NamedTuple):
         measure: dl/dq there, shape (arms,).
         state: Index of each row's state in z, -1 without one, shape (K,).
         state_row: The row of each state, shape (states,).
-        touch: 1 for the first of the three rows of a contact, 2 for the others, 0 for all else, shape (K,).
+        touch: 1 for the first of the rows of a contact, 2 for the others, 0 for all else, shape (K,).
         contact_rows: Number of rows of contacts, which stand before all others.
+        contact_arms: Number of rows of each contact.
         channel: Index of its input from outside, -1 without one, shape (K,).
         input_rows: Rows that have an input, from outside or from earlier rows, ascending.
         input_start: First index of the terms of its input from earlier rows in ``terms``, shape (K + 1,).
@@ -103,6 +104,7 @@ class Tables(NamedTuple):
     state_row: Annotated[Indices, along("state", of="row")]
     touch: Annotated[Indices, along("row")]
     contact_rows: int
+    contact_arms: int
     channel: Annotated[Indices, along("row", of="channel")]
     input_rows: Annotated[Indices, along("input row", of="row")]
     input_start: Annotated[Indices, along("row", starts="term")]

@@ -40,6 +40,12 @@ class Surface(Description):
     friction: Annotated[float, real(0.0, 10.0)] = quantity(
         0.7, unit="1", source="rubber on plastic", doc="mu_k, the coefficient of sliding friction."
     )
+    torsion: Annotated[float, real(0.0, 1.0)] = quantity(
+        0.0,
+        unit="m",
+        source="no resistance; of a pressed pad of radius a 0.59 mu_k a (Hertz)",
+        doc="Friction moment about the normal per normal force; with slip the ellipsoid of both.",
+    )
     stiction_ratio: Annotated[float, real(1.0, 100.0)] = quantity(
         1.0, unit="1", source="chosen", doc="mu_s / mu_k: sliding begins at mu_s f_n."
     )
@@ -55,6 +61,12 @@ class Surface(Description):
     floor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
         1e-4, unit="N", source="keeps slopes finite at f_n = 0", doc="Friction below which sticking is gradual."
     )
+
+    @model_validator(mode="after")
+    def _turns_with_friction(self) -> Self:
+        if self.torsion and not self.friction:
+            raise problem("torsion", "must be 0 where friction is 0: both make up one limit", self.torsion)
+        return self
 
 
 class Shaped(Description):

@@ -100,8 +100,8 @@ def add_pairs(
         before = [other for other in [*tree.objects][:k] if each.moves or tree.objects[other].moves]
         pairs += [(other, name) for other in (*owner, *before) if frozenset((name, other)) not in apart]
     for pair in pairs:
-        stiffness, damping, exponent, _, mu, *_ = law_numbers(*(solids[each].surface for each in pair))
-        sliding = {"condim": "1"} if mu == 0.0 else {"condim": "3", "friction": numbers(mu, mu, 0.005, 1e-4, 1e-4)}
+        stiffness, damping, exponent, _, mu, *_, radius = law_numbers(*(solids[each].surface for each in pair))
+        sliding = _rubbing(mu, radius * mu, numbers(mu, mu, radius * mu or 0.005, 1e-4, 1e-4))
         meeting = sum(mobility.bodies[owner.get(each, each)] for each in pair)
         # A spring of Hertz's exponent has no stiffness of its own.
         held = soft(stiffness, impact_ratio(damping), meeting, damped=True) if exponent == 1.0 else {}
@@ -110,5 +110,10 @@ def add_pairs(
 
 
 def _friction(surface: Surface | None) -> dict[str, str]:
-    mu = (surface or Surface()).friction
-    return {"friction": numbers(mu, 0.005, 1e-4)} if mu else {"condim": "1"}
+    surface = surface or Surface()
+    return _rubbing(surface.friction, surface.torsion, numbers(surface.friction, surface.torsion or 0.005, 1e-4))
+
+
+def _rubbing(mu: float, torsion: float, friction: str) -> dict[str, str]:
+    """Return friction with the dimension of contacts in which MuJoCo heeds what there is of it."""
+    return {"condim": "4" if torsion else "3", "friction": friction} if mu else {"condim": "1"}

@@ -59,7 +59,7 @@ class Pairs(ElementReader):
         return _kept(int(np.max(dims)), np.maximum(model.geom_friction[a], model.geom_friction[b]))
 
     def surfaces(self, met: dict[Pair, Array]) -> dict[int, Table]:
-        """Return the sliding friction, stiffness and damping of each geom, of which the smaller of two is their pair's.
+        """Return friction, torsion, stiffness and damping of each geom, of which the smaller of two is their pair's.
 
         No other numbers do if these do not; the pairs of which a number is greater than in MuJoCo are listed.
         """
@@ -67,10 +67,19 @@ class Pairs(ElementReader):
         pressing = {pair: self._pressing(pair, numbers) for pair, numbers in met.items()}
         stiffness = self._shared("stiffness, N/m,", {pair: each[0] for pair, each in pressing.items()}, moves=False)
         damping = self._shared("damping, s/m,", {pair: each[1] for pair, each in pressing.items()}, moves=False)
-        turning = [self._pair(pair) for pair, numbers in met.items() if numbers[1:].any()]
-        if turning:
-            self.rest.add(f"torsional and rolling friction (condim 4 and 6) of geoms: {_few(turning)}")
-        return {i: {"friction": friction[i], "stiffness": stiffness[i], "damping": damping[i]} for i in friction}
+        # Torsion shares its limit with sliding, and has none where that is zero.
+        torsion = self._shared("torsion, m,", {pair: each[1] * (each[0] > 0.0) for pair, each in met.items()})
+        for what, lost in (
+            (
+                "torsional friction without sliding friction",
+                [pair for pair, each in met.items() if each[1] > 0 == each[0]],
+            ),
+            ("rolling friction (condim 6)", [pair for pair, each in met.items() if each[2]]),
+        ):
+            if lost:
+                self.rest.add(f"{what} of geoms: {_few([self._pair(pair) for pair in lost])}")
+        columns = {"friction": friction, "torsion": torsion, "stiffness": stiffness, "damping": damping}
+        return {i: {name: values[i] for name, values in columns.items()} for i in friction}
 
     def _shared(self, what: str, wanted: dict[Pair, float], moves: bool = True) -> dict[int, float]:
         """Return a number for each geom so that no pair gets too little; list the pairs that get more."""

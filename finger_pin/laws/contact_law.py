@@ -12,6 +12,11 @@ where k_t |w| <= mu f_n, else the length that brings k_t w back to the cone; z' 
 the element of which the friction model of Xiong, Kikuuwe and Yamamoto (Tribology Letters 51, 2013) consists, here for
 two tangents and a load that varies.
 
+Where a contact resists spinning, the bend has a third component: the turn about the normal times a length r, at
+which the law above has the moment M = r F_3. So |F|^2 + (M / r)^2 <= (mu f_n)^2, the ellipsoid that is MuJoCo's
+elliptic cone (and, as a fair fit, a soft finger's limit surface: Howe and Cutkosky, Int. J. Robotics Research 15,
+1996), with r = torsion / mu_k. Without slip along the tangents the contact turns below r mu f_n.
+
 What follows, whatever the normal force does meanwhile:
 
 - |F| <= mu_s f_n, with the magnitude of both components.
@@ -28,6 +33,7 @@ slopes finite at f_n = 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -46,31 +52,34 @@ def _normal(touch: Touch, p: Parameters) -> Numbers:
 
 def _cone(touch: Touch, pressing: Number, p: Parameters) -> Numbers:
     """Return w, |w|, the sliding speed x that lowers mu, mu, and its excess over kinetic friction, mu - mu_k."""
-    _, _, _, static, kinetic, stiffness, lag, stribeck, _ = p
+    _, _, _, static, kinetic, stiffness, lag, stribeck, _, radius = p
     bend_1, bend_2 = touch.state_1 + lag * touch.slip_1, touch.state_2 + lag * touch.slip_2
-    bend = np.sqrt(bend_1 * bend_1 + bend_2 * bend_2)
+    bend_3 = touch.state_3 + lag * (radius * touch.slip_3)
+    bend = np.sqrt(bend_1 * bend_1 + bend_2 * bend_2 + bend_3 * bend_3)
     sliding = np.maximum(bend - static * pressing / stiffness, 0.0) / lag
     excess = (static - kinetic) * np.exp(-(sliding / stribeck) * (sliding / stribeck))
-    return bend_1, bend_2, bend, sliding, kinetic + excess, excess
+    return bend_1, bend_2, bend_3, bend, sliding, kinetic + excess, excess
 
 
 def _value(touch: Touch, p: Parameters) -> Numbers:
-    _, _, _, _, _, stiffness, lag, _, floor = p
+    _, _, _, _, _, stiffness, lag, _, floor, radius = p
     _, spring, factor, pushes = _normal(touch, p)
     normal = spring * factor * pushes
     pressing = np.maximum(normal, 0.0)
-    bend_1, bend_2, bend, _, friction, _ = _cone(touch, pressing, p)
+    bend_1, bend_2, bend_3, bend, _, friction, _ = _cone(touch, pressing, p)
     level = friction * pressing
     share = level / np.maximum(np.maximum(stiffness * bend, level), floor)
-    tip_1, tip_2 = share * bend_1, share * bend_2
+    tip_1, tip_2, tip_3 = share * bend_1, share * bend_2, share * bend_3
     # The force bends sharply where the surfaces meet, and where the contact would begin to pull.
     grip = np.minimum(-touch.gap, factor)
     return (
         normal,
         -stiffness * tip_1,
         -stiffness * tip_2,
+        -stiffness * tip_3 * radius,
         (tip_1 - touch.state_1) / lag,
         (tip_2 - touch.state_2) / lag,
+        (tip_3 - touch.state_3) / lag,
         level,
         (1.0 - share) * bend / lag,
         grip,
@@ -78,7 +87,7 @@ def _value(touch: Touch, p: Parameters) -> Numbers:
 
 
 def _slopes(touch: Touch, p: Parameters, signals: Numbers) -> tuple[Numbers, ...]:
-    kn, damping, exponent, static, _, stiffness, lag, stribeck, floor = p
+    kn, damping, exponent, static, _, stiffness, lag, stribeck, floor, radius = p
     depth, spring, factor, pushes = _normal(touch, p)
     touching = 1.0 * ((touch.gap < 0.0) | (touch.side > 0.0))
     normal = spring * factor * pushes
@@ -86,7 +95,7 @@ def _slopes(touch: Touch, p: Parameters, signals: Numbers) -> tuple[Numbers, ...
     by_speed = -damping * spring * pushes
     # A step held in touch must not depend on whether its start is just before or just behind the touch.
     pressing, pressed = np.maximum(normal, 0.0), 1.0 * ((normal > 0.0) | (touch.side > 0.0))
-    bend_1, bend_2, bend, sliding, friction, excess = _cone(touch, pressing, p)
+    bend_1, bend_2, bend_3, bend, sliding, friction, excess = _cone(touch, pressing, p)
     level = friction * pressing
     reach = np.maximum(np.maximum(stiffness * bend, level), floor)
     share = level / reach
@@ -99,50 +108,58 @@ def _slopes(touch: Touch, p: Parameters, signals: Numbers) -> tuple[Numbers, ...
     share_n = level_n * (1.0 - inside * share) / reach
     share_b = (level_b * (1.0 - inside * share) - outside * share * stiffness) / reach
     # |w| by its components; at w = 0 it has no slope, and needs none.
-    along_1, along_2 = bend_1 / np.maximum(bend, 1e-300), bend_2 / np.maximum(bend, 1e-300)
+    scale = np.maximum(bend, 1e-300)
+    along_1, along_2, along_3 = bend_1 / scale, bend_2 / scale, bend_3 / scale
     # The tip's bend s w by f_n and by w.
-    n_1, n_2 = share_n * bend_1, share_n * bend_2
+    n_1, n_2, n_3 = share_n * bend_1, share_n * bend_2, share_n * bend_3
     b_11, b_22 = share + share_b * along_1 * bend_1, share + share_b * along_2 * bend_2
-    b_12 = share_b * along_1 * bend_2
+    b_33, b_12 = share + share_b * along_3 * bend_3, share_b * along_2 * bend_1
+    b_13, b_23 = share_b * along_3 * bend_1, share_b * along_3 * bend_2
+    by_normal = (by_gap, by_speed)
+    first, second, third = (n_1, b_11, b_12, b_13), (n_2, b_12, b_22, b_23), (n_3, b_13, b_23, b_33)
     return (
-        (by_gap, by_speed, 0.0, 0.0, 0.0, 0.0),
-        (
-            -stiffness * n_1 * by_gap,
-            -stiffness * n_1 * by_speed,
-            -stiffness * lag * b_11,
-            -stiffness * lag * b_12,
-            -stiffness * b_11,
-            -stiffness * b_12,
-        ),
-        (
-            -stiffness * n_2 * by_gap,
-            -stiffness * n_2 * by_speed,
-            -stiffness * lag * b_12,
-            -stiffness * lag * b_22,
-            -stiffness * b_12,
-            -stiffness * b_22,
-        ),
-        (n_1 * by_gap / lag, n_1 * by_speed / lag, b_11, b_12, (b_11 - 1.0) / lag, b_12 / lag),
-        (n_2 * by_gap / lag, n_2 * by_speed / lag, b_12, b_22, b_12 / lag, (b_22 - 1.0) / lag),
+        (by_gap, by_speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        _of_force(-stiffness, first, by_normal, lag, radius),
+        _of_force(-stiffness, second, by_normal, lag, radius),
+        _of_force(-stiffness * radius, third, by_normal, lag, radius),
+        _of_rate((1.0, 0.0, 0.0), first, by_normal, lag, radius),
+        _of_rate((0.0, 1.0, 0.0), second, by_normal, lag, radius),
+        _of_rate((0.0, 0.0, 1.0), third, by_normal, lag, radius),
     )
+
+
+def _of_force(factor: Number, bend: Numbers, by_normal: Numbers, lag: Number, radius: Number) -> Numbers:
+    """Return the slopes of a multiple of a component of the tip's bend, given by f_n and by w."""
+    n, b_1, b_2, b_3 = bend
+    by_1, by_2, by_3, (by_gap, by_speed) = factor * b_1, factor * b_2, factor * b_3, by_normal
+    return factor * n * by_gap, factor * n * by_speed, lag * by_1, lag * by_2, lag * radius * by_3, by_1, by_2, by_3
+
+
+def _of_rate(unit: Numbers, bend: Numbers, by_normal: Numbers, lag: Number, radius: Number) -> Numbers:
+    """Return the slopes of z' = (tip - z) / T of a component."""
+    (n, b_1, b_2, b_3), (u_1, u_2, u_3), (by_gap, by_speed) = bend, unit, by_normal
+    by_states = (b_1 - u_1) / lag, (b_2 - u_2) / lag, (b_3 - u_3) / lag
+    return n * by_gap / lag, n * by_speed / lag, b_1, b_2, radius * b_3, *by_states
 
 
 def _account(
     touch: Touch, p: Parameters, forces: Sequence[Number], rates: Sequence[Number], signals: Numbers
 ) -> Numbers:
-    _, _, exponent, _, _, stiffness, lag, _, _ = p
+    _, _, exponent, _, _, stiffness, lag, _, _, _ = p
     depth, spring, _, _ = _normal(touch, p)
-    bent = touch.state_1 * touch.state_1 + touch.state_2 * touch.state_2
-    rubbing = np.sqrt(forces[1] * forces[1] + forces[2] * forces[2])
+    bent = touch.state_1 * touch.state_1 + touch.state_2 * touch.state_2 + touch.state_3 * touch.state_3
+    # Of the spin, at the length r: from the tip's bend, as r may be zero.
+    third = stiffness * (touch.state_3 + lag * rates[2])
+    rubbing = np.sqrt(forces[1] * forces[1] + forces[2] * forces[2] + third * third)
     return (
         spring * depth / (exponent + 1.0) + 0.5 * stiffness * bent,
         (spring - forces[0]) * touch.speed,
         rubbing * signals[1],
-        stiffness * lag * (rates[0] * rates[0] + rates[1] * rates[1]),
+        stiffness * lag * (rates[0] * rates[0] + rates[1] * rates[1] + rates[2] * rates[2]),
     )
 
 
-#: Contact of two surfaces.
+#: Contact of two surfaces that resists no spinning.
 CONTACT = ContactLaw(
     name="contact",
     parameters=(
@@ -155,6 +172,7 @@ CONTACT = ContactLaw(
         "lag",
         "stribeck_velocity",
         "floor",
+        "torsion_radius",
     ),
     value=_value,
     slopes=_slopes,
@@ -164,3 +182,5 @@ CONTACT = ContactLaw(
     scale=1e-5,
     kink="grip",
 )
+#: Contact of two surfaces with torsional friction.
+TORSIONAL_CONTACT = replace(CONTACT, name="contact with torsion", arms=4)

@@ -116,8 +116,10 @@ class Touch(NamedTuple):
         speed: Its rate, m/s.
         slip_1: Speed along the first tangent of the body that is pushed up the normal, against the other, m/s.
         slip_2: Along the second.
+        slip_3: How fast it spins about the normal, rad/s; 0 where contacts have no torsional friction.
         state_1: The law's first state.
         state_2: The second.
+        state_3: The third, likewise.
         side: On which side of its law's kink the contact is held, as in `Row`.
     """
 
@@ -125,29 +127,33 @@ class Touch(NamedTuple):
     speed: Number
     slip_1: Number
     slip_2: Number
+    slip_3: Number
     state_1: Number
     state_2: Number
+    state_3: Number
     side: Number = 0.0
 
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """The law of a row with three arms and two states: a contact, its normal and its tangents.
+    """The law of a contact, whose row has an arm along the normal and one for every slip, each of these with a state.
 
-    Forces act along the arms: the first drives the gap open, the others drive the slips up.
+    Forces act along the arms: the first drives the gap open, the others drive the slips up. Two slips are those along
+    the tangents; the third, where there are four arms, is the spin about the normal, and its force a moment. What
+    functions return of a slip that a contact does not have is dropped.
 
     Attributes:
         name: For messages.
         parameters: Names of the numbers that each contact has; ``p`` holds them in this order.
-        value: (touch, p) -> (f_n, f_1, f_2, z_1', z_2', *signals).
-        slopes: (touch, p, signals) -> five tuples: derivatives of f_n, f_1, f_2, z_1' and z_2' by gap, speed, slip_1,
-            slip_2, state_1, state_2.
-        account: (touch, p, (f_n, f_1, f_2), (z_1', z_2'), signals) -> (stored energy, *lost powers), J and W. The power
-            of the three forces is what is neither lost nor stored.
+        value: (touch, p) -> (f_n, f_1, f_2, f_3, z_1', z_2', z_3', *signals).
+        slopes: (touch, p, signals) -> seven tuples: derivatives of these by gap, speed, three slips, three states.
+        account: (touch, p, (f_n, f_1, f_2, f_3), (z_1', z_2', z_3'), signals) -> (stored energy, *lost powers), J and
+            W. The power of the forces is what is neither lost nor stored.
         signals: Names of the further numbers that ``value`` returns.
         losses: Names of the powers that are lost.
         scale: Typical magnitude of the states, for absolute tolerances.
         kink: As in `Law`.
+        arms: Number of arms, 3 or 4.
     """
 
     name: str
@@ -159,25 +165,34 @@ class ContactLaw:
     losses: tuple[str, ...]
     scale: float
     kink: str = ""
+    arms: int = 3
     supplies: ClassVar[tuple[str, ...]] = ()
     reads_states: ClassVar[bool] = False
-    arms: ClassVar[int] = 3
-    states: ClassVar[int] = 2
+
+    @property
+    def states(self) -> int:
+        """The number of states of a contact."""
+        return self.arms - 1
 
     def arguments(self, row: Any) -> Touch:
-        """Return the arguments for contacts from a `Row` of arms, shape (..., 3 k), and of states, (..., 2 k)."""
-        slips = (row.speed[..., each::3] for each in range(3))
-        return Touch(row.length[..., ::3], *slips, *(row.state[..., each::2] for each in range(2)))
+        """Return the arguments for k contacts from a `Row`: of arms, shape (..., a k), and states, (..., (a - 1) k)."""
+        gap, speed = row.length[..., :: self.arms], row.speed[..., :: self.arms]
+        return Touch(gap, speed, *_apart(row.speed, self.arms, 4)[1:], *_apart(row.state, self.states, 3))
 
     def act(self, touch: Touch, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
-        """Return the contacts' forces, shape (..., 3 k), the rates of their states, (..., 2 k), and their signals."""
+        """Return the contacts' forces, shape (..., a k), the rates of their states, (..., (a - 1) k), and signals."""
         values = self.value(touch, p)
-        return _side_by_side(values[:3]), _side_by_side(values[3:5]), tuple(values[5:])
+        return _side_by_side(values[: self.arms]), _side_by_side(values[4 : 4 + self.states]), tuple(values[7:])
 
     def energy_terms(self, touch: Touch, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
         """Return stored energy, J, and powers, W, from the results of `act`."""
-        forces, rates = ([all_[..., each::count] for each in range(count)] for all_, count in ((force, 3), (rate, 2)))
-        return self.account(touch, p, forces, rates, signals)
+        return self.account(touch, p, _apart(force, self.arms, 4), _apart(rate, self.states, 3), signals)
+
+
+def _apart(values: Array, count: int, most: int) -> list[Array]:
+    """Return the numbers of each arm or state of contacts, zero for those that they do not have."""
+    parts = [values[..., each::count] for each in range(count)]
+    return parts + [np.zeros_like(parts[0])] * (most - count)
 
 
 def _side_by_side(parts: Sequence[Number]) -> Array:

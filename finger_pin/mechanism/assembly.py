@@ -171,7 +171,7 @@ def _state_layout(
         "passive_velocity": routing.passive_names,
         "spool_velocity": motors.loose_names,
         "motor_velocity": motors.names,
-        "contact_bend": dotted(touching, "1 2"),
+        "contact_bend": dotted(touching, "1 2 3" if scene is not None and scene.contacts.law.arms > 3 else "1 2"),
         "actuator_state": [name for table in of_tree if table.states for name in table.names],
         "elastic_stiction": (
             *tendons.hysteretic_halves,

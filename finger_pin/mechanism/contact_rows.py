@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
-from finger_pin.laws.contact_law import CONTACT
+from finger_pin.laws.contact_law import CONTACT, TORSIONAL_CONTACT
 from finger_pin.mechanism.contact_features import ContactPart, contacts_of
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
@@ -43,7 +43,7 @@ def contact_rows(
     """
     names: list[str] = []
     numbers: list[tuple[float, ...]] = []
-    paths: list[tuple[PathTerm, ...]] = []
+    pieces: list[PathElement] = []
     for one, other in itertools.combinations(solids, 2):
         pair = frozenset((one.name, other.name))
         apart = pair in never or (one.group == other.group and pair not in within)
@@ -54,10 +54,13 @@ def contact_rows(
             piece = _piece(a, part, w, prism)
             names.append(f"{a.name}-{w.name}" + (f".{index}" if len(touches) > 1 else ""))
             numbers.append(law_numbers(a.surface, w.surface))
-            paths += [(PathTerm(piece, column),) for column in range(CONTACT.arms)]
+            pieces.append(piece)
     parameters = np.array(numbers).reshape(-1, len(CONTACT.parameters)).T
+    # One that resists spinning makes rows of four arms of all.
+    law = TORSIONAL_CONTACT if parameters[-1].any() else CONTACT
+    paths = tuple((PathTerm(piece, column),) for piece in pieces for column in range(law.arms))
     arm = np.zeros((len(paths), width))
-    return Rows("contacts", CONTACT, tuple(names), parameters, arm, paths=tuple(paths), powers=_LOSSES)
+    return Rows("contacts", law, tuple(names), parameters, arm, paths=paths, powers=_LOSSES)
 
 
 def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> PathElement:
@@ -82,7 +85,7 @@ def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     Raises:
         InputError: Naming the pair and how deep it is.
     """
-    gaps = path_kinematics(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: CONTACT.arms]
+    gaps = path_kinematics(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: contacts.law.arms]
     if gaps.size and gaps.min() < -DEEPEST_START:
         deep, most = -1e3 * float(gaps.min()), 1e3 * DEEPEST_START
         # With as many digits as say that it is more.
@@ -109,4 +112,5 @@ def law_numbers(one: Surface | None, other: Surface | None) -> tuple[float, ...]
         number["lag"],
         number["stribeck_velocity"],
         number["floor"],
+        number["torsion"] / kinetic if number["torsion"] else 0.0,
     )

@@ -13,7 +13,6 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import Link
 from finger_pin.exceptions import InputError
-from finger_pin.laws.contact_law import CONTACT
 from finger_pin.mechanism.contact_rows import check_start, contact_rows
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.gaps import PRISM
@@ -222,11 +221,11 @@ class Scene:
 
         Args:
             state: m states.
-            force: Along the contacts' three arms, shape (m, 3 c), N.
+            force: Along the contacts' arms, shape (m, a c), N; moments are left out.
         """
         body, data, placed = self.body, self.body.model.createData(), _placed(state)
-        pieces = [legs[0].piece for legs in self.contacts.paths[:: CONTACT.arms]]
-        along = force.reshape(len(force), len(pieces), CONTACT.arms)
+        pieces = [legs[0].piece for legs in self.contacts.paths[:: self.contacts.law.arms]]
+        along = force.reshape(len(force), len(pieces), self.contacts.law.arms)[..., :3]
         points, out = ContactPoints(*(np.zeros((len(force), len(pieces), 3)) for _ in range(3))), np.zeros(16)
         for m in np.flatnonzero(np.any(along[..., 0], axis=1)):
             pin.forwardKinematics(body.model, data, placed[m])

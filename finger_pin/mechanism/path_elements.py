@@ -27,7 +27,7 @@ class PathShape(Protocol):
         parameters: Names of its numbers.
         value: (y, p, out) fills what the points y give, six numbers, and three of a side point; see `spans`, `gaps`.
         slopes: (y, p, out) fills its derivatives by y.
-        columns: Count of its wrenches: one along a span; normal and two tangents of a gap.
+        columns: Count of its wrenches: one along a span; of a gap normal, two tangents, and a moment about the normal.
     """
 
     columns: ClassVar[int]
@@ -107,6 +107,8 @@ class PathTerm:
         return self.arm if self.measure is None else self.measure
 
 
+#: Column of a gap's moment about the normal.
+SPIN = 3
 #: Of every row of a table, the legs of its path.
 Paths = Sequence[Sequence[PathTerm]]
 
@@ -160,9 +162,12 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
                 loads = [(rotation @ out[2:5], points[0]), (rotation @ out[5:8], points[1])]
             else:
                 length, turn = (out[0] if leg.column == 0 else 0.0), 0.0
-                axis = (1, 7, 10)[leg.column]
+                axis = (1, 7, 10, 1)[leg.column]
                 loads = [(rotation @ out[axis : axis + 3], frame.act(out[4:7]))] if out[0] < 0.0 else []
             arm = np.zeros(width)
+            if piece.shape.columns > 1 and leg.column == SPIN and loads:
+                arm += loads[0][0] @ (twists[piece.ends[0].joint] - twists[piece.joint])[3:]
+                loads = []
             for (force, point), end in zip(loads, piece.ends[:2], strict=False):
                 wrench = np.concatenate([force, pin.skew(point) @ force])
                 arm += wrench @ (twists[end.joint] - twists[piece.joint])

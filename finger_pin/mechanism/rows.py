@@ -77,7 +77,8 @@ def _once(energies: Iterable[Energy]) -> tuple[Energy, ...]:
 class Rows:
     """A table of rows that share a law; k rows, N coordinates.
 
-    A contact has three rows: along its normal, and along two tangents. The parameters are then those of a third of k.
+    A contact has three rows: along its normal, and along two tangents; or four, the last about its normal. The
+    parameters are then those of a third or a fourth of k.
 
     Attributes:
         group: Name of the table, by which later ones refer to it.

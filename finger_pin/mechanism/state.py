@@ -91,7 +91,8 @@ class State:
         passive_velocity: p_5', shape (..., p), m/s.
         spool_velocity: theta_s', shape (..., l), rad/s.
         motor_velocity: theta_m', shape (..., m), rad/s.
-        contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
+        contact_bend: z of the contacts, of two tangents each, and of the spin where there is torsional friction,
+            shape (..., 2 c) or (..., 3 c), m.
         actuator_state: States of a tree's actuators that have some, shape (..., k).
         elastic_stiction: F^s that tendons hold against their stretch, halves of passive ones first, shape (..., h), N.
         drives: States of a user's drives, shape (..., d).

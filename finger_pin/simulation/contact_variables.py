@@ -8,10 +8,10 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.exceptions import InputError
-from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Touch
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.object_scene import POSE, VELOCITY
+from finger_pin.mechanism.path_elements import SPIN
 from finger_pin.mechanism.state import State
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.typing import Array
@@ -47,8 +47,14 @@ def contact_variables(finger: Finger) -> Variables:
         "contact_level": (_CONTACT, "N", "most friction, mu times the normal force"),
         "contact_point": (_SPACE, "m", "midway between the surfaces; zero where they are open"),
         "contact_normal": (_SPACE, "1", "normal of the second body, shorter deep in an edge; zero where they are open"),
-        "contact_bend": (("time", "contact", "tangent"), "m", "bend of the bristles along two tangents"),
+        "contact_bend": (
+            ("time", "contact", "tangent"),
+            "m",
+            "bend of the bristles along the tangents, and by spinning",
+        ),
     }
+    if around.contacts.law.arms > SPIN:
+        table["contact_moment"] = (_CONTACT, "N m", "friction moment about the normal, on the second body of the pair")
     if around.free:
         axes, turns = ("time", "object", "axis"), ("time", "object", "quaternion")
         table |= {
@@ -65,14 +71,16 @@ def contact_value(name: str, finger: Finger, of: SampledTrajectory) -> Array:
     if name.startswith("object_"):
         return _of_object(name, of.state)
     if name == "contact_bend":
-        return _split(of.state.contact_bend, 2)
+        return _split(of.state.contact_bend, _arms(finger) - 1)
     around, evaluation = finger.scene, of.finger.mechanism
     assert around is not None
-    contacts, arms = evaluation.rows[around.contacts.group], CONTACT.arms
+    contacts, arms = evaluation.rows[around.contacts.group], _arms(finger)
     if name in ("contact_force", "contact_point", "contact_normal"):
         return np.asarray(getattr(of.touching, name.removeprefix("contact_")))
     if name == "contact_normal_force":
         return contacts.force[:, ::arms]
+    if name == "contact_moment":
+        return -contacts.force[:, SPIN::arms]
     if name == "contact_level":
         return contacts["level"]
     if name == "contact_gap":
@@ -80,6 +88,15 @@ def contact_value(name: str, finger: Finger, of: SampledTrajectory) -> Array:
         return np.asarray(contacts.row.gap)
     friction = np.hypot(contacts.force[:, 1::arms], contacts.force[:, 2::arms])
     return friction if name == "contact_friction" else contacts["sliding_speed"] * (friction > 0.0)
+
+
+def _arms(finger: Finger) -> int:
+    assert finger.scene is not None
+    return finger.scene.contacts.law.arms
+
+
+def _slips(finger: Finger) -> list[str]:
+    return ["1", "2", "spin"][: _arms(finger) - 1]
 
 
 def _of_object(name: str, state: State) -> Array:
@@ -99,7 +116,7 @@ def contact_coordinates(finger: Finger) -> dict[str, Any]:
         return {}
     coordinates = {
         "contact": ("contact", list(around.contacts.names), {"long_name": "contact"}),
-        "tangent": ("tangent", ["1", "2"], {"long_name": "tangent of a contact"}),
+        "tangent": ("tangent", _slips(finger), {"long_name": "tangent of a contact"}),
     }
     if around.free:
         coordinates["object"] = ("object", list(around.free), {"long_name": "free object"})
@@ -124,9 +141,9 @@ def last_touching(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
             left_out and left_out + len(recorded_names) == len(expected) and {*recorded_names} < {*expected}
         ):
             raise InputError("initial", f"is a result with other {dimension}s: they must be {', '.join(expected)}")
-    # Bristles of pairs that never came near are not bent.
+    # Bristles of pairs that never came near are not bent, nor those that the result's contacts did not have.
     last = last[[name for names in parts.values() for name in names]]
-    last = last.reindex(contact=list(around.contacts.names), fill_value=0.0)
+    last = last.reindex(contact=list(around.contacts.names), tangent=_slips(finger), fill_value=0.0)
     values = {part: np.concatenate([last[name].values for name in names], axis=-1) for part, names in parts.items()}
     if around.free:
         # A state has angular velocities in the objects' own frames.

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from law_cases import every_law, random_parameters
 
-from finger_pin.laws.contact_law import CONTACT
+from finger_pin.laws.contact_law import CONTACT, TORSIONAL_CONTACT
 from finger_pin.laws.law import Law
 from finger_pin.mechanism.gaps import PRISM, prism_parameters
 from finger_pin.mechanism.mechanism import Mechanism
@@ -89,7 +89,8 @@ def random_path(rng, joints):
 
 
 def random_contacts(rng, joints, width):
-    """Three or four contacts of capsules with balls so large that most are inside; they slide or stick."""
+    """Three or four contacts of capsules with balls so large that most are inside; they slide or stick, or spin too."""
+    law = TORSIONAL_CONTACT if joints % 2 else CONTACT
     count = int(rng.integers(3, 5))
     paths = []
     for _ in range(count):
@@ -97,13 +98,14 @@ def random_contacts(rng, joints, width):
         ends = Place(holder, rng.normal(size=3)), Place(holder, rng.normal(size=3))
         numbers = np.array([0.3, 0.0, 1.0, *prism_parameters("sphere", [rng.uniform(2.0, 6.0)])])
         piece = PathElement(PRISM, numbers, ends, frame, random_placement(rng))
-        paths += [(PathTerm(piece, column),) for column in range(3)]
-    # Stiffness, damping, exponent; static and kinetic friction; stiffness and lag of bristles, Stribeck speed, floor.
-    least = [1.0, 0.0, 1.0, 0.8, 0.3, 1.0, 0.1, 0.5, 0.1]
-    most = [2.0, 0.1, 1.5, 1.0, 0.7, 3.0, 1.0, 2.0, 0.2]
+        paths += [(PathTerm(piece, column),) for column in range(law.arms)]
+    # Stiffness, damping, exponent; static and kinetic friction; stiffness and lag of bristles, Stribeck speed, floor;
+    # radius of torsion.
+    least = [1.0, 0.0, 1.0, 0.8, 0.3, 1.0, 0.1, 0.5, 0.1, 0.2]
+    most = [2.0, 0.1, 1.5, 1.0, 0.7, 3.0, 1.0, 2.0, 0.2, 1.0]
     parameters = rng.uniform(least, most, (count, len(least))).T
     names = tuple(f"contact{k}" for k in range(count))
-    return Rows("contacts", CONTACT, names, parameters, np.zeros((3 * count, width)), paths=paths)
+    return Rows("contacts", law, names, parameters, np.zeros((law.arms * count, width)), paths=paths)
 
 
 def _read(row, p):
@@ -208,7 +210,7 @@ def with_other_numbers(mechanism, rng):
         return matrix * rng.uniform(0.5, 1.5, np.shape(matrix))
 
     def other(table):
-        contact = table.law is CONTACT
+        contact = table.law.arms > 1
         return replace(
             table,
             parameters=1.1 * table.parameters if contact else random_parameters(table.law, rng, table.count),

@@ -9,6 +9,7 @@ from finger_pin.core.chains import BODY
 from finger_pin.core.evaluation.law_code import (
     ROW,
     SLOPE,
+    SLOPE_COLUMNS,
     TOUCH_SLOPE,
     RowColumns,
     SlopeColumns,
@@ -51,7 +52,7 @@ def test_columns_follow_the_arguments_of_laws():
     moved = [name for name in Touch._fields if name != "side"]
     assert list(TouchSlopeColumns._fields) == [f"{what}_by_{name}" for what in ("force", "rate") for name in moved]
     # A block of slopes has room for both kinds of laws.
-    assert len(set(TOUCH_SLOPE)) == len(TOUCH_SLOPE) and max(TOUCH_SLOPE) < len(SLOPE)
+    assert len(set(TOUCH_SLOPE)) == len(TOUCH_SLOPE) and max(*SLOPE, *TOUCH_SLOPE) < SLOPE_COLUMNS
 
 
 def test_compiled_laws_read_and_fill_named_columns():

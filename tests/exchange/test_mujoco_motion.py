@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 import finger_pin as fp
 from finger_pin.description.loading import read_scenario
+from finger_pin.description.surface import Surface
 from finger_pin.exchange.mujoco_compliance import impact_damping, restitution
 
 SMOOTH = {"finger.joint_friction.coulomb": 0.0, "finger.joint_friction.stiction": 0.0}
@@ -153,3 +154,40 @@ def test_the_share_that_a_damped_spring_throws_back_is_that_of_its_motion(ratio)
         atol=1e-13,
     )
     np.testing.assert_allclose(restitution(ratio), -run.y_events[0][0][1], atol=1e-7)
+
+
+PINCHED = """<mujoco><option timestep="5e-4" cone="elliptic" impratio="20"/>
+<default><geom solref=".004 1" condim="DIM" friction=".9 .012 .0001"/></default><worldbody>
+<body name="left" pos="0 -.026 .2"><joint name="left" type="slide" axis="0 1 0" damping="4" armature=".02"/>
+ <geom name="left_tip" size=".01" mass=".03"/></body>
+<body name="right" pos="0 .026 .2"><joint name="right" type="slide" axis="0 -1 0" damping="4" armature=".02"/>
+ <geom name="right_tip" size=".01" mass=".03"/></body>
+<body name="card" pos=".018 0 .2"><freejoint/><geom name="card" type="box" size=".04 .015 .025" mass=".04"/></body>
+</worldbody>
+<actuator><motor joint="left"/><motor joint="right"/></actuator>
+<keyframe><key qpos="0 0 .018 0 .2 1 0 0 0" ctrl="8 8"/></keyframe></mujoco>"""
+
+
+def test_a_card_pinched_off_its_centre_stays_level_by_torsional_friction():
+    """Bristles of stiffness k_t r^2 on both sides bend by m g d / (2 k_t r^2), r = torsion / mu; without, it falls."""
+    data, result = both(PINCHED.replace("DIM", "4"), 0.5)
+    level, (x, y, z) = 0.04 * 9.81 * 0.018, result.object_orientation.values[-1, 0, :3]
+    stiffness = Surface().tangential_stiffness * (0.012 / 0.9) ** 2
+    assert 2.0 * np.arcsin(abs(y)) == pytest.approx(level / (2.0 * stiffness), rel=1e-3)
+    assert max(abs(x), abs(z)) < 1e-6
+    # MuJoCo's creeps meanwhile.
+    assert 2.0 * np.arccos(min(data.qpos[5], 1.0)) < 0.02
+    tips = result.contact_moment.values[-1][result.contact_normal_force.values[-1] > 0.0]
+    assert np.abs(tips) == pytest.approx([level / 2.0] * 2, rel=1e-3)
+    _, fallen = both(PINCHED.replace("DIM", "3"), 0.5)
+    assert abs(float(fallen.object_orientation[-1, 0, 1])) > 0.2
+
+
+def test_torsional_friction_is_written_as_it_was_read_and_rolling_friction_is_listed():
+    with pytest.warns(
+        fp.exceptions.LeftOutWarning, match="rolling friction .condim 6. of geoms: left_tip and right_tip, left_tip and"
+    ):
+        first = fp.from_mujoco(mujoco.MjModel.from_xml_string(PINCHED.replace("DIM", "6")))
+    written = mujoco.MjModel.from_xml_string(fp.to_mjcf(first))
+    assert set(written.pair_dim) == {4}
+    assert written.pair_friction[:, :3] == pytest.approx(np.array([[0.9, 0.9, 0.012]] * len(written.pair_dim)))

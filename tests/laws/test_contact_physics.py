@@ -18,6 +18,7 @@ SOFT = dict(
     lag=2e-3,
     stribeck_velocity=5e-3,
     floor=1e-4,
+    torsion_radius=0.0,
 )
 
 
@@ -30,7 +31,7 @@ def contact(**changes):
 
 def pressed(value, normal, v, z, numbers):
     """The answer of a contact that is pressed with a force, whatever its gap."""
-    return value(Touch(-normal / numbers["stiffness"], 0.0, v[0], v[1], z[0], z[1]))
+    return value(Touch(-normal / numbers["stiffness"], 0.0, v[0], v[1], 0.0, z[0], z[1], 0.0))
 
 
 def integrate(rhs, end, start, **further):
@@ -44,7 +45,7 @@ def block(slope, end, mass=0.2, start=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)):
     normal, pull = mass * G * np.cos(slope), mass * G * np.sin(slope) * np.array([0.6, 0.8])
 
     def rhs(_, y):
-        _, f_1, f_2, rate_1, rate_2, *_ = pressed(value, normal, y[2:4], y[4:], numbers)
+        _, f_1, f_2, _, rate_1, rate_2, *_ = pressed(value, normal, y[2:4], y[4:], numbers)
         return [y[2], y[3], (pull[0] + f_1) / mass, (pull[1] + f_2) / mass, rate_1, rate_2]
 
     return integrate(rhs, end, start).y, normal, pull, numbers
@@ -92,7 +93,7 @@ def test_steady_sliding_settles_against_the_velocity_at_the_friction_that_the_la
         friction = 0.5 + 0.2 * np.exp(-((sliding / 5e-3) ** 2))
         speed = sliding + (0.7 - friction) * normal / damping
         v = speed * np.array([0.28, -0.96])
-        z = integrate(lambda _, z, v=v: pressed(value, normal, v, z, numbers)[3:5], 12.0, [1e-4, 1e-4]).y[:, -1]
+        z = integrate(lambda _, z, v=v: pressed(value, normal, v, z, numbers)[4:6], 12.0, [1e-4, 1e-4]).y[:, -1]
         _, f_1, f_2, *_ = pressed(value, normal, v, z, numbers)
         assert np.array([f_1, f_2]) == pytest.approx(-friction * normal * v / speed, rel=1e-5)
 
@@ -102,7 +103,7 @@ def test_a_sphere_set_down_sliding_rolls_after_two_sevenths_of_v_over_mu_g_at_fi
     mass, radius, v0 = 0.1, 0.02, 1.0
 
     def rhs(_, y):
-        _, force, _, rate, _, *_ = pressed(value, mass * G, (y[0] - radius * y[1], 0.0), (y[2], 0.0), numbers)
+        _, force, _, _, rate, *_ = pressed(value, mass * G, (y[0] - radius * y[1], 0.0), (y[2], 0.0), numbers)
         return [force / mass, -radius * force / (0.4 * mass * radius**2), rate]
 
     rolls = 2.0 * v0 / (7.0 * 0.5 * G)
@@ -124,7 +125,7 @@ def test_a_bouncing_ball_comes_back_with_one_less_two_thirds_of_damping_times_sp
         opened.terminal, opened.direction = True, 1.0
 
         def rhs(_, y, value=value):
-            return [y[1], value(Touch(y[0], y[1], 0.0, 0.0, 0.0, 0.0))[0] / mass]
+            return [y[1], value(Touch(y[0], y[1], *np.zeros(6)))[0] / mass]
 
         found = integrate(rhs, 1.0, [-1e-15, -speed], events=opened, atol=1e-14)
         product = damping * speed
@@ -137,7 +138,7 @@ def test_a_mass_on_the_contact_oscillates_at_the_square_root_of_stiffness_over_m
     rest = -mass * G / numbers["stiffness"]
 
     def rhs(_, y):
-        return [y[1], value(Touch(y[0], y[1], 0.0, 0.0, 0.0, 0.0))[0] / mass - G]
+        return [y[1], value(Touch(y[0], y[1], *np.zeros(6)))[0] / mass - G]
 
     pulse = np.sqrt(numbers["stiffness"] / mass)
     found = integrate(rhs, 20.0 * 2.0 * np.pi / pulse, [rest + amplitude, 0.0], method="DOP853", atol=1e-14)
@@ -152,7 +153,7 @@ def test_a_pinched_capsule_neither_creeps_nor_falls_until_its_load_is_twice_mu_t
 
     def fall(load):
         def rhs(_, y):
-            _, force, _, rate, _, *_ = pressed(value, normal, (y[1], 0.0), (y[2], 0.0), numbers)
+            _, force, _, _, rate, *_ = pressed(value, normal, (y[1], 0.0), (y[2], 0.0), numbers)
             return [y[1], (load + 2.0 * force) / mass, rate]
 
         y = integrate(rhs, 60.0, [0.0, 0.0, 0.0], dense_output=True).sol([10.0, 60.0])[0]
@@ -171,7 +172,7 @@ def test_vibration_of_load_and_normal_force_below_break_away_moves_nothing_on():
     def rhs(t, y):
         phase = 2.0 * np.pi * t / period
         normal, pull = 2.0 + 0.5 * np.cos(phase), 0.6 + 0.4 * np.sin(phase)
-        _, force, _, rate, _, *_ = pressed(value, normal, (y[1], 0.0), (y[2], 0.0), numbers)
+        _, force, _, _, rate, *_ = pressed(value, normal, (y[1], 0.0), (y[2], 0.0), numbers)
         return [y[1], (pull + force) / mass, rate]
 
     found = integrate(
@@ -190,7 +191,7 @@ def test_no_closed_cycle_yields_energy_and_sliding_cycles_cost_some():
         def rhs(t, y, value=value, sines=sines, turns=turns):
             place, rate = np.sin(turns * t), turns * np.cos(turns * t)
             (gap, _, _), (speed, slip_1, slip_2) = sines @ place - [2e-5, 0.0, 0.0], sines @ rate
-            f_n, f_1, f_2, rate_1, rate_2, *_ = value(Touch(gap, speed, slip_1, slip_2, y[0], y[1]))
+            f_n, f_1, f_2, _, rate_1, rate_2, *_ = value(Touch(gap, speed, slip_1, slip_2, 0.0, y[0], y[1], 0.0))
             return [rate_1, rate_2, f_n * speed + f_1 * slip_1 + f_2 * slip_2]
 
         work = integrate(rhs, 2.0 * np.pi, np.zeros(3), rtol=1e-6, atol=1e-11).y[2, -1]
@@ -201,8 +202,45 @@ def test_a_contact_that_opens_forgets_with_its_time_constant_and_exerts_nothing(
     value, numbers = contact()
 
     def rhs(_, z):
-        return value(Touch(1e-4, 0.1, 0.3, -0.2, *z))[3:5]
+        return value(Touch(1e-4, 0.1, 0.3, -0.2, 0.0, *z, 0.0))[4:6]
 
     z = integrate(rhs, 5.0 * numbers["lag"], [1e-5, -2e-5]).y[:, -1]
     assert z == pytest.approx(np.exp(-5.0) * np.array([1e-5, -2e-5]), rel=1e-5)
-    assert np.array(value(Touch(1e-4, 0.1, 0.3, -0.2, *z))[:3]) == pytest.approx(np.zeros(3), abs=0.0)
+    assert np.array(value(Touch(1e-4, 0.1, 0.3, -0.2, 0.0, *z, 0.0))[:3]) == pytest.approx(np.zeros(3), abs=0.0)
+
+
+def test_a_pinched_card_stays_level_until_its_moment_is_twice_the_torsion_times_the_pinch():
+    """40 g held 18 mm off its centre, as by two soft tips; what holds it bends by moment / (2 k_t r^2)."""
+    normal, torsion, inertia = 12.0, 4e-3, 2e-5
+    value, numbers = contact(kinetic=0.7, torsion_radius=torsion / 0.7)
+    r = numbers["torsion_radius"]
+
+    def turn(moment):
+        def rhs(_, y):
+            touch = Touch(-normal / numbers["stiffness"], 0.0, 0.0, 0.0, y[1], 0.0, 0.0, y[2])
+            _, _, _, resisting, _, _, rate, *_ = value(touch)
+            return [y[1], (moment + 2.0 * resisting) / inertia, rate]
+
+        return integrate(rhs, 20.0, [0.0, 0.0, 0.0]).y
+
+    card = 0.04 * G * 0.018
+    y = turn(card)
+    assert y[0, -1] == pytest.approx(card / (2.0 * numbers["tangential_stiffness"] * r**2), rel=1e-6)
+    assert abs(turn(0.999 * 2.0 * torsion * normal)[1, -1]) < 1e-10
+    assert turn(1.001 * 2.0 * torsion * normal)[1, -1] > 1.0
+
+
+def test_sliding_and_spinning_share_one_limit_along_the_motion():
+    """Steady: (F, M / r) is the limit mu f_n against (v, r omega)."""
+    r, normal = 6e-3, 3.0
+    value, numbers = contact(torsion_radius=r)
+    for v, omega in (((0.3, -0.4), 0.0), ((0.0, 0.0), 50.0), ((0.06, 0.08), 30.0), ((0.1, 0.0), -60.0)):
+        motion = np.array([*v, r * omega])
+
+        def rates(_, z, v=v, omega=omega):
+            return value(Touch(-normal / numbers["stiffness"], 0.0, *v, omega, *z))[4:7]
+
+        z = integrate(rates, 1.0, [1e-5, 0.0, 1e-5]).y[:, -1]
+        _, f_1, f_2, moment, *_ = value(Touch(-normal / numbers["stiffness"], 0.0, *v, omega, *z))
+        expected = -numbers["kinetic"] * normal * motion / np.linalg.norm(motion)
+        assert np.array([f_1, f_2, moment / r]) == pytest.approx(expected, rel=1e-5, abs=1e-7)

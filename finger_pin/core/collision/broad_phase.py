@@ -13,7 +13,7 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
-from finger_pin.core.path_tables import COLUMNS, PIECE, Paths, PathWork
+from finger_pin.core.path_tables import PIECE, Paths, PathWork
 from finger_pin.core.tables import Tables
 
 # Derivations and origins: core/stepping/NOTES.md.
@@ -101,9 +101,9 @@ def widened(path: float, turned: float, far: float) -> float:
 
 
 @njit_inline
-def set_culled(k: int, value: int, culled: Indices) -> None:
+def set_culled(tables: Tables, k: int, value: int, culled: Indices) -> None:
     """Set or clear the flag `culled` of a contact's rows."""
-    for m in range(k, k + COLUMNS):
+    for m in range(k, k + tables.contact_arms):
         culled[m] = value
 
 
@@ -111,7 +111,7 @@ def set_culled(k: int, value: int, culled: Indices) -> None:
 def list_active_pairs(tables: Tables, pieces: PathWork) -> None:
     """List the active contact pairs."""
     count = 0
-    for e in range(tables.contact_rows // COLUMNS):
+    for e in range(tables.contact_rows // tables.contact_arms):
         if pieces.culled[tables.paths.row[e]] == 0:
             pieces.active_pairs[count] = e
             count += 1
@@ -129,7 +129,7 @@ def activate_near(tables: Tables, pieces: PathWork) -> None:
             if pieces.culled[k]:
                 pieces.ahead[e] = pieces.clear[e] - pieces.path[e]
                 if not pieces.ahead[e] > 0.0:
-                    set_culled(k, 0, pieces.culled)
+                    set_culled(tables, k, 0, pieces.culled)
 
 
 @njit_always_inline
@@ -144,10 +144,10 @@ def record_end_gaps(tables: Tables, pieces: PathWork) -> None:
 @njit_always_inline
 def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
-    for m in range(k + 1, k + COLUMNS):
+    for m in range(k + 1, k + tables.contact_arms):
         if not abs(states[tables.state[m]]) < _STRAIGHT_DEFLECTION:
             return False
-    for m in range(k + 1, k + COLUMNS):
+    for m in range(k + 1, k + tables.contact_arms):
         states[tables.state[m]] = rows[ROW.rate, m] = 0.0
     return True
 
@@ -170,20 +170,20 @@ def update_culling(tables: Tables, rows: Matrix, pieces: PathWork, states: Vecto
             pieces.far[e] += pieces.path[e]
             if near:
                 changed = True
-                set_culled(k, 0, pieces.culled)
+                set_culled(tables, k, 0, pieces.culled)
         elif not near and pieces.active[e] == 0 and _straighten(tables, rows, k, states):
             pieces.clear[e], pieces.far[e] = pieces.ahead[e], pieces.far[e] + pieces.path[e]
             changed = True
-            set_culled(k, 1, pieces.culled)
+            set_culled(tables, k, 1, pieces.culled)
     return changed
 
 
 @njit_always_inline
 def forget_culled(tables: Tables, pieces: PathWork, first: int, values: Vector) -> None:
     """Set the states of culled contacts to zero in a vector, in which states of rows begin at a place."""
-    for k in range(0, tables.contact_rows, COLUMNS):
+    for k in range(0, tables.contact_rows, tables.contact_arms):
         if pieces.culled[k]:
-            for m in range(k + 1, k + COLUMNS):
+            for m in range(k + 1, k + tables.contact_arms):
                 values[first + tables.state[m]] = 0.0
 
 
@@ -212,7 +212,7 @@ def activate_since(tables: Tables, work: Work, first: Matrix, second: Matrix, be
     for k in range(tables.contact_rows):
         # Bent bristles tell of a contact that was closed meanwhile.
         if tables.state[k] >= 0 and after[2 * width + tables.state[k]] != 0.0:
-            set_culled(k - k % 3, 0, work.paths.culled)
+            set_culled(tables, k - k % tables.contact_arms, 0, work.paths.culled)
     list_active_pairs(tables, work.paths)
 
 

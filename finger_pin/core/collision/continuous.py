@@ -220,7 +220,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
             share = _scan(integration, model, e, True)
             if share < NOTHING or pieces.ahead[e] < 0.0:
                 # Until it is listed again it exerts nothing, whatever else the step has met.
-                set_culled(k, 0, pieces.culled)
+                set_culled(tables, k, 0, pieces.culled)
                 woken = True
         else:
             start, end = pieces.clear[e], pieces.out[e, GAP_OUT.gap]

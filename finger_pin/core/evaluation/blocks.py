@@ -54,14 +54,14 @@ def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
     """Find the blocks of a step, after the slopes of all laws; of contacts that have opened, clear the rows' gains."""
     paths = tables.paths
     for index in range(blocks.touch_start[blocks.number[0]]):
-        for k in range(blocks.touches[index], blocks.touches[index] + 3):
+        for k in range(blocks.touches[index], blocks.touches[index] + tables.contact_arms):
             for c in range(gain.shape[1]):
                 gain[k, c] = 0.0
     _join(tables, work, blocks)
     coordinates = rows = touches = states = active = 0
     for index in range(work.paths.active_pair_count[0]):
         k = paths.row[work.paths.active_pairs[index]]
-        for m in range(1, 3):
+        for m in range(1, tables.contact_arms):
             blocks.active_states[active] = tables.state[k + m]
             blocks.loose[tables.state[k + m]] = -work.slopes[TOUCH_SLOPE.rate_by_state_1 + m - 1, k + m]
             active += 1
@@ -79,7 +79,7 @@ def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
                 continue
             blocks.touches[touches] = k
             touches += 1
-            for m in range(1, 3):
+            for m in range(1, tables.contact_arms):
                 state = tables.state[k + m]
                 blocks.states[states], blocks.loose[state] = state, 0.0
                 blocks.state_place[state] = states - blocks.state_start[b]

@@ -1,4 +1,7 @@
-"""Contacts, of three rows and two states each: their forces, and their part in the systems of `condensation`."""
+"""Forces of contacts, and their part in the systems of `condensation`.
+
+A contact has a row along the normal, and for every slip a row and a state.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,9 @@ from finger_pin.core.evaluation.blocks import extent
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.law_code import TOUCH_SLOPE as AT
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
-from finger_pin.core.jit import CompiledFunction, Vector, call_value, njit_always_inline, njit_inline, unpack
+from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS
 from finger_pin.core.tables import Tables
 
 
@@ -38,7 +40,7 @@ def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
             k = tables.paths.row[e]
             if not begin <= k < end:
                 continue
-            for m in range(k, k + COLUMNS):
+            for m in range(k, k + tables.contact_arms):
                 speed = 0.0
                 # One that is open moves nothing, and sees no speed.
                 for a in range(tables.arm_start[m], tables.arm_start[m + 1] if paths.active[e] else 0):
@@ -46,19 +48,19 @@ def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
                 rows[ROW.length, m], rows[ROW.speed, m] = paths.length[m], speed
                 if m > k:
                     rows[ROW.state, m] = z[tables.state[m]]
-            call_value(tables.groups.value[g], rows, tables.parameters, k, k + COLUMNS)
+            call_value(tables.groups.value[g], rows, tables.parameters, k, k + tables.contact_arms)
     push(tables, work)
     for index in range(work.paths.closed_count[0]):
         k = tables.paths.row[work.paths.closed[index]]
-        for e in range(tables.arm_start[k], tables.arm_start[k + COLUMNS]):
+        for e in range(tables.arm_start[k], tables.arm_start[k + tables.contact_arms]):
             work.torque[tables.arm_at[e]] += work.arm[e] * rows[ROW.force, tables.arm_row[e]]
 
 
 @njit_inline
-def _add_inputs(tables: Tables, k: int, weights: tuple[float, ...], linear: Linear, width: int, out: Vector) -> None:
-    """Add the change of a contact's gap, speed and slips, with a weight each."""
-    place = linear.blocks.place
-    for m in range(3):
+def _add_inputs(tables: Tables, k: int, linear: Linear, width: int, out: Vector) -> None:
+    """Add the change of a contact's gap, speed and slips, with the weights in ``contact_weights``."""
+    place, weights = linear.blocks.place, linear.contact_weights
+    for m in range(tables.contact_arms):
         by_length, by_speed = (weights[0] if m == 0 else 0.0), weights[m + 1]
         for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
             j = place[tables.arm_at[e]]
@@ -66,42 +68,59 @@ def _add_inputs(tables: Tables, k: int, weights: tuple[float, ...], linear: Line
             out[width + j] += by_speed * linear.arm[e]
 
 
+@njit_inline
+def _invert(matrix: Matrix) -> None:
+    """Invert a matrix in place, without pivoting: g less what makes bristles relax is positive definite."""
+    size = matrix.shape[0]
+    for p in range(size):
+        inverse, matrix[p, p] = 1.0 / matrix[p, p], 1.0
+        for c in range(size):
+            matrix[p, c] *= inverse
+        for r in range(size):
+            if r != p:
+                factor, matrix[r, p] = matrix[r, p], 0.0
+                for c in range(size):
+                    matrix[r, c] -= factor * matrix[p, c]
+
+
 @njit_always_inline
 def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear, width: int, wide: int) -> None:
-    """Fill the gains of the three rows of a contact and of its two states, in the columns of its block."""
+    """Fill the gains of the rows of a contact and of its states, in the columns of its block."""
     slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
-    first, second = tables.state[k + 1], tables.state[k + 2]
-    # (g - A) dz = r_z + B (what the contact sees): A is two by two.
-    a, b = g - slopes[AT.rate_by_state_1, k + 1], -slopes[AT.rate_by_state_2, k + 1]
-    c, d = -slopes[AT.rate_by_state_1, k + 2], g - slopes[AT.rate_by_state_2, k + 2]
-    inverse = 1.0 / (a * d - b * c)
-    for i in range(2):
-        by_first, by_second = (inverse * d, -inverse * b) if i == 0 else (-inverse * c, inverse * a)
-        state_gain = linear.state_gain[first if i == 0 else second]
+    matrix, weights, states, full = (
+        linear.contact_matrix,
+        linear.contact_weights,
+        tables.state[k + 1 : k + tables.contact_arms],
+        wide + tables.read_states.size,
+    )
+    # (g - A) dz = r_z + B (what the contact sees).
+    for i in range(states.size):
+        for j in range(states.size):
+            matrix[i, j] = (g if i == j else 0.0) - slopes[AT.rate_by_state_1 + j, k + 1 + i]
+    _invert(matrix)
+    for i in range(states.size):
+        state_gain = linear.state_gain[states[i]]
         # Those of states that rows read, too: other blocks may have had their columns there.
-        for column in range(wide + tables.read_states.size):
+        for column in range(full):
             state_gain[column] = 0.0
-        weights = (
-            by_first * slopes[AT.rate_by_gap, k + 1] + by_second * slopes[AT.rate_by_gap, k + 2],
-            by_first * slopes[AT.rate_by_speed, k + 1] + by_second * slopes[AT.rate_by_speed, k + 2],
-            by_first * slopes[AT.rate_by_slip_1, k + 1] + by_second * slopes[AT.rate_by_slip_1, k + 2],
-            by_first * slopes[AT.rate_by_slip_2, k + 1] + by_second * slopes[AT.rate_by_slip_2, k + 2],
-        )
-        _add_inputs(tables, k, weights, linear, width, state_gain)
-        state_gain[2 * width + state_place[first]] += by_first
-        state_gain[2 * width + state_place[second]] += by_second
-    for m in range(3):
+        for c in range(weights.size):
+            weights[c] = 0.0
+            for j in range(states.size):
+                weights[c] += matrix[i, j] * slopes[AT.rate_by_gap + c, k + 1 + j]
+        _add_inputs(tables, k, linear, width, state_gain)
+        for j in range(states.size):
+            state_gain[2 * width + state_place[states[j]]] += matrix[i, j]
+    for m in range(tables.contact_arms):
         row = linear.gain[k + m]
-        of_first, of_second = slopes[AT.force_by_state_1, k + m], slopes[AT.force_by_state_2, k + m]
-        for column in range(wide + tables.read_states.size):
-            row[column] = of_first * linear.state_gain[first, column] + of_second * linear.state_gain[second, column]
-        weights = (
-            slopes[AT.force_by_gap, k + m],
-            slopes[AT.force_by_speed, k + m],
-            slopes[AT.force_by_slip_1, k + m],
-            slopes[AT.force_by_slip_2, k + m],
-        )
-        _add_inputs(tables, k, weights, linear, width, row)
+        for column in range(full):
+            row[column] = 0.0
+        for j in range(states.size):
+            slope, state_gain = slopes[AT.force_by_state_1 + j, k + m], linear.state_gain[states[j]]
+            for column in range(full):
+                row[column] += slope * state_gain[column]
+        for c in range(weights.size):
+            weights[c] = slopes[AT.force_by_gap + c, k + m]
+        _add_inputs(tables, k, linear, width, row)
         for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
             arm, target = linear.arm[e], linear.force[place[tables.arm_at[e]]]
             if arm != 0.0:

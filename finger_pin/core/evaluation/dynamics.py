@@ -18,7 +18,6 @@ from finger_pin.core.evaluation.rigid_body_dynamics import (
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS
 from finger_pin.core.tables import Tables
 
 
@@ -79,6 +78,12 @@ def _sum_of_terms(tables: Tables, begin: int, end: int, work: Work) -> float:
     return total
 
 
+@njit_inline
+def contact_states(tables: Tables) -> int:
+    """Return the number of states of contacts, which come before those of other rows."""
+    return tables.contact_rows - tables.contact_rows // tables.contact_arms
+
+
 @njit_always_inline
 def _see(tables: Tables, q: Vector, v: Vector, z: Vector, work: Work) -> None:
     """Fill the arguments of all rows' laws but contacts': positions, velocities, states and inputs from outside.
@@ -96,7 +101,7 @@ def _see(tables: Tables, q: Vector, v: Vector, z: Vector, work: Work) -> None:
         rows[ROW.speed, k] += work.arm[e] * v[j]
     for e in range(tables.bend_start[first], tables.bend_at.size):
         rows[ROW.curvature, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
-    for i in range(2 * first // 3, tables.state_row.size):
+    for i in range(contact_states(tables), tables.state_row.size):
         rows[ROW.state, tables.state_row[i]] = z[i]
     for e in range(tables.read_at.size):
         rows[ROW.reading, tables.read_row[e]] = 0.0
@@ -137,9 +142,9 @@ def _drive(tables: Tables, work: Work, rate: Vector) -> None:
         torque[tables.arm_at[e]] += work.arm[e] * rows[ROW.force, tables.arm_row[e]]
     for index in range(work.paths.active_pair_count[0]):
         k = tables.paths.row[work.paths.active_pairs[index]]
-        for m in range(k + 1, k + COLUMNS):
+        for m in range(k + 1, k + tables.contact_arms):
             rate[tables.state[m]] = rows[ROW.rate, m]
-    for i in range((COLUMNS - 1) * tables.contact_rows // COLUMNS, tables.state_row.size):
+    for i in range(contact_states(tables), tables.state_row.size):
         rate[i] = rows[ROW.rate, tables.state_row[i]]
 
 

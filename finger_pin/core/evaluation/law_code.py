@@ -59,20 +59,24 @@ class SlopeColumns(NamedTuple):
 
 
 class TouchSlopeColumns(NamedTuple):
-    """Columns of the table of slopes in the three rows of a contact, in the order of `ContactLaw.slopes`."""
+    """Columns of the table of slopes in the rows of a contact, in the order of `ContactLaw.slopes`."""
 
     force_by_gap: int
     force_by_speed: int
     force_by_slip_1: int
     force_by_slip_2: int
+    force_by_slip_3: int
     force_by_state_1: int
     force_by_state_2: int
+    force_by_state_3: int
     rate_by_gap: int
     rate_by_speed: int
     rate_by_slip_1: int
     rate_by_slip_2: int
+    rate_by_slip_3: int
     rate_by_state_1: int
     rate_by_state_2: int
+    rate_by_state_3: int
 
 
 # A law is called with a whole table, so that its columns are positions in one array; the compiler takes them for
@@ -80,11 +84,14 @@ class TouchSlopeColumns(NamedTuple):
 ROW, SLOPE = RowColumns(*range(len(RowColumns._fields))), SlopeColumns(*range(len(SlopeColumns._fields)))
 _STEPS = range(len(TouchSlopeColumns._fields) // 2)
 TOUCH_SLOPE = TouchSlopeColumns(*_STEPS, *(SLOPE.rate_by_length + step for step in _STEPS))
+#: Columns of the table of slopes.
+SLOPE_COLUMNS = 1 + max(*SLOPE, *TOUCH_SLOPE)
 _ARGUMENTS = len(Row._fields)
 
-# Filled in for every law.
+# Filled in for every law; the last are zeros for the states that a contact does not have.
 _law: Any = None
-_PARAMETERS = _COUNT = 0
+_PARAMETERS = _COUNT = _ARMS = _STATES = _END = 0
+_ABSENT: tuple[float, ...] = ()
 
 
 class Addresses(NamedTuple):
@@ -167,6 +174,11 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
         "_law": inlined(function),
         "_PARAMETERS": len(law.parameters),
         "_COUNT": len(law.signals),
+        "_ARMS": law.arms,
+        "_STATES": law.states,
+        # The compiler slices tuples by constants alone.
+        "_END": 4 + law.states,
+        "_ABSENT": (0.0,) * (3 - law.states),
     }
     twin = FunctionType(template.__code__, world, template.__name__)
     tables = "CPointer(float64), " * (2 if template in (_value, _contact_value) else 3)
@@ -202,44 +214,46 @@ def _account(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, beg
 
 
 @njit_inline
-def _touched(table: Pointer, stride: int, k: int) -> Touch:
-    gap, speed, state_1, state_2, side = (
-        table[ROW.length * stride + k],
-        table[ROW.speed * stride + k],
-        table[ROW.state * stride + k + 1],
-        table[ROW.state * stride + k + 2],
-        table[ROW.side * stride + k],
-    )
-    return Touch(
-        gap, speed, table[ROW.speed * stride + k + 1], table[ROW.speed * stride + k + 2], state_1, state_2, side
-    )
+def _touched(table: Pointer, stride: int, k: int, slips: tuple[float, ...], states: tuple[float, ...]) -> Touch:
+    gap, speed, side = table[ROW.length * stride + k], table[ROW.speed * stride + k], table[ROW.side * stride + k]
+    return Touch(gap, speed, slips[0], slips[1], slips[2], states[0], states[1], states[2], side)
 
 
 def _contact_value(table: Pointer, numbers: Pointer, stride: int, begin: int, end: int) -> None:
-    for k in range(begin, end, 3):
-        outputs = _law(_touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
-        _put(table, ROW.force * stride + k, 1, outputs[:3])
-        _put(table, ROW.rate * stride + k + 1, 1, outputs[3:5])
-        _put(table, ROW.signals * stride + k, stride, outputs[5:])
+    for k in range(begin, end, _ARMS):
+        slips = _numbers(table, ROW.speed * stride + k + 1, 1, _STATES) + _ABSENT
+        states = _numbers(table, ROW.state * stride + k + 1, 1, _STATES) + _ABSENT
+        outputs = _law(_touched(table, stride, k, slips, states), _numbers(numbers, k, stride, _PARAMETERS))
+        _put(table, ROW.force * stride + k, 1, outputs[:_ARMS])
+        _put(table, ROW.rate * stride + k + 1, 1, outputs[4:_END])
+        _put(table, ROW.signals * stride + k, stride, outputs[7:])
 
 
 def _contact_slopes(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
     # The slopes of forces stand in the columns of their rows, those of the states' rates below.
-    for k in range(begin, end, 3):
+    for k in range(begin, end, _ARMS):
+        slips = _numbers(table, ROW.speed * stride + k + 1, 1, _STATES) + _ABSENT
+        states = _numbers(table, ROW.state * stride + k + 1, 1, _STATES) + _ABSENT
         signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
-        normal, first, second, rate_1, rate_2 = _law(
-            _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), signals
+        normal, first, second, third, rate_1, rate_2, rate_3 = _law(
+            _touched(table, stride, k, slips, states), _numbers(numbers, k, stride, _PARAMETERS), signals
         )
         _put(filled, k, stride, normal)
         _put(filled, k + 1, stride, first)
         _put(filled, k + 2, stride, second)
         _put(filled, TOUCH_SLOPE.rate_by_gap * stride + k + 1, stride, rate_1)
         _put(filled, TOUCH_SLOPE.rate_by_gap * stride + k + 2, stride, rate_2)
+        if _ARMS > 3:
+            _put(filled, k + 3, stride, third)
+            _put(filled, TOUCH_SLOPE.rate_by_gap * stride + k + 3, stride, rate_3)
 
 
 def _contact_account(table: Pointer, numbers: Pointer, filled: Pointer, stride: int, begin: int, end: int) -> None:
-    for k in range(begin, end, 3):
+    for k in range(begin, end, _ARMS):
+        slips = _numbers(table, ROW.speed * stride + k + 1, 1, _STATES) + _ABSENT
+        states = _numbers(table, ROW.state * stride + k + 1, 1, _STATES) + _ABSENT
         signals = _numbers(table, ROW.signals * stride + k, stride, _COUNT)
-        forces, rates = _numbers(table, ROW.force * stride + k, 1, 3), _numbers(table, ROW.rate * stride + k + 1, 1, 2)
-        touch, parameters = _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS)
+        forces = _numbers(table, ROW.force * stride + k, 1, _ARMS) + _ABSENT
+        rates = _numbers(table, ROW.rate * stride + k + 1, 1, _STATES) + _ABSENT
+        touch, parameters = _touched(table, stride, k, slips, states), _numbers(numbers, k, stride, _PARAMETERS)
         _put(filled, k, stride, _law(touch, parameters, forces, rates, signals))

@@ -13,7 +13,6 @@ from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, call_at, call_filling, njit_always_inline, unpack
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS
 from finger_pin.core.tables import Tables
 
 
@@ -115,7 +114,9 @@ def linearise(address: int, time: float) -> int:
         for index in range(work.paths.active_pair_count[0]):
             k = tables.paths.row[work.paths.active_pairs[index]]
             if begin <= k < end:
-                call_filling(tables.groups.slopes[g], work.rows, tables.parameters, work.slopes, k, k + COLUMNS)
+                call_filling(
+                    tables.groups.slopes[g], work.rows, tables.parameters, work.slopes, k, k + tables.contact_arms
+                )
     for e in range(tables.bend.size):
         linear.bend[e] = tables.bend[e] * np.sign(x[tables.bend_at[e]])
     _load_slopes(tables, work, linear)

@@ -14,7 +14,7 @@ from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cros
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS, PIECE, WRENCH, Paths
+from finger_pin.core.path_tables import PIECE, WRENCH, Paths
 from finger_pin.core.tables import Tables
 
 
@@ -71,6 +71,8 @@ def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
                     add_moment(ends[3 * p : 3 * p + 3], force, out[6 * p : 6 * p + 3])
                     turn_out(rotation, dy, 3 * p, moved)
                     add_moment(moved, wrench[6 * p + 3 : 6 * p + 6], out[6 * p : 6 * p + 3])
+            elif m > 2:
+                _changed(slopes, 0, dy, rotation, out[:3])
             else:
                 force = out[3:6]
                 _changed(slopes, 0 if m == 0 else 18 + 18 * m, dy, rotation, force)
@@ -137,19 +139,15 @@ def linearise_paths(address: int, _time: float) -> int:
     model = unpack(address, MODEL)
     tables, work, linear = model.tables, model.work, model.linear
     velocity = model.state[work.torque.size : 2 * work.torque.size]
-    paths, pieces, closed, touching = (
-        tables.paths,
-        work.paths,
-        COLUMNS * work.paths.closed_count[0],
-        tables.contact_rows,
-    )
+    paths, pieces, touching, arms = tables.paths, work.paths, tables.contact_rows, tables.contact_arms
+    closed = arms * pieces.closed_count[0]
     for index in range(pieces.closed_count[0]):
         _slopes_of_piece(paths, pieces.closed[index], work)
-    for e in range(touching // COLUMNS, paths.columns.size):
+    for e in range(touching // arms, paths.columns.size):
         _slopes_of_piece(paths, e, work)
     axes, gather, net, crossed = work.spatial.axis, pieces.gather, work.vectors[0], work.vectors[1]
     for at in range(closed + paths.rows.size - touching):
-        index = paths.row[pieces.closed[at // COLUMNS]] + at % COLUMNS if at < closed else at - closed + touching
+        index = paths.row[pieces.closed[at // arms]] + at % arms if at < closed else at - closed + touching
         k = paths.rows[index]
         if k >= touching:
             _add_turns(tables, work, linear, index)

@@ -20,7 +20,7 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import COLUMNS, PIECE, WRENCH, Paths
+from finger_pin.core.path_tables import PIECE, WRENCH, Paths
 from finger_pin.core.tables import Tables
 
 
@@ -111,6 +111,9 @@ def _measure(paths: Paths, e: int, work: Work) -> None:
         turn_out(rotation, out, GAP_OUT.point, point)
         for r in range(3):
             point[r] += pieces.origin[e, r]
+        # A moment about the normal.
+        for m in range(3, columns):
+            turn_out(rotation, out, GAP_OUT.normal, pieces.wrench[e, m, :3])
         for m in range(3):
             wrench = pieces.wrench[e, m]
             turn_out(rotation, out, GAP_OUT.normal if m == 0 else GAP_OUT.tangents + 3 * (m - 1), wrench[3:6])
@@ -147,7 +150,7 @@ def look(address: int, piece: float) -> int:
 @njit_always_inline
 def measure_paths(tables: Tables, work: Work) -> None:
     """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if active."""
-    paths, pieces, first = tables.paths, work.paths, tables.contact_rows
+    paths, pieces, first, arms = tables.paths, work.paths, tables.contact_rows, tables.contact_arms
     closed = 0
     for index in range(pieces.active_pair_count[0]):
         e = pieces.active_pairs[index]
@@ -158,14 +161,14 @@ def measure_paths(tables: Tables, work: Work) -> None:
         else:
             pieces.length[paths.row[e]] = pieces.out[e, GAP_OUT.gap]
     pieces.closed_count[0] = closed
-    for e in range(first // COLUMNS, paths.columns.size):
+    for e in range(first // arms, paths.columns.size):
         _measure(paths, e, work)
     axes, gather, net = work.spatial.axis, pieces.gather, work.vectors[0]
-    for at in range(COLUMNS * closed + paths.rows.size - first):
+    for at in range(arms * closed + paths.rows.size - first):
         # The rows of contacts are their places, too.
-        index = at - COLUMNS * closed + first
-        if at < COLUMNS * closed:
-            index = paths.row[pieces.closed[at // COLUMNS]] + at % COLUMNS
+        index = at - arms * closed + first
+        if at < arms * closed:
+            index = paths.row[pieces.closed[at // arms]] + at % arms
         k = paths.rows[index]
         length, turn = 0.0, 0.0
         begin, end = tables.arm_start[k], tables.arm_start[k + 1]

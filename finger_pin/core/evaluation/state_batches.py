@@ -26,7 +26,6 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.path_tables import COLUMNS, Paths
 from finger_pin.core.tables import Tables
 
 
@@ -108,7 +107,9 @@ def fill_energy_terms(tables: Tables, work: Work, totals: Vector) -> None:
             for index in range(work.paths.active_pair_count[0]):
                 k = tables.paths.row[work.paths.active_pairs[index]]
                 if begin <= k < end:
-                    call_filling(tables.groups.account[g], work.rows, tables.parameters, work.powers, k, k + COLUMNS)
+                    call_filling(
+                        tables.groups.account[g], work.rows, tables.parameters, work.powers, k, k + tables.contact_arms
+                    )
                     for i in range(tables.energies.shape[1]):
                         if tables.energies[g, i] >= 0:
                             totals[tables.energies[g, i]] += work.powers[i, k]
@@ -124,16 +125,16 @@ def fill_energy_terms(tables: Tables, work: Work, totals: Vector) -> None:
 
 
 @njit_always_inline
-def _touch(paths: Paths, work: Work, out: Matrix) -> None:
+def _touch(tables: Tables, work: Work, out: Matrix) -> None:
     """Fill the forces of contacts on the second body, the points, and the normals; zero for open ones."""
-    pieces = work.paths
+    paths, pieces = tables.paths, work.paths
     for index in range(pieces.closed_count[0]):
         e = pieces.closed[index]
         k = paths.row[e]
         if work.rows[ROW.force, k] == 0.0:
             continue
         # Contacts come before all other rows.
-        touch = out[k // COLUMNS]
+        touch = out[k // tables.contact_arms]
         turn_out(pieces.frame[e], pieces.out[e], GAP_OUT.point, touch[3:6])
         for r in range(3):
             touch[3 + r] += pieces.origin[e, r]
@@ -185,7 +186,7 @@ def _keep(many: States, model: Model, m: int) -> None:
             for k in range(rows.shape[2]):
                 rows[c, many.first + m, k] = work.rows[many.column + c, k]
     if many.touches.shape[0] > 0 and tables.contact_rows:
-        _touch(tables.paths, work, many.touches[m])
+        _touch(tables, work, many.touches[m])
     if many.energy_terms.shape[0] > 0:
         for j in range(many.torques.shape[1]):
             many.torques[m, j] = work.torque[j]

@@ -255,4 +255,4 @@ class SignedDistance:
     parameters: tuple[str, ...]
     value: Callable[..., Any]
     slopes: Callable[..., Any]
-    columns: ClassVar[int] = 3
+    columns: ClassVar[int] = 4
