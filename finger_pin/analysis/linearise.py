@@ -71,7 +71,8 @@ def linearise(
     Returns:
         ``A`` (state, by_state), ``B`` (state, input), ``C`` (output, by_state), ``D`` (output, input), ``E`` (state,
         parameter) and ``F`` (output, parameter), in SI; ``rate``, which is x' or x(dt), and ``output_value``. Outputs
-        are angles, velocities, tensions, the fingertip's position and the motors' currents at the state.
+        are angles, velocities, tensions, the fingertips' positions and the motors' currents at the state. Inputs are
+        those that have arrived: ``input_delay``, s, is how long each is on its way.
         ``side_by_state``, ``side_of_input`` and ``side_of_parameter`` say where a kink is near: 1 where derivatives
         hold above the number, -1 where below; 0 elsewhere, and at a kink, where they are the mean of both.
 
@@ -224,6 +225,8 @@ def _dataset(
         variables[first] = (("state", whose), columns[: len(names)], {"units": "SI"})
         variables[second] = (("output", whose), columns[len(names) :], {"units": "SI"})
         variables["side_by_state" if whose == "by_state" else f"side_of_{whose}"] = (whose, sides)
+    delays = [*[0.0] * finger.routing.actuated, *(each.delay for each in finger.description.tree.actuators.values())]
+    variables["input_delay"] = ("input", delays, {"units": "s"})
     coordinates = {
         "state": names,
         "by_state": names,

@@ -12,6 +12,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.mechanism.assembly import ConstructorArgs, Parts, assemble, check_joints
+from finger_pin.mechanism.canals import CANALS
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
@@ -213,6 +214,11 @@ class Finger:
         rubbing = list(zip(self.routing.tendons, self.tendons.wraps, strict=False))
         first = [f"{name}.{places[0].name}" for name, places in rubbing if len(places) > 1]
         return (*first, *(name for table in self.extra_rows if table.group in self.wraps for name in table.names))
+
+    @property
+    def cord_names(self) -> tuple[str, ...]:
+        """Names of the cords of a tree that servos, muscles and springs pull, in the order of `cord_tension`."""
+        return next((table.names for table in self.extra_rows if table.group == CANALS), ())
 
     @property
     def tendon_rows(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.caching import cached_property
 from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.mechanism.canals import CANALS
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.rows import RowSignals, combined
 from finger_pin.mechanism.state import State
@@ -186,6 +187,13 @@ class FingerSignals:
             strands = strands + combined(wraps.force, weights.T @ np.eye(len(weights), strands.shape[-1]))
         acceleration = evaluation.acceleration[..., self.bodies : self.bodies + masses]
         return TendonForces(driven, passive, strands, acceleration, beyond)
+
+    @property
+    def cord_tension(self) -> Array:
+        """Delivered tensions of the cords that servos, muscles or springs pull, shape (..., c), N, (12)."""
+        if CANALS not in self.mechanism.rows:
+            return np.zeros((*self.state.position.shape[:-1], 0))
+        return self.mechanism.rows[CANALS]["pressing"]
 
     @property
     def joints(self) -> JointForces:

@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 
-from finger_pin.mechanism.canals import CANALS
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rows import LOST, Rows
 from finger_pin.simulation.energy import flows, stores
@@ -48,21 +47,12 @@ def extra_row_variables(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
     return quantities
 
 
-def cord_names(finger: Finger) -> list[str]:
-    """Return the names of the cords of a tree that servos, muscles and springs pull."""
-    return [name for table in finger.extra_rows if table.group == CANALS for name in table.names]
-
-
 def cord_variables(finger: Finger) -> dict[str, Quantity]:
-    """Return the tension of the cords of `cord_names`, by the name of the variable; empty if there are none."""
-    if not cord_names(finger):
+    """Return the tension of the cords that no motor of the finger pulls, by the name of the variable; empty if none."""
+    if not finger.cord_names:
         return {}
-
-    def delivered(of: SampledTrajectory) -> Array:
-        return of.finger.mechanism.rows[CANALS]["pressing"]
-
     text = "delivered tension of a cord that servos, muscles or springs pull; negative where a servo pushes it"
-    return {"cord_tension": Quantity(("time", "cord"), delivered, "N", text, "12")}
+    return {"cord_tension": Quantity(("time", "cord"), lambda of: of.finger.cord_tension, "N", text, "12")}
 
 
 def account_variables(finger: Finger) -> dict[str, Quantity]:

@@ -14,7 +14,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.rows import RowSignals
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.motor_variables import motor_variables
-from finger_pin.simulation.row_variables import account_variables, cord_names, cord_variables, extra_row_variables
+from finger_pin.simulation.row_variables import account_variables, cord_variables, extra_row_variables
 from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory, of_state
 from finger_pin.typing import Array
 
@@ -253,7 +253,7 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
         "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
         "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
     }
-    labels |= {"cord": ("cord", cords, {"long_name": "cord of a tree"})} if (cords := cord_names(finger)) else {}
+    labels |= {"cord": ("cord", cords, {"long_name": "cord of a tree"})} if (cords := list(finger.cord_names)) else {}
     labels |= {table.group: list(table.names) for table in finger.extra_rows} | contact_coordinates(finger)
     labels |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:

@@ -9,6 +9,8 @@ import finger_pin as fp
 from finger_pin.analysis import equilibrium, force_polytope, inverse_kinematics
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import load_finger, read_scenario
+from finger_pin.learning import Environment
+from finger_pin.views.playground.session import Session
 
 _HAND = """<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>
   <body name="index" pos="0.03 0 0"><joint name="index" axis="0 1 0" range="-1 1"/>
@@ -74,6 +76,27 @@ def test_every_fingertip_is_where_mujoco_has_it_and_its_force_turns_the_same_joi
     assert result.fingertip_force[0].sel(tip="thumb").values == pytest.approx(_FORCES["thumb"])
     assert result.external_torque[0].values == pytest.approx(torque[: len(_POSTURE)], abs=1e-12)
     assert result.sizes["tip"] == len(_FORCES)
+
+
+def test_policies_players_and_linear_models_see_every_fingertip(hand):
+    description, model, data = hand
+    alone = _scenario(_alone(description), **{"finger.tree.actuators.thumb.delay": 0.02})
+    environment = Environment(alone, reward=lambda signals: 0.0, observation=["fingertip_position"], period=0.01)
+    observation, _ = environment.reset(seed=0)
+    places = np.array([*_ends(data).values()])
+    assert observation.reshape(3, 3) == pytest.approx(places, abs=1e-6)
+    session = Session(alone)
+    session.step()
+    assert session.reading().force == pytest.approx(np.array([*_FORCES.values()]))
+    linear = fp.linearise(_alone(description), [_POSTURE[name] for name in description.joints], {})
+    jacobian = np.zeros((3, model.nv))
+    for name, place in _ends(data).items():
+        body = model.body("middle" if name == "middle_tip" else name).id
+        mujoco.mj_jac(model, data, jacobian, None, place, body)
+        rows = linear.C.sel(output=[f"fingertip_position.{name}.{axis}" for axis in "xyz"])
+        columns = rows.sel(by_state=[f"joint_position[{joint}]" for joint in description.joints])
+        assert columns.values == pytest.approx(jacobian[:, : len(_POSTURE)], abs=1e-8)
+    assert fp.linearise(alone, [0.0] * 4, {}).input_delay.values.tolist() == [0.0, 0.0, 0.0, 0.02]
 
 
 def test_postures_are_found_by_the_tip_that_is_named(hand):

@@ -33,7 +33,7 @@ class Reading:
     Attributes:
         time: s.
         position: theta, shape (n,), rad.
-        strands: Tension of every strand, shape (s,), N.
+        strands: Tension of every strand and then of every cord, as `Scene.strands`, shape (s,), N.
         tension: Of every tendon, of a passive one its distal half, shape (t,), N.
         tendon_use: Bristle force of every tendon over the friction of steady sliding, shape (t,): 1 slips.
         joint_use: The same of every joint, shape (n,), or (0,) where their law has no bristles.
@@ -210,7 +210,7 @@ class Session:
         return Reading(
             time=self.simulator.time,
             position=state.position,
-            strands=tendons.strands,
+            strands=np.concatenate([tendons.strands, signals.cord_tension]),
             tension=finger.routing.tendon_tension(tendons.strands),
             tendon_use=_tendon_use(signals),
             joint_use=np.abs(pins.row.state) / pins["level"] if bristles else np.zeros(0),

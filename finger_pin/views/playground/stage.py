@@ -45,7 +45,7 @@ class Stage:
 
     def __init__(self, server: viser.ViserServer, session: Session) -> None:
         """Draw all bodies."""
-        self.scene, self._session, self._peak = Scene(session.finger), session, _TENSION
+        self.scene, self._session, self._peak = Scene(session.finger, session.finger.cord_names), session, _TENSION
         self.scale = _TENSION
         self._viser, self._turn = server.scene, self.scene.view()
         self._viser.set_up_direction("+z")

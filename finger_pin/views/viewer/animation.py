@@ -146,7 +146,8 @@ class Playback:
         Raises:
             InputError: If the result lacks something that is shown.
         """
-        scene = Scene(finger or read_scene(result.attrs).finger)
+        cords = [str(name) for name in result["cord"].values] if "cord_tension" in result else []
+        scene = Scene(finger or read_scene(result.attrs).finger, cords)
         require_samples(result)
         time = _variable(result, "time")
         frames = _frame_indices(time, rate)
@@ -167,12 +168,13 @@ def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array
     description = scene.geometry.description
     tension = _variable(result, "tendon_tension")[frames]
     actuated, passive = len(description.actuated_names), len(description.passive_names)
-    if not passive:
-        return tension
-    distal = tension[:, actuated:]
-    proximal = _variable(result, "passive_tension_proximal")[frames].reshape(len(frames), passive)
-    halves = np.stack([proximal, distal], axis=-1).reshape(len(frames), 2 * passive)
-    return np.concatenate([tension[:, :actuated], halves], axis=1)
+    if passive:
+        proximal = _variable(result, "passive_tension_proximal")[frames].reshape(len(frames), passive)
+        halves = np.stack([proximal, tension[:, actuated:]], axis=-1).reshape(len(frames), 2 * passive)
+        tension = np.concatenate([tension[:, :actuated], halves], axis=1)
+    if "cord_tension" in result:
+        tension = np.concatenate([tension, _variable(result, "cord_tension")[frames]], axis=1)
+    return tension
 
 
 def _palm(result: xr.Dataset, frames: Indices) -> LinkPoses | None:

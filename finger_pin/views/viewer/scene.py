@@ -81,15 +81,20 @@ class Scene:
 
     Attributes:
         geometry: Its tendons in space.
-        strands: Labels of the strands whose tension is shown: the actuated tendons, then two halves of each passive.
+        strands: Labels of the strands whose tension is shown: the actuated tendons, two halves of each passive, and the
+            cords that servos, muscles and springs pull.
         size: Length of the finger, m.
         tube_radius: Of the tubes that are drawn for tendons, m.
         tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots. Cords of
-            a tree that actuators or springs pull have the index behind the last strand: no tension is shown.
+            a tree whose tension is not known have the index behind the last strand.
     """
 
-    def __init__(self, finger: FingerLike) -> None:
+    def __init__(self, finger: FingerLike, cords: Sequence[str] = ()) -> None:
         """Prepare solids and tendons.
+
+        Args:
+            finger: The finger.
+            cords: Names of the cords that servos, muscles and springs pull with known tensions.
 
         Raises:
             InputError: If a joint of a description carries no link.
@@ -98,7 +103,7 @@ class Scene:
         description = self.geometry.description
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
         self._slides = [name for name, joint in description.tree.joints.items() if joint.kind == "slide"]
-        self.strands = (*description.actuated_names, *halves)
+        self.strands = (*description.actuated_names, *halves, *cords)
         self._widths, self.size = self.geometry.widths, self.geometry.size
         # Points travel as 16-bit integers; this is their unit, a few micrometres.
         self._quantum = 1.5 * self.size / _LARGEST

@@ -13,8 +13,11 @@ from pages import console_errors, opened, painted, ring_centres, seek, tendon_co
 from PIL import Image
 
 import finger_pin as fp
+from finger_pin.description.demo_motion import demo_motion
+from finger_pin.description.loading import read_scenario
 from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views.viewer import write_animation
+from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.scene import Scene
 
 
@@ -196,8 +199,15 @@ CORDS = """<mujoco><compiler angle="radian"/><worldbody><site name="a" pos=".01 
         ('stiffness="10"', "", "springs"),
     ],
 )
-def test_cords_without_tension_are_named_by_what_pulls_them(stiff, drive, pulls):
+def test_cords_show_their_tension_and_those_without_are_named_by_what_pulls_them(stiff, drive, pulls):
     mujoco = pytest.importorskip("mujoco")
     text = CORDS.replace("STIFF", stiff).replace("DRIVE", drive)
-    scene = Scene(fp.from_mujoco(mujoco.MjModel.from_xml_string(text)))
+    finger = fp.from_mujoco(mujoco.MjModel.from_xml_string(text))
+    result = fp.simulate(read_scenario(demo_motion(finger, 0.05)))
+    motion = Playback.from_result(result)
+    shown = np.interp(motion.time, result.time, result.cord_tension.sel(cord="cord"))
+    assert motion.scene.strands == ("cord",) and motion.tension[:, 0] == pytest.approx(shown)
+    assert set(motion.scene.tendons[0]["strand"]) == {0}
+    assert motion.scene.header("", motion.position, motion.largest)["cords"] == ""
+    scene = Scene(finger)
     assert scene.header("", np.zeros((1, 1)), 1.0)["cords"] == f"cords that {pulls} pull; their tension is not shown"

@@ -96,8 +96,8 @@ class Player {
 
   readOut(tensions, colours, angles) {
     this.rows.forEach(({ bar, value }, i) => {
-      const slack = looseness(tensions[i], this.config.slackTension) > 0.5;
-      bar.style.width = `${Math.min(100, (100 * tensions[i]) / this.scale)}%`;
+      const slack = looseness(Math.abs(tensions[i]), this.config.slackTension) > 0.5;
+      bar.style.width = `${Math.min(100, (100 * Math.max(tensions[i], 0)) / this.scale)}%`;
       bar.style.background = css(colours[i]);
       value.textContent = slack ? "slack" : this.hand ? tensions[i].toFixed(1) : `${tensions[i].toFixed(2)} N`;
       value.classList.toggle("slack", slack);
