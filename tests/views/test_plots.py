@@ -143,7 +143,7 @@ def test_positions_and_forces_of_a_hand_stand_in_panels_by_their_units():
     shown = {axes.get_ylabel(): [line.get_label() for line in axes.get_lines()] for axes in plot_hand_motion(hand).axes}
     assert shown["position (m)"] == ["block"]
     assert shown["angle (°)"] == ["left_proximal", "left_distal", "right_proximal", "right_distal"]
-    assert shown["tension (N)"] == ["trunk"]
+    assert shown["tension (N)"] == ["trunk"] and shown["cord tension (N)"] == ["cord"]
 
 
 @pytest.mark.parametrize("samples", [1, 2])

@@ -57,7 +57,7 @@ def _moved(result: xr.Dataset) -> list[Panel]:
 def _driven(result: xr.Dataset) -> list[Panel]:
     panels = _panels(result["tendon_tension"], "tendon", names(result, "tendon"), "tension (N)")
     if "cord_tension" in result:
-        panels += _panels(result["cord_tension"], "cord", names(result, "cord"), "tension (N)")
+        panels += _panels(result["cord_tension"], "cord", names(result, "cord"), "cord tension (N)")
     for group in (STATELESS, STATEFUL, MUSCLES):
         if f"{group}_force" in result:
             for unit, actuators in actuators_by_unit(result, group).items():
