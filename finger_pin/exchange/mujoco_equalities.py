@@ -17,12 +17,11 @@ _WELD = 1e-3
 
 
 def linked_bodies(mujoco: Any, model: Any) -> set[int]:
-    """Return the bodies that connections and welds hold together, without mocap bodies and the world."""
+    """Return the bodies that connections and welds hold together, without the world."""
     linked: set[int] = set()
     for i in (int(each) for each in np.flatnonzero(model.eq_active0)):
         if model.eq_type[i] in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):
-            bodies = _bodies(mujoco, model, i)
-            linked |= set(bodies) if all(model.body_mocapid[each] < 0 for each in bodies) else set()
+            linked |= set(_bodies(mujoco, model, i))
     return linked - {0}
 
 
@@ -44,10 +43,7 @@ def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
         kind = mujoco.mjtEq(int(model.eq_type[i])).name.removeprefix("mjEQ_").lower()
         if kind in ("connect", "weld"):
             points = _points(read, i)
-            if isinstance(points, str):
-                rest.add(f"equality {name}: {points}")
-            else:
-                loops |= {f"{name}_{k}" if len(points) > 1 else name: point for k, point in enumerate(points)}
+            loops |= {f"{name}_{k}" if len(points) > 1 else name: point for k, point in enumerate(points)}
         elif kind == "joint":
             couplings[name] = _coupling(read, i)
         elif kind != "tendon":
@@ -61,14 +57,12 @@ def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
     return _renamed(couplings), _renamed(loops), _renamed(tendons)
 
 
-def _points(read: ElementReader, i: int) -> list[Table] | str:
-    """Return the points that a connection holds together, three for a weld, or the reason for their lack."""
+def _points(read: ElementReader, i: int) -> list[Table]:
+    """Return the points that a connection holds together, three for a weld."""
     mujoco, model = read.mujoco, read.model
     first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     of_sites, bodies = model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE, _bodies(mujoco, model, i)
-    if any(model.body_mocapid[each] >= 0 for each in bodies):
-        return "to a mocap body, which others lead"
-    if not any(model.body_weldid[bodies]):
+    if not any(read.moves[bodies]):
         return []  # Both stand still.
     numbers = model.eq_data[i]
     if model.eq_type[i] == mujoco.mjtEq.mjEQ_CONNECT:
@@ -102,7 +96,7 @@ def _matrix(mujoco: Any, quaternion: Any) -> Any:
 def _loop(read: ElementReader, i: int, bodies: list[int], places: list[Any], shared: float = 1.0) -> Table:
     """Return two points that stay together; the body that moves is the first."""
     model, names = read.model, read.names
-    pairs = sorted(zip(bodies, places, strict=True), key=lambda pair: (model.body_weldid[pair[0]] == 0, -pair[0]))
+    pairs = sorted(zip(bodies, places, strict=True), key=lambda pair: (not read.moves[pair[0]], -pair[0]))
     (body, place), (other, there) = pairs
     mobility = float(np.sum(model.body_invweight0[bodies, 0]))
     # A body that turns about its mass centre alone has none.

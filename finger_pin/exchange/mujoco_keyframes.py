@@ -41,8 +41,10 @@ def read_keyframes(
 
 
 def _list_rest(read: ElementReader, free: FreeBodies, name: str, k: int, act: Array) -> None:
-    """List what of a keyframe is left out: activations, and speeds of free bodies in the tree."""
+    """List what of a keyframe is left out: activations, speeds of free bodies in the tree, places of mocap bodies."""
     model = read.model
+    if k and any(np.any(places[k] != places[0]) for places in (model.key_mpos, model.key_mquat)):
+        read.rest.add(f"keyframe {name}: places of mocap bodies, which are where the first keyframe has them")
     if np.any(np.abs(act) > _SAME):
         read.rest.add(f"keyframe {name}: activations of its actuators, which start at zero")
     starts = [int(model.jnt_dofadr[i]) for i in free.kept]

@@ -45,6 +45,8 @@ class Pairs(ElementReader):
             return False
         one, other = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
         first, second = int(weld[one]), int(weld[other])
+        if not self.moves[[one, other]].any():
+            return False
         parents = weld[model.body_parentid[second]] == first or weld[model.body_parentid[first]] == second
         # The world is nobody's parent.
         related = first and second and parents and "filterparent" not in disabled(self.mujoco, model)

@@ -25,6 +25,7 @@ class Shapes:
         """Read the geoms of a model."""
         mujoco, model = read.mujoco, read.model
         self.mujoco, self.model, self.names, self.rest = mujoco, model, read.names, read.rest
+        self._moves = read.moves[model.geom_bodyid]
         kinds = mujoco.mjtGeom
         self._kinds = {
             int(kinds.mjGEOM_SPHERE): "sphere",
@@ -41,7 +42,7 @@ class Shapes:
         for i in self._colliding:
             kind = kinds(int(model.geom_type[i])).name.removeprefix("mjGEOM_").lower()
             if not self._solid(i) and not self._is_plane(i):
-                moves = bool(model.body_weldid[model.geom_bodyid[i]])
+                moves = bool(self._moves[i])
                 self.rest.add(f"geom {self._name(i)}: a {kind} touches nothing here", moves)
         pairs, self._placed_at = Pairs(*vars(read).values()), dict[int, str]()
         # Ellipsoids, meshes and planes that move were listed.
@@ -60,9 +61,7 @@ class Shapes:
 
     def _is_plane(self, i: int) -> bool:
         model = self.model
-        return bool(
-            model.geom_type[i] == self.mujoco.mjtGeom.mjGEOM_PLANE and not model.body_weldid[model.geom_bodyid[i]]
-        )
+        return bool(model.geom_type[i] == self.mujoco.mjtGeom.mjGEOM_PLANE and not self._moves[i])
 
     def _list_margins(self) -> None:
         model = self.model
@@ -103,8 +102,7 @@ class Shapes:
 
     def still(self) -> set[int]:
         """Return the bodies that stand still, have something to touch, and are not the world."""
-        weld, carriers = self.model.body_weldid, self.model.geom_bodyid
-        return {int(carriers[i]) for i in self._colliding if self._solid(i) and not weld[carriers[i]]} - {0}
+        return {int(self.model.geom_bodyid[i]) for i in self._colliding if self._solid(i) and not self._moves[i]} - {0}
 
     def objects(self, loose: list[int]) -> Table:
         """Return planes that may be touched, and free bodies at the start of runs, as objects."""
@@ -136,8 +134,7 @@ class Shapes:
 
     def _free_states(self, keyframe: int) -> Table:
         data = self._read.start_data(keyframe)
-        weld, carriers = self.model.body_weldid, self.model.geom_bodyid
-        free = {name: i for i, name in self._placed_at.items() if weld[carriers[i]]}
+        free = {name: i for i, name in self._placed_at.items() if self._moves[i]}
         return {name: self._placed(data, i) | self._velocity(data, i) for name, i in free.items()}
 
     def _dropped(self, i: int) -> bool:
@@ -194,7 +191,7 @@ class Shapes:
 
     def set_apart(self, objects: Table, bodies: list[int]) -> None:
         """Set the entry ``apart`` of objects: what MuJoCo does not let collide with them."""
-        weld, carriers = self.model.body_weldid, self.model.geom_bodyid
+        carriers = self.model.geom_bodyid
         shapes = {
             i: self.names.geoms[i] for i in self._colliding if self._solid(i) and int(carriers[i]) in (0, *bodies)
         }
@@ -203,7 +200,7 @@ class Shapes:
             apart = [
                 other
                 for k, other in others.items()
-                if (weld[carriers[i]] or weld[carriers[k]]) and (min(i, k), max(i, k)) not in self._met
+                if (self._moves[i] or self._moves[k]) and (min(i, k), max(i, k)) not in self._met
             ]
             objects[name] |= {"apart": apart} if apart else {}
             others[i] = name

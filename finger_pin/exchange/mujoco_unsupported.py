@@ -78,9 +78,7 @@ class Rest:
             if count:
                 self.add(f"{what}: {count}")
         for i in np.flatnonzero(model.body_mocapid >= 0):
-            geoms = model.geom_bodyid == i
-            touches = bool(np.any(geoms & ((model.geom_contype > 0) | (model.geom_conaffinity > 0))))
-            self.add(f"{self._name('body', i)}: mocap, which others lead, stands still", moves=touches)
+            self.add(f"{self._name('body', i)}: mocap, which others lead, stands still", moves=False)
 
     def listed(self) -> list[str]:
         """Return the elements left out, a line each."""
@@ -129,6 +127,12 @@ class ElementReader:
     names: Names
     rest: Rest
 
+    @property
+    def moves(self) -> NDArray[np.bool_]:
+        """Mask of the bodies that joints move, shape (nbody,): the world and mocap bodies stand still."""
+        weld = self.model.body_weldid
+        return np.asarray((weld > 0) & (self.model.body_mocapid[weld] < 0))
+
     def start_data(self, keyframe: int = 0) -> Any:
         """Return the model's data where runs start: at a keyframe, or at its reference without any."""
         data = self.mujoco.MjData(self.model)
@@ -151,8 +155,15 @@ def disabled(mujoco: Any, model: Any) -> set[str]:
 
 
 def apply_flags(mujoco: Any, model: Any) -> Any:
-    """Return a copy of a model without the elements that its flags disable, and with the friction that they set."""
+    """Return a copy of a model without the elements that its flags disable, and with the friction that they set.
+
+    Mocap bodies are where the first keyframe has them.
+    """
     copied = copy.copy(model)
+    if model.nkey:
+        led = np.flatnonzero(model.body_mocapid >= 0)
+        copied.body_pos[led] = model.key_mpos[0].reshape(-1, 3)[model.body_mocapid[led]]
+        copied.body_quat[led] = model.key_mquat[0].reshape(-1, 4)[model.body_mocapid[led]]
     flags = disabled(mujoco, model)
     if hasattr(model, "actuator_armature"):
         _add_drives(mujoco, copied)

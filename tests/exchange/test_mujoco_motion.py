@@ -191,3 +191,36 @@ def test_torsional_friction_is_written_as_it_was_read_and_rolling_friction_is_li
     written = mujoco.MjModel.from_xml_string(fp.to_mjcf(first))
     assert set(written.pair_dim) == {4}
     assert written.pair_friction[:, :3] == pytest.approx(np.array([[0.9, 0.9, 0.012]] * len(written.pair_dim)))
+
+
+LED = """<mujoco><compiler angle="radian"/><option timestep="5e-4" cone="elliptic"/><worldbody>
+<body name="table" mocap="true"><geom type="plane" size="1 1 .1"/></body>
+<body name="block" mocap="true" pos="9 9 9"><geom type="box" size=".05 .05 .02"/></body>
+<body name="leader" mocap="true" pos="9 9 9"><geom size=".01"/></body>
+<body name="ball" pos=".3 0 .2"><freejoint/><geom size=".02" mass=".05"/></body>
+<body name="other" pos="0 .3 .2"><freejoint/><geom size=".02" mass=".05"/></body>
+<body name="palm" pos="0 0 .3"><freejoint/><geom type="box" size=".03 .02 .01" mass=".2" contype="0" conaffinity="0"/>
+ <body pos=".03 0 0"><joint name="flex" axis="0 1 0" damping="4e-3" armature="2e-5"/>
+ <geom type="capsule" size=".006" fromto="0 0 0 .05 0 0" mass=".02" contype="0" conaffinity="0"/></body></body>
+</worldbody><equality><weld body1="leader" body2="palm" relpose="0 0 -.05 1 0 0 0" solref=".01 1"/></equality>
+<actuator><position joint="flex" kp=".5" kv=".02"/></actuator>
+<keyframe><key mpos="0 0 .01 .3 0 .1 0 0 .35" mquat="1 0 0 0 .9 0 0 .1 .96 0 .28 0" ctrl=".8"
+ qpos=".3 0 .2 1 0 0 0 0 .3 .2 1 0 0 0 0 0 .3 1 0 0 0 0"/>
+<key name="elsewhere" mpos="1 0 .01 .3 0 .1 0 0 .35"/></keyframe></mujoco>"""
+
+
+def test_mocap_bodies_stand_where_a_keyframe_has_them_and_lead_and_carry_what_is_there():
+    """A weld takes a palm to its leader's place and turn, a box and a plane catch balls."""
+    with pytest.warns(fp.exceptions.LeftOutWarning, match="keyframe elsewhere: places of mocap bodies"):
+        data, result = both(LED, 0.6)
+    # Bodies that stand still do not touch each other.
+    assert not tomllib.loads(result.attrs["scenario"])["finger"]["tree"].get("touching")
+    where = dict(zip(result.joint.values, result.joint_position.values[-1], strict=True))
+    moved = np.add([where[f"palm_{axis}"] for axis in "xyz"], [0.0, 0.0, 0.3])
+    np.testing.assert_allclose(moved, data.body("palm").xpos, atol=1e-3)
+    turn = 2.0 * np.arctan2(data.qpos[19], data.qpos[17])
+    assert turn > 0.5
+    assert abs(where["palm_pitch"]) == pytest.approx(turn, abs=1e-3)
+    assert where["flex"] == pytest.approx(data.joint("flex").qpos[0], abs=1e-3)
+    balls = [data.body(name).xpos for name in ("ball", "other")]
+    np.testing.assert_allclose(result.object_position.values[-1], balls, atol=1e-3)
