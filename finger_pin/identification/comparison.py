@@ -32,7 +32,7 @@ class LawComparison:
     Attributes:
         law: Names.
         parameters: Number of parameters found.
-        bic: k log n + sum of w n log(SSE / n).
+        bic: As by `bic`, under the weights of the scenario's own law.
         rms: Of residuals over the noise under the scenario's own law.
         held_out: The same of samples that the fit had not seen; not a number where nothing can be held out.
         estimate: By law, what was found, by key.
@@ -67,13 +67,27 @@ def compare_laws(problem: Problem, settings: IdentifySettings, minimum: Fit) -> 
     rows = []
     for name, law in [(DESCRIBED, problem), *other_laws(problem, settings).items()]:
         best = minimum if law is problem else _best(law, minimum.weights, _places(law, problem, minimum.z))
-        size = float(sum(w * len(e) for e, w in zip(best.residuals, minimum.weights, strict=True)))
-        misfit = minus_twice_likelihood(best.residuals, minimum.weights, law.groups, law.least_noise)
-        value = misfit + law.asked * math.log(size)
+        value = bic(best.residuals, minimum.weights, law.asked, law.groups, law.least_noise)
         values = dict(zip(law.keys[: law.asked], law.values(best.z).tolist(), strict=False))
         out = _held_out(law, best, minimum, folds)
         rows.append((name, law.asked, value, _scaled_rms(best.residuals, minimum.noise), out, values))
     return LawComparison(*(list(column) for column in zip(*rows, strict=True)))
+
+
+def bic(
+    residuals: Sequence[Array], weights: Array, parameters: int, groups: NDArray[np.intp], least_noise: Array
+) -> float:
+    """Return k log n + sum of w n log(SSE / n); laws are comparable under the same weights w.
+
+    Args:
+        residuals: Of every signal.
+        weights: Part of the samples that are independent, shape (s,).
+        parameters: Number of parameters k.
+        groups: Number of the output that every signal is of, shape (s,).
+        least_noise: Least standard deviation of every signal, shape (s,).
+    """
+    size = float(sum(w * len(e) for e, w in zip(residuals, weights, strict=True)))
+    return minus_twice_likelihood(residuals, weights, groups, least_noise) + parameters * math.log(max(size, 1.0))
 
 
 def other_laws(problem: Problem, settings: IdentifySettings) -> dict[str, Problem]:

@@ -16,7 +16,7 @@ from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
-from finger_pin.identification.comparison import LawComparison
+from finger_pin.identification.comparison import LawComparison, bic
 from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, free_directions
 from finger_pin.identification.likelihood import minus_twice_likelihood
@@ -66,7 +66,7 @@ def results(
         "searches": len(fits),
         "searches_alike": searches_alike,
         "evaluations": problem.evaluations,
-        "bic": least + count * math.log(max(float(best.weights @ [len(e) for e in best.residuals]), 1.0)),
+        "bic": bic(best.residuals, best.weights, count, problem.groups, problem.least_noise),
     }
     attrs |= {"unfinished": unfinished} if unfinished else {}
     return xr.Dataset(variables, coordinates, attrs)

@@ -44,8 +44,8 @@ SHORTER = {
     r"reaction\.py$": "reaction.py reversals --forces 1",
     # What it finds has a test of its own.
     r"(identify\.py) (winding|servo_pendulum|postures|spool_finger|instrument).*": r"\1 --list any",
-    # It fits a bench under every law.
-    r"(compare_laws\.py) .*": r"\1 transmission",
+    # It fits benches under every law.
+    r"(compare_laws\.py).*": r"\1 transmission",
     # It fits for minutes.
     r"(servo_models\.py).*": r"\1 --only M1 --generations 0",
     # Its stages have tests of their own, and it measures for minutes.
