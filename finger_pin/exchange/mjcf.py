@@ -106,7 +106,8 @@ def to_mjcf(
     if description.tree.bodies:
         if friction:
             allowed = (
-                "of a tree is added by finger_pin.mujoco.add_friction to a mujoco.MjSpec of what is written without"
+                "of a tree is added to what is written without: "
+                "finger_pin.mujoco.add_friction(mujoco.MjSpec.from_string(text), of=hand)"
             )
             raise InputError("friction", allowed)
         return tree_to_mjcf(description, posture, timestep, integrator, limits is not False, shapes)

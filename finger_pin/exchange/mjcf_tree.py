@@ -39,7 +39,7 @@ _NOTES = """
   Joints, tendons, couplings, actuators and keyframes are as described; ranges, couplings and loops are MuJoCo's soft
   constraints, of the description's stiffness and damping at the model's own inertia, and so are contacts.
   Left out, because MuJoCo has no counterpart, or is told of it otherwise:
-  - friction of tendons and joints that grows with their load: finger_pin.mujoco.add_friction adds it to a MjSpec;
+  - friction of tendons and joints that grows with their load: finger_pin.mujoco.add_friction(spec, of=hand) adds it;
   - what takes energy from an impact on a stop by its depth: stops without a damper are critically damped;{rest}
 """
 

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Annotated, Any
 
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
-from finger_pin.description.validation import Description, quantity, real, suggestion, validate
+from finger_pin.description.validation import Description, expand, quantity, real, suggestion, validate
 from finger_pin.exceptions import InputError
 
 
@@ -55,3 +56,49 @@ def choose(
             tables[name] = tables.get(name, {}) | dict(keys)
         named |= {pattern} & set(matching)
     return {name: (validate(kind, keys, (entry, name)), name in named) for name, keys in tables.items()}
+
+
+def keys_of(description: FingerDescription) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+    """Return the keys with which the tendons and joints of a tree rub as the description says, by name.
+
+    They are for the model that `to_mjcf` writes, which has viscous friction of joints and the loss of tendons already.
+
+    Raises:
+        InputError: If tendons rub at several bends, a tendon turns by another angle than its joints, or joints rub by
+            another law than (9).
+    """
+    rubbing, turning = description.tendon_friction, description.joint_friction
+    if rubbing.place != "canal":
+        allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
+        raise InputError("finger.tendon_friction.place", allowed, rubbing.place)
+    if turning.law != "lugre" and any(description.bearings):
+        allowed = 'must be "lugre", law (9), the only one that is computed in the step of MuJoCo; or leave out friction'
+        raise InputError("finger.joint_friction.law", allowed, turning.law)
+    of_tendons = {name: each.along or name for name, each in description.tendons.items()}
+    of_tendons |= {name: name for name in description.canals}
+    tendons = {}
+    for index, (name, written) in enumerate(of_tendons.items()):
+        cord = description.cord(name)
+        keys = _at(rubbing, index, len(of_tendons)) | {"curvature_offset": cord.curvature_offset}
+        if not cord.through_space:
+            turns = {element.name: element.turn for element in cord.elements if element.turn}
+            if set(turns.values()) - {1.0}:
+                allowed = "must be 1 rad per rad in MuJoCo; or leave out friction"
+                raise InputError(f"finger.tendons.{name}: turn over its joints", allowed, turns)
+            keys |= {"bends": tuple(turns)}
+            keys["curvature_offset"] += sum(element.curvature_offset for element in cord.elements)
+        loss = description.tree.tendons[written].friction if written in description.tree.tendons else 0.0
+        tendons[written] = keys | {"drag": max(keys["drag"] - loss, 0.0)}
+    bearings = dict(zip(description.joints, description.bearings, strict=True))
+    joints = {
+        name: _at(turning, index, len(bearings)) | {"viscous": 0.0}
+        for index, (name, rubs) in enumerate(bearings.items())
+        if rubs
+    }
+    return tendons, joints
+
+
+def _at(settings: TendonFrictionSettings | JointFrictionSettings, index: int, count: int) -> dict[str, Any]:
+    """Return the numbers of one of several tendons or joints."""
+    numbers = {key: value for key, value in settings if isinstance(value, int | float | tuple)}
+    return {key: float(expand(value, count)[index]) for key, value in numbers.items() if key != "reversal_speed"}

@@ -11,8 +11,9 @@ import numpy as np
 
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.exchange.mujoco_friction import COUNT, GROUP, LEAST_LOSS, NAME, NO_INPUT, PLUGIN, PluginFriction
+from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.mujoco.frictions import add_branches, frictions, pulled
-from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose
+from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose, keys_of
 from finger_pin.mujoco.registration import register
 
 Keys = Mapping[str, Mapping[str, Any]]
@@ -30,7 +31,9 @@ class MujocoWarning(ScenarioWarning):
     """An option or step of a MuJoCo model weakens friction."""
 
 
-def add_friction(spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys | None = None) -> None:
+def add_friction(
+    spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys | None = None, *, of: FingerLike | None = None
+) -> None:
     """Add friction that grows with tension, and holds, to a MuJoCo model.
 
     Tendons rub in their canals by (9), (14) and (16), joints on their pins by (9) and (17). Names may have stars
@@ -44,11 +47,15 @@ def add_friction(spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys 
             stribeck_velocity, floor, stribeck_exponent, micro_damping, drag), ``curvature_offset``, rad, the turn that
             the model does not show, and for fixed tendons ``bends``, the joints whose angle bends the path.
         joints: By name, keys of ``finger.joint_friction``.
+        of: The finger or hand with a tree of bodies whose friction it is, where `to_mjcf` has written the model;
+            ``tendons`` and ``joints`` go on top.
 
     Raises:
         InputError: If a name matches nothing, a key or number is not allowed, the model does not compile, has friction
             already, or is integrated by ``discrete``, which leaves no room for friction.
     """
+    if of is not None:
+        tendons, joints = (_on_top(*each) for each in zip(_written(of), (tendons, joints), strict=True))
     register()
     if not isinstance(spec, mujoco.MjSpec):
         raise InputError("spec", "must be a mujoco.MjSpec", type(spec).__name__)
@@ -73,6 +80,17 @@ def add_friction(spec: mujoco.MjSpec, tendons: Keys | None = None, joints: Keys 
         raise InputError("spec", "nothing pulls the tendons, and no joints are named: there is no friction to add")
     warn_if_stiff(model, plugin_frictions, "spec.option.timestep")
     _write(spec, model, plugin_frictions)
+
+
+def _written(finger: FingerLike) -> tuple[Keys, Keys]:
+    description = description_of(finger)
+    if not description.tree.bodies:
+        raise InputError("of", "must have a tree of bodies; friction of others is written by to_mjcf(friction=True)")
+    return keys_of(description)
+
+
+def _on_top(keys: Keys, more: Keys | None) -> Keys:
+    return {**keys, **{name: {**keys.get(name, {}), **each} for name, each in (more or {}).items()}}
 
 
 def warn_if_noslip(option: Any, entry: str) -> None:

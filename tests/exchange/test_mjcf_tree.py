@@ -198,7 +198,7 @@ def test_friction_of_a_tree_is_added_to_what_is_written_without():
     from finger_pin.mujoco import add_friction
 
     hand = fp.from_mujoco(mujoco.MjModel.from_xml_string(MODELS_BY_NAME["pulled"]))
-    with pytest.raises(fp.InputError, match=r"add_friction to a mujoco[.]MjSpec of what is written without"):
+    with pytest.raises(fp.InputError, match=r"add_friction[(]mujoco[.]MjSpec[.]from_string[(]text[)], of=hand[)]"):
         fp.to_mjcf(hand, friction=True)
     spec = mujoco.MjSpec.from_string(fp.to_mjcf(hand))
     add_friction(spec, {"cord": {"coulomb": 0.3}})

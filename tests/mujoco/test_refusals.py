@@ -38,6 +38,20 @@ def test_wrong_names_keys_and_numbers_are_named(tendons, joints, entry):
     assert caught.value.entry == entry and "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "of, changes, words",
+    [
+        ("reversals", {}, "of: must have a tree of bodies"),
+        ("tree", {"finger.tendon_friction.place": "bends"}, "tendon_friction.place.*canal"),
+        ("tree", {"finger.joint_friction.law": "dahl", "finger.tendon_friction.place": "canal"}, "joint_friction.law"),
+    ],
+)
+def test_friction_that_no_written_hand_can_have_is_refused(of, changes, words):
+    hand = fp.load_scenario("underactuated" if of == "tree" else of, changes).finger
+    with pytest.raises(fp.InputError, match=words):
+        fp.mujoco.add_friction(mujoco.MjSpec(), of=hand)
+
+
 def test_what_cannot_be_is_refused_and_what_is_less_is_warned_of():
     once = rope()
     fp.mujoco.add_friction(once, tendons={"rope": {}})

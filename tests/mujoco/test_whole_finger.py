@@ -41,6 +41,25 @@ def test_a_routed_hand_with_our_friction_moves_in_mujoco_as_here():
     assert errors[-1] < 1e-3 and errors[0] / errors[1] > 1.8
 
 
+def test_a_hand_that_was_changed_and_written_rubs_in_mujoco_as_here():
+    """Other coefficients of every tendon and joint, and a turn that the model does not show."""
+    spec = mujoco.MjSpec.from_string(ROUTED)
+    spec.joint("slider").limited = 0
+    scenario, _ = ours(spec, 0.1)
+    assert ([*scenario.finger.tendons], scenario.finger.canals) == (["pull"], ("top",))
+    changes = {"tendon_friction.coulomb": [0.1, 0.2], "tendon_friction.drag": [0.0, 0.2]}
+    changes |= {"joint_friction.coulomb": [1e-3, 2e-3, 4e-3], "joint_friction.stiction": 6e-3}
+    changes |= {"joint_friction.drag": [0.0, 5e-3, 0.1], "tree.tendons.top.curvature_offset": 0.8}
+    scenario = fp.load_scenario(scenario, {f"finger.{key}": value for key, value in changes.items()})
+    result = fp.simulate(scenario)
+    text = fp.to_mjcf(scenario.finger, limits=False)
+    smooth, rough = mujoco.MjSpec.from_string(text), mujoco.MjSpec.from_string(text)
+    add_friction(rough, of=scenario.finger)
+    errors = differences(rough.compile(), scenario, result, (5e-5, 2.5e-5))
+    assert errors[-1] < 1e-3 and errors[0] / errors[1] > 1.8
+    assert differences(smooth.compile(), scenario, result, (5e-5,))[0] > 0.02
+
+
 def test_the_shadow_hand_with_friction_in_all_joints_moves_in_mujoco_as_here():
     spec = mujoco.MjSpec.from_file(str(asset("hand/reach.xml")))
     # Without its cords, which would load the pins.
