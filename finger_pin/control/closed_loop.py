@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger_pin.control.interface import Controller, ControlSignals, Dynamics, LoopController
-from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_paths
+from finger_pin.control.palm import Guides, PalmPath, PrescribedJoints, PrescribedObjects, at_start, with_paths
 from finger_pin.control.position_drive import DriveSignals, LoopMemory
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -55,7 +55,7 @@ class ClosedLoop:
         drives: Loops of motors in position drive; None without any.
         last_samples: Of these loops, from the run that this one goes on from; None for loops that start.
         palm: Path of the palm of a hand; None at rest.
-        guides: Paths of moved objects; None without any.
+        guides: Paths of moved objects, or of all joints; None without any.
     """
 
     finger: Finger
@@ -68,7 +68,7 @@ class ClosedLoop:
     drives: DriveSignals | None = None
     last_samples: LoopMemory | None = None
     palm: PalmPath | None = None
-    guides: PrescribedObjects | None = None
+    guides: Guides | None = None
 
     @classmethod
     def from_scenario(
@@ -139,6 +139,13 @@ class ClosedLoop:
         """Return the same loop that starts at a packed state; a palm on a path has the world where it is then."""
         start = x if self.palm is None else self.palm.place_world(self.finger, x)
         return replace(self, start=start, last_samples=last_samples)
+
+    def along(self, motion: Signal) -> ClosedLoop:
+        """Return the same loop with its joints held to a motion, n functions of time, rad; bristles start relaxed."""
+        finger = self.finger.with_prescribed_joints()
+        guides = PrescribedJoints(motion, np.array(finger.rigid_body.model.gravity.linear))
+        loop = replace(self, finger=finger, dynamics=finger, guides=guides)
+        return replace(loop, start=loop.rest_state(*motion.at(0.0)))
 
     def compiled(self) -> ClosedLoop:
         """Return the same loop on the compiled core."""

@@ -92,6 +92,29 @@ class PalmPath:
 
 
 @dataclass(frozen=True, eq=False)
+class PrescribedJoints:
+    """The motion of all joints, along which something holds them.
+
+    Attributes:
+        signal: theta over time, n functions, rad.
+        gravity: In the base frame, shape (3,), m/s2.
+    """
+
+    signal: Signal
+    gravity: Array
+
+    def place(self, finger: Finger, x: Array) -> Array:
+        """Return a packed state with the joints at the beginning of their motion."""
+        state = finger.layout.unpack(x)
+        state.position[:], state.velocity[:] = self.signal.at(0.0)
+        return x
+
+    def base(self, time: Array | float) -> Array:
+        """Return the 27 numbers of `base_motion` for a base at rest, and the n accelerations, at times (...)."""
+        return _resting_base(self.gravity, self.signal.derivative(time, 2))
+
+
+@dataclass(frozen=True, eq=False)
 class PrescribedObjects:
     """The paths of k objects.
 
@@ -132,21 +155,28 @@ class PrescribedObjects:
 
     def base(self, time: Array | float) -> Array:
         """Return the 27 numbers of `base_motion` for a base at rest, and the 6 k accelerations, at times (...)."""
-        acceleration = self.signal.derivative(time, 2)
-        rest = np.zeros((*np.shape(time), 27))
-        rest[..., 9:12], rest[..., 12:15] = -self.gravity, self.gravity
-        return np.concatenate([rest, acceleration], axis=-1)
+        return _resting_base(self.gravity, self.signal.derivative(time, 2))
 
 
-def at_start(finger: Finger, x: Array, palm: PalmPath | None, guides: PrescribedObjects | None) -> Array:
-    """Return a packed state with palm and objects at the start of their paths."""
+#: What moves coordinates along paths.
+Guides = PrescribedJoints | PrescribedObjects
+
+
+def _resting_base(gravity: Array, acceleration: Array) -> Array:
+    rest = np.zeros((*acceleration.shape[:-1], 27))
+    rest[..., 9:12], rest[..., 12:15] = -gravity, gravity
+    return np.concatenate([rest, acceleration], axis=-1)
+
+
+def at_start(finger: Finger, x: Array, palm: PalmPath | None, guides: Guides | None) -> Array:
+    """Return a packed state with palm, joints and objects at the start of their paths."""
     if palm is not None:
         return palm.place_world(finger, x)
     return x if guides is None else guides.place(finger, x)
 
 
-def with_paths(control: InputTable, palm: PalmPath | None, guides: PrescribedObjects | None) -> InputTable:
-    """Return inputs with the paths of palm and objects."""
+def with_paths(control: InputTable, palm: PalmPath | None, guides: Guides | None) -> InputTable:
+    """Return inputs with the paths of palm, joints and objects."""
     if palm is not None:
         control = control._replace(palm=core_signal(palm.signal))
     return control if guides is None else control._replace(guide=core_signal(guides.signal))

@@ -170,7 +170,9 @@ def _undamped(scenario: Scenario, problem: Problem) -> list[str]:
     damped = np.add(expand(friction.viscous, len(joints)), expand(friction.micro_damping, len(joints)))
     damped += [0.0 if joint.spring is None else joint.spring.damping for joint in finger.joints.values()]
     tendons_damp = bool(np.any(expand(finger.tendon_friction.viscous, len(finger.tendons)) > 0.0))
-    if tendons_damp or not problem.moves:
+    settings = [model.recording.settings for model in problem.models]
+    computed = any(each.kind == "motion" and not each.imposed for each in settings)
+    if tendons_damp or not computed:
         return []
     return [name for name, value in zip(joints, damped, strict=True) if value == 0.0]
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.identification.imposed_motions import ImposedMotion
 from finger_pin.identification.motions import RecordedMotion
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording, RecordingModel, check_angles, unit_of
@@ -67,7 +68,8 @@ def recording_models(
         if steady:
             models.append(SteadyReadings(recording, recorded_scenario, replacing))
         else:
-            models += [RecordedMotion(recording, recorded_scenario, rows, k, replacing) for k, rows in parts]
+            model = ImposedMotion if recording.settings.imposed else RecordedMotion
+            models += [model(recording, recorded_scenario, rows, k, replacing) for k, rows in parts]
         signals += [
             _signal(recording, name, values, rows, rows_wanted)
             for _, rows in parts

@@ -16,7 +16,7 @@ from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.identification.recorded_inputs import check_references, put_inputs, with_corrected_inputs
+from finger_pin.identification.recorded_inputs import Corrections, check_references, put_inputs, with_corrected_inputs
 from finger_pin.identification.recordings import At, Recording, comes_round
 from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
 from finger_pin.identification.starts import check_reachable, far_start, recorded_starts, starts_to_find
@@ -125,6 +125,7 @@ class RecordedMotion:
             k
             for k, (scenario, nuisance) in enumerate(there)
             if self._with_nuisance(scenario, nuisance) != motion[0].scenario
+            or self._imposed(nuisance) != self._imposed(here[1])
         ]
         others = {k: self._setup(*there[k]) for k in feeling}
         # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
@@ -178,8 +179,15 @@ class RecordedMotion:
 
     def _setup(self, scenario: Scenario, nuisance: Mapping[str, float]) -> Setup:
         moved = self._with_nuisance(scenario, nuisance)
-        finger = None if self._finger is None else with_parameters_of(self._finger, self.scenario, moved)
-        return Setup.from_scenario(moved, ClosedLoop.from_scenario(moved, finger=finger))
+        return Setup.from_scenario(moved, self._loop(moved, nuisance))
+
+    def _loop(self, scenario: Scenario, nuisance: Mapping[str, float]) -> ClosedLoop:
+        finger = None if self._finger is None else with_parameters_of(self._finger, self.scenario, scenario)
+        return ClosedLoop.from_scenario(scenario, finger=finger)
+
+    def _imposed(self, nuisance: Mapping[str, float]) -> dict[str, Corrections]:
+        """Return the corrections of joints whose motion is given, by column: none here."""
+        return {}
 
     def _made(
         self, scenario: Scenario, nuisance: Mapping[str, float], factor: float

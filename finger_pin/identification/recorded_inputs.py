@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from finger_pin.description.recordings.bench import IMPOSED
 from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.winding import WINDINGS
@@ -37,8 +38,10 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
     entry = f"identify.recordings.{recording.name}"
     for name, values in recording.inputs.items():
         variable, _, label = name.partition(".")
+        if variable == IMPOSED:
+            continue
         if variable not in _INPUTS:
-            raise InputError(f"{entry}.inputs.{name}", f"a motion is given {', '.join(_INPUTS)}")
+            raise InputError(f"{entry}.inputs.{name}", f"a motion is given {', '.join([*_INPUTS, IMPOSED])}")
         rivals = [f"{other}.{label}" for other in _OF_MOTORS if variable in _OF_MOTORS and other != variable]
         rival = next((each for each in rivals if each in recording.inputs), None)
         if rival is not None:
@@ -95,6 +98,20 @@ def check_references(recording: Recording, scenario: Scenario) -> None:
             raise InputError(f"identify.recordings.{recording.name}.inputs.{name}", allowed)
 
 
+class Corrections(NamedTuple):
+    """Scale, offset and delay, s, of a column that are being found."""
+
+    scale: float = 1.0
+    offset: float = 0.0
+    delay: float = 0.0
+
+
+def corrections(recording: str, column: str, nuisance: Mapping[str, float]) -> Corrections:
+    """Return the corrections of a column of a recording."""
+    neutral = Corrections()._asdict().items()
+    return Corrections(*(nuisance_value(nuisance, recording, column, what, default) for what, default in neutral))
+
+
 def with_corrected_inputs(scenario: Scenario, recording: Recording, nuisance: Mapping[str, float]) -> Scenario:
     """Return a scenario with the scales, offsets and delays of a motion's inputs that are being found.
 
@@ -102,22 +119,21 @@ def with_corrected_inputs(scenario: Scenario, recording: Recording, nuisance: Ma
         InputError: If an input is of one finger of a hand.
     """
     for name, values in recording.inputs.items():
-        numbers = [
-            nuisance_value(nuisance, recording.name, name, what, default)
-            for what, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
-        ]
-        if numbers == [1.0, 0.0, 0.0]:
+        if name.startswith(f"{IMPOSED}."):
+            continue
+        numbers = corrections(recording.name, name, nuisance)
+        if numbers == Corrections():
             continue
         (section, group), label = _INPUTS[name.partition(".")[0]], name.partition(".")[2]
         signals = dict(getattr(getattr(scenario, section), group) or {})
         if label not in signals:
             allowed = "has no scale, offset or delay to be found: it is of one finger of a hand"
             raise InputError(f"identify.recordings.{recording.name}.inputs.{name}", allowed)
-        corrected = numbers[0] * values + numbers[1]
+        corrected = numbers.scale * values + numbers.offset
         if name.startswith("tendon_command."):
             # A tendon only pulls: what a wrong zero takes below it is a slack one.
             corrected = np.maximum(corrected, 0.0)
-        times = np.asarray(signals[label].times) - numbers[2]
+        times = np.asarray(signals[label].times) - numbers.delay
         signals[label] = signals[label].updated(times=Series(times), values=Series(corrected))
         scenario = scenario.updated(**{section: {group: signals}})
     return scenario

@@ -35,6 +35,7 @@ VARIABLES = {
     "joint_reference": "rad",
     "joint_velocity": "rad/s",
     "joint_torque": "N m",
+    "joint_effort": "N m",
     "motor_position": "rad",
     "motor_velocity": "rad/s",
     "motor_current": "A",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
@@ -11,11 +12,13 @@ import pinocchio as pin
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.assembly import ConstructorArgs, Parts, assemble, check_joints
 from finger_pin.mechanism.canals import CANALS
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
+from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 from finger_pin.mechanism.state import Motion, as_floats
@@ -125,6 +128,22 @@ class Finger:
         args = self.constructor_args
         finger = Finger(description, args.rigid_body, args.rows, objects, args.tables)
         finger.visuals = self.visuals
+        return finger
+
+    def with_prescribed_joints(self) -> Finger:
+        """Return the same finger whose joints are moved along a motion, whatever effort that takes.
+
+        Raises:
+            InputError: If its palm or objects around it are moved along paths as well.
+        """
+        if self.mechanism.moved or np.any(self.mechanism.prescribed >= 0):
+            entry = "hand.palm.path" if self.mechanism.moved else "environment.objects"
+            raise InputError(entry, "a path cannot stand beside a motion of the joints that is given: leave it out")
+        finger = copy.copy(self)
+        whole, joints = self.mechanism, len(self.routing.joints)
+        prescribed = np.append(np.arange(joints), np.full(whole.coordinates - joints, -1))
+        parts = whole.body, whole.listed, whole.lumps, whole.inertia, whole.channels
+        finger.mechanism = Mechanism(*parts, prescribed=prescribed)
         return finger
 
     @property

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,9 @@ from finger_pin.laws.input_functions import harmonic, harmonic_rate, quintic, qu
 from finger_pin.references.polynomials import ORDER, joined, polynomials
 from finger_pin.references.sample_fitting import thinned
 from finger_pin.typing import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 Flags = NDArray[np.bool_]
 # A signal that varies by less, of its size, is constant but for rounding.
@@ -101,6 +104,11 @@ class Signal:
         coefficients = np.zeros((ORDER, *values.shape))
         coefficients[-1] = values
         return cls(no_harmonics(values.shape[1]), knots, coefficients)
+
+    @classmethod
+    def from_polynomials(cls, columns: Sequence[PPoly]) -> Signal:
+        """Return the signals that piecewise polynomials of degree five at most are."""
+        return cls(no_harmonics(len(columns)), *joined(columns))
 
     @classmethod
     def from_signals(cls, signals: Sequence[Signal]) -> Signal:

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.palm import PrescribedJoints
 from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.rows import RowSignals
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
@@ -52,6 +53,8 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         ),
         SHORTFALL: Quantity(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
+    if isinstance(loop.guides, PrescribedJoints):
+        table["joint_effort"] = Quantity(_JOINT, _effort, "N m", "torque that the given motion of a joint takes", "18")
     if loop.finger.layout.names_of("joint_stiction"):
         table["joint_stiction"] = of_state("joint_stiction")
     if loop.finger.layout.names_of("elastic_stiction"):
@@ -182,6 +185,15 @@ def _fingertip_force(of: SampledTrajectory) -> Array:
 def _shortfall(of: SampledTrajectory) -> Array:
     missing = of.control.torque_deficit
     return np.zeros_like(of.state.position) if missing is None else missing
+
+
+def _effort(of: SampledTrajectory) -> Array:
+    """Return M a + h less all that the finger exerts itself, shape (m, n)."""
+    loop, state, mechanism = of.loop, of.state, of.finger.mechanism
+    assert loop.guides is not None
+    motion = zip(state.position, state.velocity, loop.guides.signal.derivative(of.times, 2), strict=True)
+    needed = np.array([loop.finger.rigid_body.inverse_dynamics(*each) for each in motion])
+    return np.asarray(needed - (mechanism.torque + mechanism.external)[:, : needed.shape[1]])
 
 
 def _of_palm(loop: ClosedLoop) -> dict[str, Quantity]:

@@ -114,7 +114,8 @@ def test_two_recordings_with_gaps_share_the_friction_and_go_on_after_an_interrup
     [
         ({"start": "recorded", "outputs": {"joint_position.drum": TURNED}}, "cannot be reached: drum begins at"),
         ({"start": "recorded", "outputs": {"tendon_tension.T1": "f"}}, "needs joint_position among the outputs"),
-        ({"inputs": {"joint_position.drum": TURNED}}, "a motion is given tendon_command, spool_angle"),
+        ({"inputs": {"motor_current.M1": "f"}}, "a motion is given tendon_command, spool_angle"),
+        ({"inputs": {"joint_position.drum": TURNED}}, "drum.smoothing: is missing"),
         ({"time": "f"}, "times must increase"),
         ({"start": "rest", "outputs": {"joint_position.wheel": "f"}}, "there is no wheel; there are drum"),
         ({"start": "rest", "outputs": {"joint_positon.drum": "f"}}, "did you mean joint_position?"),

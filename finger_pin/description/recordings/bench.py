@@ -12,6 +12,12 @@ from finger_pin.description.validation import Description, Name, choice, problem
 
 #: What a parameter of one recording begins with, before its name.
 OF_RECORDINGS = "recordings."
+#: Input of a motion that is given, not computed; what is then no output; and the output that is there then alone.
+IMPOSED, _KINEMATIC, _EFFORT = (
+    "joint_position",
+    ("joint_position", "joint_velocity", "joint_acceleration"),
+    "joint_effort",
+)
 Bounds = dict[str, Annotated[tuple[float, float], vector(2)]]
 
 
@@ -67,6 +73,13 @@ class Column(Description):
         0.0, unit="s", source="calibration", doc="Delay of the column behind its quantity; motions only."
     )
 
+    smoothing: Annotated[float, real(0.0, 1e3)] | None = quantity(
+        None,
+        unit="rad",
+        source="the encoder",
+        doc="Inputs joint_position of motions: rms by which a smooth curve passes beside the readings; 0: through all.",
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _named(cls, value: Any) -> Any:
@@ -113,6 +126,34 @@ class RecordingSettings(TableFormat):
         description="Whether it is predicted, not fitted; or its part between two times, s from its start; or by "
         "column the number or word, or a list of them, in such rows.",
     )
+
+    @property
+    def imposed(self) -> bool:
+        """Whether the motion of the joints is an input, so that nothing of it is computed."""
+        return self.kind == "motion" and any(name.partition(".")[0] == IMPOSED for name in self.inputs)
+
+    @model_validator(mode="after")
+    def _imposes(self) -> Self:
+        columns = {f"inputs.{name}": each for name, each in self.inputs.items()}
+        columns |= {f"outputs.{name}": each for name, each in self.outputs.items()}
+        for name, column in {**columns, "time": self.time, "speed": self.speed}.items():
+            smooth = self.imposed and name.startswith(f"inputs.{IMPOSED}.")
+            if isinstance(column, Column) and not smooth and column.smoothing is not None:
+                raise problem(f"{name}.smoothing", f"is for inputs {IMPOSED} of motions only", column.smoothing)
+            if isinstance(column, Column) and smooth and column.smoothing is None:
+                allowed = (
+                    "is missing: the noise of these readings, rad rms, that a smooth curve leaves out, or 0 for none"
+                )
+                raise problem(f"{name}.smoothing", allowed)
+        for name in self.outputs:
+            variable = name.partition(".")[0]
+            if self.imposed and variable in _KINEMATIC:
+                raise problem(f"outputs.{name}", f"cannot be compared: the inputs {IMPOSED} say it")
+            if not self.imposed and variable == _EFFORT:
+                raise problem(f"outputs.{name}", f"is there where {IMPOSED} of every joint is an input of a motion")
+        if self.imposed and self.start != "rest":
+            raise problem("start", f"is for motions that are computed: the inputs {IMPOSED} say it", self.start)
+        return self
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
