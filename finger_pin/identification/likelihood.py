@@ -3,11 +3,86 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.identification.recordings import RecordedSignal
 from finger_pin.typing import Array
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseGrowth:
+    """Noise of signals that grows with their readings x: sigma = sigma_0 w(x), w^2 = 1 + (share x / least)^2.
+
+    With residuals e / w times G, the geometric mean of w in a group of signals, n log(SSE / n) is minus twice the
+    log-likelihood again, whose logarithm of all sigma would else be missing: readings are those that are computed, as
+    measured ones would count for more where they are too small by chance.
+
+    Attributes:
+        measured: Readings of every signal.
+        least: Least noise of every signal, shape (s,).
+        share: Part of the reading, shape (s,).
+        groups: Group of every signal, shape (s,).
+    """
+
+    measured: Sequence[Array]
+    least: Array
+    share: Array
+    groups: NDArray[np.intp]
+
+    @classmethod
+    def from_signals(cls, signals: Sequence[RecordedSignal], groups: NDArray[np.intp]) -> Self:
+        """Return the growth of the noise of recorded signals."""
+        least, share = np.array([(each.least_noise, each.noise_share) for each in signals]).reshape(-1, 2).T
+        return cls([each.measured for each in signals], least, share, groups)
+
+    @property
+    def floor(self) -> Array:
+        """The least deviation of residuals, shape (s,), by the level of the measured readings."""
+        return self.least * self.levels([0.0 * x for x in self.measured]) if self.acts else self.least
+
+    @property
+    def _ratios(self) -> Array:
+        return np.divide(self.share, self.least, out=np.zeros_like(self.share), where=self.share > 0.0)
+
+    @property
+    def acts(self) -> bool:
+        """Whether any noise grows."""
+        return bool(np.any(self.share))
+
+    def growth(self, errors: Sequence[Array]) -> list[Array]:
+        """Return w of what is computed, measured less errors."""
+        readings = zip(self._ratios, self.measured, errors, strict=True)
+        return [np.sqrt(1.0 + (ratio * (x - e)) ** 2) if ratio else np.ones_like(x) for ratio, x, e in readings]
+
+    def levels(self, errors: Sequence[Array]) -> Array:
+        """Return G of every signal, shape (s,)."""
+        return np.exp(self._grouped_means([np.log(w) for w in self.growth(errors)]))
+
+    def weigh(self, errors: Sequence[Array]) -> list[Array]:
+        """Return the residuals G e / w."""
+        rows = zip(self.levels(errors), self.growth(errors), errors, strict=True)
+        return [level / w * e for level, w, e in rows]
+
+    def weigh_slopes(self, errors: Sequence[Array], slopes: Sequence[Array]) -> list[Array]:
+        """Return the derivatives of the residuals from those of the errors, shape (m, p) each."""
+        rows = list(zip(self.levels(errors), self.growth(errors), self.measured, errors, slopes, strict=True))
+        # Of log w, as what is computed falls where the error rises.
+        by_log = [-((k / w) ** 2 * (x - e))[:, None] * j for k, (_, w, x, e, j) in zip(self._ratios, rows, strict=True)]
+        means = self._grouped_means(by_log)
+        pairs = zip(rows, by_log, means, strict=True)
+        return [(g / w)[:, None] * (j + e[:, None] * (mean - log)) for (g, w, _, e, j), log, mean in pairs]
+
+    def _grouped_means(self, values: Sequence[Array]) -> Array:
+        """Return the mean of all values of its group for every signal."""
+        count = np.bincount(self.groups, [len(v) for v in values])
+        sums = np.array([np.sum(v, axis=0) for v in values])
+        totals = np.zeros((len(count), *sums.shape[1:]))
+        np.add.at(totals, self.groups, sums)
+        return np.asarray((totals.T / np.maximum(count, 1)).T[self.groups])
 
 
 def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -34,3 +109,9 @@ def minus_twice_likelihood(
     value = np.sum(count[there] * np.log(np.maximum(np.maximum(square, least)[there], 1e-300)))
     known = there & (square < least)
     return float(value + np.sum(count[known] * (square[known] / least[known] - 1.0)))
+
+
+def means_of(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
+    """Return means of consecutive samples."""
+    pairs = zip(values, counts, strict=True)
+    return [e[: len(e) // n * n].reshape(-1, n, *e.shape[1:]).mean(axis=1) for e, n in pairs]

@@ -101,6 +101,7 @@ def _signal(
         replicate,
         ordered=not steady,
         least_noise=recording.settings.outputs[name].least_noise,
+        noise_share=recording.settings.outputs[name].noise_share,
     )
 
 

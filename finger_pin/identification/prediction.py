@@ -114,12 +114,13 @@ def predictions(
     signals: list[dict[str, Any]] = []
     for recording in recordings:
         problem, z, spread = _problem(result, scenario, recording, finger)
-        computed = zip(problem.signals, problem.residuals(z), problem.slopes(z), strict=True)
+        residuals = problem.errors(z)
+        growth = problem.growth.growth(residuals)
+        computed = zip(problem.signals, residuals, problem.error_slopes(z), growth, strict=True)
         rows_by_signal: dict[str, list[Array]] = {}
-        for signal, residual, slopes in computed:
-            deviation = np.sqrt(
-                _noise(result, recording.name, signal.name) ** 2 + np.sum(slopes @ spread * slopes, axis=1)
-            )
+        for signal, residual, slopes, grown in computed:
+            noise = _noise(result, recording.name, signal.name) * grown
+            deviation = np.sqrt(noise**2 + np.sum(slopes @ spread * slopes, axis=1))
             value = np.where(np.isfinite(residual), signal.measured - residual, np.nan)
             rows = np.stack([signal.instant, signal.load, signal.measured, value, _BAND * deviation])
             rows_by_signal.setdefault(signal.name, []).append(rows)

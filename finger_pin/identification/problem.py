@@ -15,7 +15,7 @@ from finger_pin.core.threads import in_threads
 from finger_pin.description.parametrised_scenario import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.likelihood import minus_twice_likelihood
+from finger_pin.identification.likelihood import NoiseGrowth, means_of, minus_twice_likelihood
 from finger_pin.identification.limits import Limits
 from finger_pin.identification.recordings import At, RecordedSignal, RecordingModel, unit_of
 from finger_pin.identification.scenario_parameters import (
@@ -74,6 +74,7 @@ class Problem:
     def __post_init__(self) -> None:
         """Check that every key allows its bounds; nuisance parameters of the recordings join the parameters."""
         self.asked = len(self.keys)
+        self.growth = NoiseGrowth.from_signals(self.signals, self.groups)
         self._slopes: tuple[Array, list[Array]] | None = None
         further = [
             nuisance for model in self.models for nuisance in model.nuisance_parameters if nuisance.key not in self.keys
@@ -138,8 +139,8 @@ class Problem:
 
     @property
     def least_noise(self) -> Array:
-        """The least standard deviation of every signal, shape (s,), in its unit."""
-        return np.array([signal.least_noise for signal in self.signals])
+        """The least standard deviation of the residuals of every signal, shape (s,), in its unit."""
+        return self.growth.floor
 
     def to_search(self, values: Array) -> Array:
         """Return the search variables of values: logarithms of positive ones."""
@@ -156,6 +157,20 @@ class Problem:
         return self.to_search(self.low), self.to_search(self.high)
 
     def residuals(self, z: Array) -> list[Array]:
+        """Return the residuals of every signal, shape (m,) each; infinite where values do not go together.
+
+        They are measured less computed, where noise grows with readings over that growth.
+        """
+        errors = self.errors(z)
+        if not all(np.isfinite(e).all() for e in errors):
+            return self._smooth(errors)
+        residuals = self._smooth(self.growth.weigh(errors) if self.growth.acts else errors)
+        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.groups, self.least_noise)
+        if objective < self.best[0]:
+            self.best = (objective, z.copy())
+        return residuals
+
+    def errors(self, z: Array) -> list[Array]:
         """Return measured less computed of every signal, shape (m,) each; infinite where values do not go together."""
         if self.stop():
             raise Stopped
@@ -164,23 +179,25 @@ class Problem:
         try:
             places = [at(values) for at in self._places()]
         except InputError:
-            return self._smooth([np.full(len(s.measured), np.inf) for s in self.signals])
+            return [np.full(len(s.measured), np.inf) for s in self.signals]
         pairs = list(zip(self.models, places, strict=True))
         # Closed forms hold Python's lock.
         by_model = in_threads(_compute, pairs) if self.moves else map(_compute, pairs)
         computed = [output for outputs in by_model for output in outputs]
-        residuals = self._smooth([s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)])
-        if not all(np.isfinite(e).all() for e in residuals):
-            return [np.full(len(e), np.inf) for e in residuals]
-        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.groups, self.least_noise)
-        if objective < self.best[0]:
-            self.best = (objective, z.copy())
-        return residuals
+        errors = [s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)]
+        return errors if all(np.isfinite(e).all() for e in errors) else [np.full(len(e), np.inf) for e in errors]
 
     def slopes(self, z: Array) -> list[Array]:
         """Return the derivatives of the residuals by z, shape (m, p) each."""
         if self._slopes is not None and np.array_equal(self._slopes[0], z):
             return self._slopes[1]
+        slopes = self.error_slopes(z)
+        slopes = self._smooth(self.growth.weigh_slopes(self.errors(z), slopes) if self.growth.acts else slopes)
+        self._slopes = (z.copy(), slopes)
+        return slopes
+
+    def error_slopes(self, z: Array) -> list[Array]:
+        """Return the derivatives of measured less computed by z, shape (m, p) each."""
         if self.stop():
             raise Stopped
         values = self.values(z)
@@ -192,9 +209,7 @@ class Problem:
         ]
         self.evaluations += 2 * len(z)
         stretch = np.where(self.logarithmic, values, 1.0)
-        slopes = self._smooth([-each[s.rows] * stretch for each, s in zip(derivatives, self.signals, strict=True)])
-        self._slopes = (z.copy(), slopes)
-        return slopes
+        return [-each[s.rows] * stretch for each, s in zip(derivatives, self.signals, strict=True)]
 
     def alone(self) -> Problem:
         """Return a copy of the problem with separate memory, for another thread."""
@@ -224,7 +239,7 @@ class Problem:
 
     def averaged(self, values: Sequence[Array]) -> list[Array]:
         """Return the means that count roughly of residuals of every signal, or of their slopes."""
-        return _means(values, self._stretches())
+        return means_of(values, self._stretches())
 
     def _stretches(self) -> list[int]:
         """Return the number of samples in a row whose mean counts in rough searches, by signal."""
@@ -242,7 +257,7 @@ class Problem:
 
     def _smooth(self, values: list[Array]) -> list[Array]:
         """Return means of as many samples in a row as are asked for."""
-        return _means(values, self.means) if self.means else values
+        return means_of(values, self.means) if self.means else values
 
     def join(self, twin: Problem) -> None:
         """Add the evaluations of a twin, and take its best point if that is better, or if there is none yet."""
@@ -282,9 +297,3 @@ def _compute(pair: tuple[RecordingModel, tuple[Scenario, dict[str, float]]]) -> 
     """Return the outputs of a recording at a place."""
     model, place = pair
     return model.compute(*place)
-
-
-def _means(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
-    """Return means of consecutive samples."""
-    pairs = zip(values, counts, strict=True)
-    return [e[: len(e) // n * n].reshape(-1, n, *e.shape[1:]).mean(axis=1) for e, n in pairs]

@@ -67,6 +67,7 @@ class RecordedSignal:
         replicate: The number of the group of equal readings that each is of, shape (m,).
         ordered: Whether its samples follow each other in time, so that neighbours may err alike.
         least_noise: Standard deviation that its noise has at least, in its unit.
+        noise_share: Part of a reading by which its noise grows.
     """
 
     recording: str
@@ -79,6 +80,7 @@ class RecordedSignal:
     replicate: NDArray[np.intp]
     ordered: bool
     least_noise: float = 0.0
+    noise_share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

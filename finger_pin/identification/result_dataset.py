@@ -142,6 +142,11 @@ def _units(problem: Problem, key: str) -> str:
 def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]:
     signals, groups = problem.signals, problem.groups
     grown = np.ones(len(signals)) if naive is None else SmallSample.from_fit(problem, best, naive).noise
+    errors, noise = best.residuals, best.noise
+    if problem.growth.acts:
+        errors = problem.errors(best.z)
+        # That of a reading of zero.
+        noise = best.noise / problem.growth.levels(errors)
     # The first of every output's windows stands for what they share.
     first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
     known = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}
@@ -150,7 +155,7 @@ def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]
         "instant": np.concatenate([s.instant for s in signals]),
         "applied": np.concatenate([s.load for s in signals]),
         "measured": np.concatenate([s.measured for s in signals]),
-        "residual": np.concatenate(best.residuals),
+        "residual": np.concatenate(errors),
         "outlier": np.concatenate(outliers(problem, best.residuals)),
     }
     names = {
@@ -164,10 +169,10 @@ def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]
     return {
         "signal_units": ("signal", [signals[k].unit for k in first]),
         "signal_steady": ("signal", [not signals[k].ordered for k in first]),
-        "noise": ("signal", best.noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
+        "noise": ("signal", noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
         "noise_deviation": (
             "signal",
-            (best.noise * grown)[first],
+            (noise * grown)[first],
             {"long_name": "deviation of further readings, of which 95 % are within 1.96 of it"},
         ),
         "replicate_noise": (

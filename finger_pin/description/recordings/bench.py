@@ -69,6 +69,9 @@ class Column(Description):
     least_noise: Annotated[float, real(0.0, 1e12)] = quantity(
         0.0, unit="SI", source="the sensor", doc="Outputs: the standard deviation that the fit must not go below."
     )
+    noise_share: Annotated[float, real(0.0, 1.0)] = quantity(
+        0.0, unit="1", source="the sensor", doc="Outputs: part of a reading by which noise grows, beside least_noise."
+    )
     delay: Annotated[float, real(-10.0, 10.0)] = quantity(
         0.0, unit="s", source="calibration", doc="Delay of the column behind its quantity; motions only."
     )
@@ -79,6 +82,12 @@ class Column(Description):
         source="the encoder",
         doc="Inputs joint_position of motions: rms by which a smooth curve passes beside the readings; 0: through all.",
     )
+
+    @model_validator(mode="after")
+    def _has_floor(self) -> Self:
+        if self.noise_share and not self.least_noise:
+            raise problem("noise_share", "needs least_noise, that of a reading of zero", self.noise_share)
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -161,8 +170,9 @@ class RecordingSettings(TableFormat):
             raise problem("parameters", "are for a recording that is fitted, and this one is held out")
         _check_ordered(self.parameters)
         for name, column in {**{f"inputs.{k}": c for k, c in self.inputs.items()}, "time": self.time}.items():
-            if column is not None and column.least_noise:
-                raise problem(f"{name}.least_noise", "is for outputs only", column.least_noise)
+            for key in ("least_noise", "noise_share"):
+                if column is not None and getattr(column, key):
+                    raise problem(f"{name}.{key}", "is for outputs only", getattr(column, key))
         for key, value in self.values.items():
             if isinstance(value, dict):
                 raise problem(f"values.{key}", "must be one value, not a table: write its dotted key in quotes")
