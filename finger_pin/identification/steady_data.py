@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from finger_pin.analysis import steady_state
+from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import At, Recording, check_pulling
@@ -18,7 +19,7 @@ from finger_pin.typing import Array
 
 # Change of a number that slopes are taken by, of its size or its range.
 _CHANGE = 1e-5
-_POSTURE = "joint_position"
+_POSTURE, _WINDING = "joint_position", "tendon_winding"
 _OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current", _POSTURE)
 
 
@@ -27,7 +28,8 @@ class SteadyReadings:
 
     Attributes:
         recording: The recording.
-        load: The pull at the entrance of the canals, shape (m, a), N.
+        load: The pull at the entrance of the canals, N, or of wound tendons the length, m, shape (m, a).
+        wound: Names of the tendons that a winch winds.
         scenario: Whose states they are.
         nuisance_parameters: Nothing is to be found for them alone.
     """
@@ -39,6 +41,8 @@ class SteadyReadings:
             InputError: If one names nothing that the scenario has, if the tension of a tendon is missing, if all of
                 one are negative, or if no one direction of sliding tells where joints come to rest.
         """
+        self.wound = tuple(name.partition(".")[2] for name in recording.inputs if name.startswith(f"{_WINDING}."))
+        scenario = _with_windings(scenario, self.wound)
         self.recording, self.scenario, finger = recording, scenario, scenario.finger
         self._replacing = replacing
         self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
@@ -57,12 +61,16 @@ class SteadyReadings:
                 place = self._place(f"inputs.{name}", label, tendons)
                 self.load[:, place] = values
                 self._inputs.append((name, self.load, place))
+            elif variable == _WINDING:
+                place = self._place(f"inputs.{name}", label, tendons)
+                self.load[:, place] = values
+                self._inputs.append((name, self.load, place))
             elif variable == "joint_position":
                 place = self._place(f"inputs.{name}", label, joints)
                 self._position[:, place] = values
                 self._inputs.append((name, self._position, place))
             else:
-                allowed = "a steady state is given tendon_command, spool_tension and joint_position"
+                allowed = "a steady state is given tendon_command, spool_tension, tendon_winding and joint_position"
                 raise InputError(f"{self._entry}.inputs.{name}", allowed)
         places = {"motor_current": list(finger.actuators), _POSTURE: joints}
         self._outputs = []
@@ -75,6 +83,9 @@ class SteadyReadings:
             if variable == _POSTURE:
                 recorded = recording.outputs[name]
                 self._position[:, place] = np.where(np.isfinite(recorded), recorded, self._position[:, place])
+        if self.wound and (recording.settings.speed is not None or {each for each, _ in self._outputs} != {_POSTURE}):
+            allowed = "tells postures without friction: joint_position is compared, without a speed"
+            raise InputError(f"{self._entry}.inputs.{_WINDING}.{self.wound[0]}", allowed)
         self._settles = any(variable == _POSTURE for variable, _ in self._outputs)
         if self._settles:
             self._check_direction()
@@ -135,11 +146,11 @@ class SteadyReadings:
         for name, group, place in self._inputs:
             scale = nuisance_value(nuisance, self.recording.name, name, "scale", 1.0)
             values = scale * group[:, place] + nuisance_value(nuisance, self.recording.name, name, "offset")
-            if group is self.load:
+            if group is self.load and not name.startswith(f"{_WINDING}."):
                 # A tendon only pulls: what a wrong zero takes below it is a slack one.
                 load[:, place] = np.maximum(values, 0.0)
             else:
-                position[:, place] = values
+                (load if group is self.load else position)[:, place] = values
         return load, position
 
     def _finger(self, scenario: Scenario) -> Finger:
@@ -180,3 +191,15 @@ class SteadyReadings:
         if label not in names:
             raise InputError(f"{self._entry}.{where}", f"there is no {label}; there are {', '.join(names) or 'none'}")
         return names.index(label)
+
+
+def _with_windings(scenario: Scenario, tendons: Sequence[str]) -> Scenario:
+    """Return a scenario with winches at some tendons; what they wind is given by the readings."""
+    if not tendons:
+        return scenario
+    table = scenario.model_dump(mode="python", exclude_unset=True, exclude_none=True)
+    controller = table.setdefault("controller", {})
+    for name in tendons:
+        controller.get("tensions", {}).pop(name, None)
+        controller.setdefault("tendon_winding", {})[name] = {"offset": 0.0}
+    return read_scenario(table)

@@ -91,3 +91,33 @@ def test_postures_whose_friction_is_not_told_are_refused_in_one_line(change, ove
     with pytest.raises(fp.InputError) as refused:
         fp.identify("canal", **given, overrides=overrides)
     assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_springs_come_from_what_a_winch_winds_as_its_cord_shares_it(tmp_path):
+    """T = K (w - sum r q) and k q = r T: the angles of three joints on one cord, of which one spring is weighed."""
+    (tmp_path / "three.toml").write_text(THREE)
+    wound, cord = np.array([0.002, 0.004, 0.006, 0.008, 0.01]), 4000.0
+    tension = cord * wound / (1.0 + cord * sum(RADIUS[name] ** 2 / SPRING[name] for name in RADIUS))
+    noise = np.random.default_rng(4).normal(0.0, 1e-4, (3, wound.size))
+    angles = {name: RADIUS[name] * tension / SPRING[name] + e for name, e in zip(RADIUS, noise, strict=True)}
+    recording = {
+        "kind": "steady",
+        "inputs": {"tendon_winding.flexor": {"column": "w", "unit": "mm"}},
+        "outputs": {f"joint_position.{name}": {"column": name, "unit": "rad"} for name in RADIUS},
+    }
+    given = {
+        "parameters": {f"finger.joints.{name}.spring.stiffness": (0.02, 1.0) for name in ("pip", "dip")},
+        "data": {"settled": {"w": 1e3 * wound, **angles}},
+        "overrides": {
+            "finger.tendons.flexor.winch.stiffness": cord,
+            "finger.joints.mcp.spring.stiffness": SPRING["mcp"],
+        },
+        "starts": 1,
+    }
+    bench = str(tmp_path / "three.toml")
+    found = fp.identify(bench, recordings={"settled": recording}, **given)
+    np.testing.assert_allclose(found.estimate, [SPRING["pip"], SPRING["dip"]], rtol=5e-3)
+    assert np.all((found.upper - found.lower) < 0.02 * found.estimate)
+    for change in ({"speed": 0.1}, {"outputs": {"tendon_tension.flexor": "w"}, "speed": 0.1}):
+        with pytest.raises(fp.InputError, match="tells postures without friction"):
+            fp.identify(bench, recordings={"settled": recording | change}, **given)
