@@ -98,8 +98,7 @@ LAWS: dict[str, dict[str, Law | str]] = {
     "transmission": {
         # A fit needs a number: a millinewton is none.
         "none": Law({f"{_TENDON}coulomb": 0.0}, {f"{_TENDON}drag": (0.0, 1e-3)}),
-        # From where it shows: a drag below the floor of the law does nothing.
-        "constant": Law({f"{_TENDON}coulomb": 0.0, f"{_TENDON}drag": 1.0}, {f"{_TENDON}drag": (0.0, 10.0)}),
+        "constant": Law({f"{_TENDON}coulomb": 0.0, f"{_TENDON}drag": 0.0}, {f"{_TENDON}drag": (0.0, 10.0)}),
         "constant, viscous": "constant",
         "LuGre without load": "constant",
         "capstan without bristle": Law({f"{_TENDON}drag": 0.0}),

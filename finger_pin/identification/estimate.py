@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
-from scipy.stats import norm
 
-from finger_pin.identification.likelihood import minus_twice_likelihood, pooled
+from finger_pin.identification.likelihood import minus_twice_likelihood, pooled, typical
 from finger_pin.identification.problem import Problem
 from finger_pin.typing import Array
 
@@ -29,8 +28,9 @@ _RADIUS, _LEAST_RADIUS = 0.3, 1e-6
 _RATIO = 0.25
 # Gain per sample that errors of slopes promise: slopes that searches ask for err by 0.01 to 0.03, and this is squared.
 _FEIGNED = 1e-3
-# Median size of what is normally distributed with a deviation of one.
-_MEDIAN = float(norm.ppf(0.75))
+# Part of the largest reading that a parameter must move, all over its bounds, to be felt by a signal; and the shares of
+# the bounds at which searches go on for parameters that nothing feels where one has ended.
+_FELT, _SHARES = 1e-9, (0.5, 0.9, 0.1)
 #: What a squared residual u counts for where outliers are to count less, and how fast that grows.
 LOSSES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
     "linear": (lambda u: u, np.ones_like),
@@ -110,6 +110,29 @@ def fit(
     used = noise if scale is None else scale
     objective = _objective(problem, _counted(residuals, used, loss)[0], shares, used, loss)
     return Fit(z, residuals, noise, correlation, shares, objective, slopes, ended)
+
+
+def fit_off_flats(problem: Problem, start: Array, loss: str = "linear") -> Fit:
+    """Return the minimum that is reached from a start, and from beside it where nothing feels some parameters.
+
+    No step moves what has no slope there, such as a friction below the floor of its law.
+    """
+    best, (low, high) = fit(problem, start, loss=loss), problem.box
+    for share in _SHARES:
+        flat = np.zeros(len(start), dtype=bool) if best.slopes is None else ~felt(problem, best.slopes)
+        if not flat.any():
+            break
+        beside = fit(problem, np.where(flat, low + (high - low) * share, best.z), loss=loss)
+        best = best_of(problem, [best, beside])
+    return best
+
+
+def felt(problem: Problem, slopes: Sequence[Array]) -> NDArray[np.bool_]:
+    """Return which parameters move a signal where residuals have some slopes, shape (p,)."""
+    width = np.subtract(*reversed(problem.box))
+    sizes = [max(float(np.max(np.abs(signal.measured), initial=0.0)), 1e-300) for signal in problem.signals]
+    pairs = zip(slopes, sizes, strict=True)
+    return np.asarray(np.any([np.any(np.abs(j) * width > _FELT * size, axis=0) for j, size in pairs], axis=0))
 
 
 def _descend(
@@ -249,18 +272,11 @@ def information(problem: Problem, minimum: Fit) -> Array:
     return total
 
 
-def typical(problem: Problem, residuals: Sequence[Array]) -> Array:
-    """Return the deviation of the residuals of every signal's output by their median, which outliers hardly change."""
-    groups = problem.groups
-    sizes = [np.abs(np.concatenate([e for e, g in zip(residuals, groups, strict=True) if g == k])) for k in groups]
-    return np.array([np.median(each) / _MEDIAN if len(each) else 1.0 for each in sizes])
-
-
 def _noise(problem: Problem, residuals: Sequence[Array], robust: bool = False) -> Array:
     """Return the rms of the residuals of every output, or that of their median; never below its least, or rounding."""
     groups = problem.groups
     count, square = pooled(residuals, np.ones(len(residuals)), groups)
-    rms = typical(problem, residuals) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
+    rms = typical(residuals, groups) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
     rounding = [1e-9 * max(float(np.max(np.abs(s.measured), initial=0.0)), 1e-9) for s in problem.signals]
     return np.maximum(rms, np.maximum(problem.least_noise, rounding))
 

@@ -8,9 +8,13 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from finger_pin.identification.recordings import RecordedSignal
 from finger_pin.typing import Array
+
+# Median size of what is normally distributed with a deviation of one.
+_MEDIAN = float(norm.ppf(0.75))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +96,12 @@ def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp])
         count[group] += w * len(e)
         squares[group] += w * float(e @ e)
     return count, squares / np.maximum(count, 1e-300)
+
+
+def typical(residuals: Sequence[Array], groups: NDArray[np.intp]) -> Array:
+    """Return the deviation of the residuals of every signal's output by their median, which outliers hardly change."""
+    sizes = [np.abs(np.concatenate([e for e, g in zip(residuals, groups, strict=True) if g == k])) for k in groups]
+    return np.array([np.median(each) / _MEDIAN if len(each) else 1.0 for each in sizes])
 
 
 def minus_twice_likelihood(

@@ -13,8 +13,9 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 from scipy.stats import t as student
 
-from finger_pin.identification.estimate import Fit, typical
+from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import information_of_bounds
+from finger_pin.identification.likelihood import typical
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording
 from finger_pin.typing import Array
@@ -88,7 +89,7 @@ def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:
     """
     ratios, groups = [], problem.groups
     count = np.bincount(groups, [len(e) for e in residuals])[groups]
-    for e, n, deviation in zip(residuals, count, typical(problem, residuals), strict=True):
+    for e, n, deviation in zip(residuals, count, typical(residuals, groups), strict=True):
         ratio = np.abs(e) / max(deviation, 1e-300)
         chance = 2.0 * n * student.sf(ratio, max(n - len(problem.keys), 1.0))
         ratios.append(np.where((chance < CHANCE) & (ratio**2 > n), ratio, 0.0))

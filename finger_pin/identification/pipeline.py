@@ -17,7 +17,7 @@ from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.exceptions import InputError
 from finger_pin.identification.checkpoint import Checkpoint
 from finger_pin.identification.comparison import LawComparison, compare_laws
-from finger_pin.identification.estimate import Fit, best_of, fit
+from finger_pin.identification.estimate import Fit, best_of, felt, fit, fit_off_flats
 from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, profile
 from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.misfit import sandwich
@@ -93,7 +93,7 @@ class FitPipeline:
         def one(item: tuple[int, Problem]) -> None:
             k, twin = item
             start = self.ledger.reached(f"start {k}", starts[k])
-            minima[k] = self.ledger.fit(f"start {k}", twin, partial(fit, twin, start, loss=self.loss))
+            minima[k] = self.ledger.fit(f"start {k}", twin, partial(fit_off_flats, twin, start, self.loss))
 
         try:
             self._side_by_side("searching", one, len(starts))
@@ -116,7 +116,7 @@ class FitPipeline:
 
         def one(item: tuple[int, Problem]) -> None:
             k, twin = item
-            work = partial(fit, twin, self.ledger.reached(f"rough {k}", starts[k]), loss=self.loss)
+            work = partial(fit_off_flats, twin, self.ledger.reached(f"rough {k}", starts[k]), self.loss)
             minima[k] = self.ledger.fit(f"rough {k}", twin, work)
 
         self._side_by_side("searching roughly", one, len(starts), rough)
@@ -232,26 +232,23 @@ def _met(problem: Problem, residuals: Sequence[Array]) -> float:
 
 
 def _check_felt(problem: Problem, fits: Sequence[Fit], places: Sequence[Array]) -> None:
-    felt = np.zeros(len(problem.keys), dtype=bool)
+    moving, (low, high) = np.zeros(len(problem.keys), dtype=bool), problem.box
     known = (each.slopes or problem.slopes(each.z) for each in fits)
-    for by_signal in itertools.chain(known, map(problem.slopes, places)):
-        for signal, slopes in zip(problem.signals, by_signal, strict=True):
-            size = max(float(np.max(np.abs(signal.measured), initial=0.0)), 1e-300)
-            low, high = problem.box
-            felt |= np.any(np.abs(slopes) * (high - low) > 1e-9 * size, axis=0)
-        if felt.all():
+    for slopes in itertools.chain(known, map(problem.slopes, places)):
+        moving |= felt(problem, slopes)
+        if moving.all():
             return
     best = best_of(problem, fits)
-    for k in np.flatnonzero(~felt):
+    for k in np.flatnonzero(~moving):
         # What is not felt at one place may be at another, such as friction that holds wherever searches have been.
         for share in np.linspace(0.0, 1.0, _PLACES):
             place = best.z.copy()
             place[k] = low[k] + share * (high - low)[k]
             moved = problem.residuals(problem.feasible(place))
-            felt[k] |= not all(map(np.array_equal, moved, best.residuals))
-    if felt.all():
+            moving[k] |= not all(map(np.array_equal, moved, best.residuals))
+    if moving.all():
         return
-    key = problem.keys[int(np.flatnonzero(~felt)[0])]
+    key = problem.keys[int(np.flatnonzero(~moving)[0])]
     raise InputError(entry_of(key), "no output of any recording feels it, at no value in its bounds; leave it out")
 
 
@@ -267,7 +264,7 @@ def beside(problem: Problem, z: Array) -> list[Array]:
         size * sum(j.T @ j / max(float(np.mean(e * e)), 1e-300) for e, j in zip(*each, strict=True))
         for each in ((residuals, slopes), (problem.averaged(residuals), problem.averaged(slopes)))
     )
-    rounding = 1e-12 * np.trace(by_samples) * np.eye(len(z))
+    rounding = max(1e-12 * np.trace(by_samples), 1e-300) * np.eye(len(z))
     values, vectors = eigh(by_means + rounding, by_samples + rounding)
     lines = []
     for value, vector in zip(values[:_LINES], vectors.T[:_LINES], strict=True):

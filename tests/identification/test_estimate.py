@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import norm
 
+import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.identification.estimate import LOSSES, fit
 from finger_pin.identification.models import build_problem
@@ -51,6 +52,51 @@ def test_a_minimum_is_that_of_least_squares_with_the_same_loss_and_bounds(loss, 
         )
         assert found.converged
         np.testing.assert_allclose(problem.values(found.z), expected.x, rtol=2e-4)
+
+
+COLUMNS = {"inputs": {"tendon_command.T1": "in"}, "outputs": {"tendon_tension.T1": "out"}}
+
+
+@pytest.mark.parametrize("coulomb", [None, (0.0, 1.0)], ids=["drag alone", "drag and coefficient"])
+def test_a_search_that_starts_below_the_floor_of_the_law_ends_at_the_least_squares_of_readings(coulomb):
+    """Without friction all readings are their loads: no number has a slope there. In minus out has the drag as mean."""
+    measured = delivered((0.12 if coulomb else 0.0, 0.4)) + np.random.default_rng(6).normal(0.0, 0.05, LOAD.size)
+    entries = {COULOMB: 0.0, DRAG: 0.0, "finger.tendons.T1.curvature_offset": TURN}
+    result = fp.identify(
+        "canal",
+        parameters={DRAG: (0.0, 3.0)} | ({COULOMB: coulomb} if coulomb else {}),
+        recordings={"pull": {"kind": "steady", "speed": 0.05, **COLUMNS}},
+        data={"pull": {"in": LOAD, "out": measured}},
+        overrides=entries,
+        starts=1,
+        profiles=False,
+    )
+    estimate = dict(zip(result.parameter.values, result.estimate.values, strict=True))
+    if coulomb is None:
+        assert estimate[DRAG] == pytest.approx(np.mean(LOAD - measured), rel=1e-6)
+        assert float(result.noise[0]) == pytest.approx(np.std(LOAD - measured), rel=1e-6)
+        return
+    slope, offset = np.polyfit(LOAD, measured, 1)
+    assert estimate[COULOMB] == pytest.approx(-np.log(slope) / TURN, rel=1e-5)
+    assert estimate[DRAG] == pytest.approx(-offset * (1.0 + np.tanh(-np.log(slope) / 2.0)), rel=1e-4)
+
+
+def test_a_search_that_starts_below_the_floor_of_the_law_ends_at_the_least_squares_of_a_motion():
+    time = np.arange(0.0, 1.01, 0.02)
+    pull = 3.0 + 4.0 * time
+    measured = pull - 0.4 + np.random.default_rng(7).normal(0.0, 0.02, time.size)
+    late = time >= 0.3 - 1e-9
+    result = fp.identify(
+        "canal",
+        parameters={DRAG: (0.0, 3.0)},
+        recordings={"pull": {"time": "t", "settle": 0.3, **COLUMNS}},
+        data={"pull": {"t": time, "in": pull, "out": measured}},
+        overrides={COULOMB: 0.0, DRAG: 0.0},
+        starts=1,
+        profiles=False,
+    )
+    # Bristles and viscous friction take some millinewtons.
+    assert float(result.estimate[0]) == pytest.approx(np.mean((pull - measured)[late]), abs=5e-3)
 
 
 def test_starts_fill_the_bounds_evenly_and_again_alike_from_the_same_seed():
