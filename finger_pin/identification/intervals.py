@@ -45,22 +45,27 @@ class ProfileBound:
 
 
 def covariance(problem: Problem, minimum: Fit) -> Array:
-    """Return the linearised covariance of z, shape (p, p); no direction is less sure than its bounds are wide."""
-    values, vectors, size = _directions(problem, minimum)
+    """Return the linearised covariance of z, shape (p, p)."""
+    return inverse_within_bounds(problem, information(problem, minimum))
+
+
+def inverse_within_bounds(problem: Problem, known: Array) -> Array:
+    """Return the covariance of z by an information, shape (p, p); no direction is less sure than bounds are wide."""
+    values, vectors, size = _directions(problem, known)
     return np.asarray((vectors / np.maximum(values, 1.0)) @ vectors.T * size)
 
 
 def information_of_bounds(problem: Problem, minimum: Fit) -> Array:
     """Return the information of z that bounds add to that of the recordings, shape (p, p)."""
-    values, vectors, size = _directions(problem, minimum)
+    values, vectors, size = _directions(problem, information(problem, minimum))
     return np.asarray((vectors * np.maximum(1.0 - values, 0.0)) @ vectors.T / size)
 
 
-def _directions(problem: Problem, minimum: Fit) -> tuple[Array, Array, Array]:
-    """Return eigenvalues and eigenvectors of the scaled information, and the products of ranges that scale it."""
+def _directions(problem: Problem, known: Array) -> tuple[Array, Array, Array]:
+    """Return eigenvalues and eigenvectors of scaled information, and the products of ranges that scale it."""
     width = np.subtract(*reversed(problem.box))
     size = np.outer(width, width)
-    return *np.linalg.eigh(information(problem, minimum) * size), size
+    return *np.linalg.eigh(known * size), size
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +76,13 @@ class SmallSample:
         variance: Factors on the variance of every parameter for the same 95 % of a normal distribution, shape (p,).
         level: Rise of minus twice the likelihood at an end of each interval, shape (p,).
         noise: Factors on the noise of every signal, for 95 % of further readings, shape (s,).
+        elsewhere: The same on the mean square of the noises of a name, for readings of other recordings, shape (s,).
     """
 
     variance: Array
     level: Array
     noise: Array
+    elsewhere: Array
 
     @classmethod
     def from_fit(cls, problem: Problem, minimum: Fit, spread: Array) -> Self:
@@ -91,7 +98,8 @@ class SmallSample:
             parts[group] += w / n**2 * j.T @ j
             count[group] += w * len(e)
         # Correlated samples may count for less than the parameters that they are to tell.
-        left = np.maximum(count - np.einsum("kl,glk->g", spread, parts), 1.0)
+        told = np.einsum("kl,glk->g", spread, parts)
+        left = np.maximum(count - told, 1.0)
         plain = np.einsum("kl,glm,mk->gk", spread, parts, spread)
         grown = plain * (count / left)[:, None]
         whole, corrected = np.maximum(plain.sum(axis=0), 1e-300), np.maximum(grown.sum(axis=0), 1e-300)
@@ -101,7 +109,28 @@ class SmallSample:
             factor * quantile**2 / LEVEL,
             factor * free * np.log1p(quantile**2 / free),
             (np.sqrt(count / left / LEVEL) * student.ppf(0.975, left))[groups],
+            _elsewhere(problem, minimum, count, told)[groups],
         )
+
+
+def _elsewhere(problem: Problem, minimum: Fit, count: Array, told: Array) -> Array:
+    """Return factors on the mean square noise of a name for readings of other recordings, for 95 % of them, by output.
+
+    Samples that follow each other are hardly more than one, so that one recording tells its noise badly: the mean of
+    several has their degrees of freedom (Satterthwaite).
+
+    Args:
+        problem: The problem that was fitted.
+        minimum: Of the problem.
+        count: Number of independent samples of every output.
+        told: Number of parameters that every output tells.
+    """
+    first = [int(np.flatnonzero(problem.groups == group)[0]) for group in range(len(count))]
+    names, square = [problem.signals[k].name for k in first], minimum.noise[first] ** 2
+    alike = np.array([[one == other for other in names] for one in names])
+    ratio = alike @ count / np.maximum(alike @ (count - told), 1.0)
+    freedom = np.maximum((alike @ square) ** 2 / (ratio * (alike @ (square**2 / np.maximum(count, 1e-300)))), 1.0)
+    return np.asarray(np.sqrt(ratio / LEVEL) * student.ppf(0.975, freedom))
 
 
 def profile(

@@ -14,7 +14,7 @@ from scipy.stats import f as f_distribution
 from scipy.stats import t as student
 
 from finger_pin.identification.estimate import Fit
-from finger_pin.identification.intervals import information_of_bounds
+from finger_pin.identification.intervals import information_of_bounds, inverse_within_bounds
 from finger_pin.identification.likelihood import typical
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording
@@ -80,6 +80,34 @@ def sandwich(problem: Problem, minimum: Fit, spread: Array) -> Array:
         process = _process([minimum.residuals[k] for k in single if problem.signals[k].ordered])
         total += sum(minimum.noise[k] ** 2 * _correlated(scores[k], process) for k in single)
     return np.asarray(spread @ total @ spread)
+
+
+def jackknife(problem: Problem, minimum: Fit) -> Array:
+    """Return the covariance of z by leaving out one setting at a time, shape (p, p); zero of less than three settings.
+
+    Settings are the recordings or, of less than three, the loads of their readings. What a model misses is shared by
+    the samples of a setting, and no noise of samples. The estimate without one follows from its information h and score
+    s, by (H - h)^-1 s (Bell and McCaffrey, Survey Methodology 28, 2002); 1.96 deviations are as many as Student's t
+    asks for with a degree of freedom for every setting but one.
+    """
+    by_load = len({signal.recording for signal in problem.signals}) < 3
+    parts, scores = dict[tuple[str, float], Array](), dict[tuple[str, float], Array]()
+    far = outliers(problem, minimum.residuals)
+    usual = [np.where(ratio > 0.0, 0.0, e) for ratio, e in zip(far, minimum.residuals, strict=True)]
+    by_signal = zip(problem.signals, minimum.weights, minimum.noise, usual, problem.slopes(minimum.z), strict=True)
+    for signal, w, n, e, j in by_signal:
+        load = np.nan_to_num(signal.load) if by_load and not signal.ordered else np.zeros(len(e))
+        for each in np.unique(load):
+            rows, setting = load == each, (signal.recording, float(each))
+            parts[setting] = parts.get(setting, 0.0) + w / n**2 * j[rows].T @ j[rows]
+            scores[setting] = scores.get(setting, 0.0) + w / n**2 * j[rows].T @ e[rows]
+    count = len(parts)
+    if count < 3:
+        return np.zeros((len(minimum.z), len(minimum.z)))
+    whole, mean = np.sum(list(parts.values()), axis=0), np.mean(list(scores.values()), axis=0)
+    without = [inverse_within_bounds(problem, whole - parts[each]) @ (scores[each] - mean) for each in parts]
+    share = (count - 1) / count * (student.ppf(0.975, count - 1) / 1.96) ** 2
+    return np.asarray(share * np.transpose(without) @ without)
 
 
 def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:

@@ -113,14 +113,15 @@ def predictions(
     """
     signals: list[dict[str, Any]] = []
     for recording in recordings:
-        problem, z, spread = _problem(result, scenario, recording, finger)
+        problem, z, spreads = _problem(result, scenario, recording, finger)
         residuals = problem.errors(z)
         growth = problem.growth.growth(residuals)
         computed = zip(problem.signals, residuals, problem.error_slopes(z), growth, strict=True)
         rows_by_signal: dict[str, list[Array]] = {}
         for signal, residual, slopes, grown in computed:
             noise = _noise(result, recording.name, signal.name) * grown
-            deviation = np.sqrt(noise**2 + np.sum(slopes @ spread * slopes, axis=1))
+            unsure = np.max([np.sum(slopes @ spread * slopes, axis=1) for spread in spreads], axis=0)
+            deviation = np.sqrt(noise**2 + unsure)
             value = np.where(np.isfinite(residual), signal.measured - residual, np.nan)
             rows = np.stack([signal.instant, signal.load, signal.measured, value, _BAND * deviation])
             rows_by_signal.setdefault(signal.name, []).append(rows)
@@ -142,7 +143,7 @@ def predictions(
 def _problem(
     result: xr.Dataset, scenario: Scenario, recording: Recording, finger: Finger | None
 ) -> tuple[Problem, Array, Array]:
-    """Return the problem of the held-out part of a recording, the estimate, and its covariance."""
+    """Return the problem of the held-out part of a recording, the estimate, and its covariances, shape (2, p, p)."""
     models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
 
     def acts(key: str) -> bool:
@@ -160,22 +161,24 @@ def _problem(
     count, z = len(kept), problem.start.copy()
     z[:count] = problem.to_search(np.append(estimate, problem.values(z)[count:]))[:count]
     ends = problem.to_search(np.append(upper, problem.values(z)[count:]))[:count]
-    spread = np.zeros((len(z), len(z)))
-    correlation = result["correlation"].values[np.ix_(kept, kept)]
-    spread[:count, :count] = np.outer(ends - z[:count], ends - z[:count]) / _BAND**2 * correlation
+    spreads, square = np.zeros((2, len(z), len(z))), np.ix_(kept, kept)
+    correlation = result["correlation"].values[square]
+    spreads[0, :count, :count] = np.outer(ends - z[:count], ends - z[:count]) / _BAND**2 * correlation
+    # A result of an earlier version has none.
+    spreads[1, :count, :count] = result["jackknife"].values[square] if "jackknife" in result else 0.0
     # An identification that was stopped early knows no covariance: noise alone makes the band.
-    return problem, z, np.nan_to_num(spread, nan=0.0)
+    return problem, z, np.nan_to_num(spreads, nan=0.0)
 
 
 def _noise(result: xr.Dataset, recording: str, name: str) -> float:
-    """Return the deviation of a fitted signal: of the same recording, else the rms of those of the same name."""
-    values = zip(result["signal"].values, result["noise_deviation"].values, strict=True)
-    noise = {str(key): float(each) for key, each in values}
-    same_recording = noise.get(f"{recording}.{name}")
-    same_name = [each for key, each in noise.items() if key.partition(".")[2] == name]
-    if same_recording is not None:
-        return same_recording
-    return math.sqrt(sum(each**2 for each in same_name) / len(same_name)) if same_name else math.nan
+    """Return the deviation of a fitted signal: of the same recording, else that for others of the same name."""
+    # A result of an earlier version has no other.
+    elsewhere = "noise_elsewhere" if "noise_elsewhere" in result else "noise_deviation"
+    for key, name_of_deviation in ((f"{recording}.{name}", "noise_deviation"), (name, elsewhere)):
+        for signal, deviation in zip(result["signal"].values, result[name_of_deviation].values, strict=True):
+            if key in (signal, str(signal).partition(".")[2]):
+                return float(deviation)
+    return math.nan
 
 
 def _beyond(result: xr.Dataset, load: Array) -> float:

@@ -20,7 +20,7 @@ from finger_pin.identification.comparison import LawComparison, bic
 from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, free_directions
 from finger_pin.identification.likelihood import minus_twice_likelihood
-from finger_pin.identification.misfit import outliers, repeats
+from finger_pin.identification.misfit import jackknife, outliers, repeats
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.scenario_parameters import bare, column_of, owner
 from finger_pin.simulation.netcdf import save
@@ -108,6 +108,11 @@ def _estimates(
         "least": ("parameter", problem.low[:count], {"long_name": "least value that was allowed"}),
         "greatest": ("parameter", problem.high[:count], {"long_name": "greatest value that was allowed"}),
         "correlation": (("parameter", "other"), correlation, {"units": "1", "long_name": "of the estimates"}),
+        "jackknife": (
+            ("parameter", "other"),
+            jackknife(problem, best)[:count, :count] if spread is not None else np.full((count, count), np.nan),
+            {"long_name": "covariance by leaving out one setting at a time; of logarithms where the least is positive"},
+        ),
         "profile_value": (("parameter", "point"), profiles[0], {"long_name": "held value of a parameter"}),
         "profile_rise": (
             ("parameter", "point"),
@@ -141,7 +146,8 @@ def _units(problem: Problem, key: str) -> str:
 
 def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]:
     signals, groups = problem.signals, problem.groups
-    grown = np.ones(len(signals)) if naive is None else SmallSample.from_fit(problem, best, naive).noise
+    few = None if naive is None else SmallSample.from_fit(problem, best, naive)
+    grown, shared = (np.ones(len(signals)),) * 2 if few is None else (few.noise, few.elsewhere)
     errors, noise = best.residuals, best.noise
     if problem.growth.acts:
         errors = problem.errors(best.z)
@@ -149,6 +155,8 @@ def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]
         noise = best.noise / problem.growth.levels(errors)
     # The first of every output's windows stands for what they share.
     first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
+    names = np.array([signals[k].name for k in first])
+    squares = np.array([np.mean(noise[first][names == name] ** 2) for name in names])
     known = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}
     whole = {
         "signal_index": np.repeat(groups, [len(s.measured) for s in signals]),
@@ -158,7 +166,7 @@ def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]
         "residual": np.concatenate(errors),
         "outlier": np.concatenate(outliers(problem, best.residuals)),
     }
-    names = {
+    words = {
         "signal_index": "which signal",
         "instant": "time, s; number of a steady reading",
         "applied": "what pulls, N",
@@ -175,6 +183,11 @@ def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]
             (noise * grown)[first],
             {"long_name": "deviation of further readings, of which 95 % are within 1.96 of it"},
         ),
+        "noise_elsewhere": (
+            "signal",
+            np.sqrt(squares) * shared[first],
+            {"long_name": "deviation of readings of recordings that were not fitted, by all fitted ones of the name"},
+        ),
         "replicate_noise": (
             "signal",
             [math.sqrt(known[k].scatter) if k in known else math.nan for k in range(len(first))],
@@ -188,7 +201,7 @@ def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]
         "signal_samples": ("signal", np.bincount(whole["signal_index"], minlength=len(first))),
         "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
-        **{name: ("sample", values, {"long_name": names[name]}) for name, values in whole.items()},
+        **{name: ("sample", values, {"long_name": words[name]}) for name, values in whole.items()},
     }
 
 

@@ -1,5 +1,6 @@
 """Misfit: what correlated residuals and repeated readings do to intervals, against statistics in closed form."""
 
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
@@ -93,3 +94,15 @@ def test_repeated_runs_tell_a_law_that_lacks_a_term_from_one_that_does_not():
     assert "misses" not in summarize_identification(whole)
     width = [float(each.upper[0] - each.lower[0]) for each in (whole, lacking)]
     assert width[1] > 2.0 * width[0]
+
+
+@pytest.mark.slow
+def test_bands_hold_beyond_the_loads_of_readings_whose_law_misses_something():
+    """Of six loads of real readings all choices of three are predicted from the others, most of them beyond these."""
+    loads, inside = [3.0, 6.0, 9.0, 12.0, 15.0, 18.0], []
+    for kept in itertools.combinations(loads, 3):
+        held = [load for load in loads if load not in kept]
+        recordings = {"pull": {"held_out": {"force_in_N": held}}}
+        inside.append(fp.identify("transmission", recordings=recordings, compare={}, starts=1, profiles=False))
+    within = np.mean([float(each.prediction_within[0]) for each in inside])
+    assert 0.9 < within < 0.98

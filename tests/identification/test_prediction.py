@@ -45,6 +45,24 @@ def found(recordings, data, **more):
     return fp.identify("canal", recordings=recordings, data=data, **given)
 
 
+def band_of(fitted, load):
+    """Half the 95 % band of a line through the origin: by its regression or, if that is more, without one load each."""
+    size = fitted["in"] @ fitted["in"]
+    share, left = fitted["in"] @ fitted["out"] / size, len(fitted["in"]) - 1
+    noise = student.ppf(0.975, left) * np.sqrt(np.sum((fitted["out"] - share * fitted["in"]) ** 2) / left)
+    loads = np.unique(fitted["in"])
+    without = [np.linalg.lstsq(x[:, None], y, rcond=None)[0][0] for x, y in apart(fitted, loads)]
+    count = len(loads)
+    deviation = np.sqrt((count - 1) / count * np.sum((np.array(without) - share) ** 2))
+    unsure = max(noise / np.sqrt(size), student.ppf(0.975, count - 1) * deviation)
+    return np.hypot(noise, unsure * load)
+
+
+def apart(fitted, loads):
+    """Readings without those at one load each."""
+    return [(fitted["in"][rest], fitted["out"][rest]) for rest in (fitted["in"] != load for load in loads)]
+
+
 def test_readings_that_are_held_out_are_predicted_with_a_band_by_noise_and_covariance(tmp_path):
     data = {"light": table(1, [2.0, 3.0, 4.0]), "heavy": table(2, [10.0, 12.0, 15.0], repeats=40)}
     result = found({"light": steady(), "heavy": steady(held_out=True)}, data, output=tmp_path)
@@ -52,9 +70,8 @@ def test_readings_that_are_held_out_are_predicted_with_a_band_by_noise_and_covar
     # A line through the origin: share = exp(-mu phi), its variance noise^2 / sum(load^2).
     share = fitted["in"] @ fitted["out"] / (fitted["in"] @ fitted["in"])
     np.testing.assert_allclose(result.estimate, [-np.log(share) / TURN], rtol=1e-5)
-    noise = np.sqrt(np.sum((fitted["out"] - share * fitted["in"]) ** 2) / 11)
     off = other["out"] - share * other["in"]
-    band = student.ppf(0.975, 11) * noise * np.sqrt(1.0 + other["in"] ** 2 / (fitted["in"] @ fitted["in"]))
+    band = band_of(fitted, other["in"])
     means = other["out"].reshape(3, 40)
     scatter = np.sqrt(np.sum((means - means.mean(axis=1, keepdims=True)) ** 2) / 117)
     expected = {"rms": np.sqrt(np.mean(off**2)), "bias": off.mean(), "within": np.mean(np.abs(off) <= band)}
@@ -120,12 +137,26 @@ def test_a_prediction_has_a_band_though_two_numbers_are_tied():
     data, later = table(9, [3.0, 6.0, 9.0]), {"in": np.array([5.0, 20.0]), "out": np.array([4.0, 16.0])}
     tied = {COULOMB: (0.01, 1.0), "finger.tendons.T1.curvature_offset": (0.1, 6.0)}
     result = found({"day": steady()}, {"day": data}, parameters=tied)
-    share = data["in"] @ data["out"] / (data["in"] @ data["in"])
-    noise = np.sqrt(np.sum((data["out"] - share * data["in"]) ** 2) / 11)
-    band = student.ppf(0.975, 11) * noise * np.sqrt(1.0 + later["in"] ** 2 / (data["in"] @ data["in"]))
+    band = band_of(data, later["in"])
     bands = fp.predict(result, {"new": steady()}, data={"new": later}).predicted_band
     np.testing.assert_allclose(bands, band, rtol=1e-3)
     assert not result.determined.any()
+
+
+def test_the_noise_of_a_recording_that_was_not_fitted_is_the_mean_of_all_with_their_degrees_of_freedom():
+    """The mean of variances s^2 with f degrees of freedom each has (sum s^2)^2 / sum(s^4 / f) (Satterthwaite, 1946)."""
+    names = {"fine": 0.02, "usual": 0.05, "coarse": 0.3}
+    data = {name: table(40 + k, [3.0, 6.0, 9.0], noise=noise) for k, (name, noise) in enumerate(names.items())}
+    result = found(dict.fromkeys(names, steady()), data)
+    share = np.exp(-float(result.estimate[0]) * TURN)
+    square = np.array([np.mean((each["out"] - share * each["in"]) ** 2) for each in data.values()])
+    # Of 36 readings one is used up by the coefficient; each recording has a third of what is left.
+    freedom = np.sum(square) ** 2 / np.sum(square**2 / (35.0 / 3.0))
+    expected = student.ppf(0.975, freedom) * np.sqrt(np.mean(square) * 36.0 / 35.0)
+    # Hardly any load: nothing but noise.
+    light = {"in": np.full(2, 1e-3), "out": np.zeros(2)}
+    told = fp.predict(result, {"new": steady()}, data={"new": light})
+    np.testing.assert_allclose(told.predicted_band, expected, rtol=1e-3)
 
 
 @pytest.mark.parametrize(
