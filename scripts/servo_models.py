@@ -35,9 +35,8 @@ _GEARS |= {"v_s": "stribeck_velocity", "alpha": "stribeck_exponent"}
 #: Keys of the bench, below the motor, for the parameters of M1 to M4.
 KEYS = {name: name for name in MOTOR} | {name: f"friction.{key}" for name, key in _GEARS.items()}
 #: What `python scripts/identify.py servo_pendulum --starts 1 --no-profiles` finds.
-OURS = {"torque_constant": 0.36551, "resistance": 3.4198, "inertia": 0.0022712}
-OURS |= {"K_c": 0.0022573, "K_l": 0.0, "K_ls": 0.33905, "K_v": 0.013386}
-HORN_DAMPING = 1000.0  # N s/m; the bench's horn rings with its own.
+OURS = {"torque_constant": 0.37851, "resistance": 3.4528, "inertia": 0.0021892}
+OURS |= {"K_c": 0.001, "K_l": 0.21214, "K_ls": 0.019969, "K_v": 0.0077933}
 #: The quantities of the motor and of M6, in the order of the compiled functions' `p`.
 QUANTITIES = (
     *(*MOTOR, "offset", "K_v"),
@@ -268,9 +267,7 @@ def print_table(options: argparse.Namespace) -> None:
     if "M4" in found and not options.offset:
         in_core["M4's in our core"] = found["M4"]
     for name, values in in_core.items():
-        for more, damping in (("", {}), (", horn damped", {f"{_ACTUATOR}tendon_damping": HORN_DAMPING})):
-            residuals = core_errors(recordings, values, {**overrides, **damping})
-            print(row(name + more, len(values), motions, residuals), flush=True)
+        print(row(name, len(values), motions, core_errors(recordings, values, overrides)), flush=True)
     for model, values in given.items():
         print(row(f"{model} as published", len(values), motions, errors(motions, values)), flush=True)
     for model, values in found.items():
