@@ -111,7 +111,10 @@ class _Reader:
         """Return the description as a table."""
         model = self.model
         if not self.kept_joints and not self.free.kept:
-            raise InputError("model", "has no joint that turns or slides, and no free body that a tendon or loop holds")
+            raise InputError(
+                "model",
+                "has no joint that turns or slides, and no free body that a tendon or loop holds, or of several shapes",
+            )
         reader = TendonReader(*vars(self._read).values())
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self._bodies()

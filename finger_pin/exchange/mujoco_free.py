@@ -22,7 +22,8 @@ class FreeBodies:
     """Bodies with free joints.
 
     Attributes:
-        kept: Free joints of the bodies that tendons pass, or that carry other joints: they become slides and hinges.
+        kept: Free joints of the bodies that tendons pass, that carry other joints, or that touch with several shapes,
+            where an object has one: they become slides and hinges.
         loose: The other bodies with free joints.
     """
 
@@ -34,7 +35,10 @@ class FreeBodies:
         trees = {i: self._carried(int(model.jnt_bodyid[i])) for i in joints}
         linked = linked_bodies(mujoco, model)
         moving = {int(model.jnt_bodyid[i]) for i in range(model.njnt) if i not in joints}
-        self.kept = [i for i in joints if trees[i] & (passed | moving | linked)]
+        self.kept = [i for i in joints if trees[i] & (passed | moving | linked) or self._touches_with_several(trees[i])]
+        for i in self.kept:
+            about = "its middle hinge of three must not come to a right angle"
+            read.rest.add(f"free body {self.names.bodies[int(model.jnt_bodyid[i])]}: {about}", moves=False)
         self.loose = [int(model.jnt_bodyid[i]) for i in joints if i not in self.kept]
         # Upwards is the axis of the first hinge: what hangs turns about it as often as it likes.
         gravity = model.opt.gravity
@@ -49,6 +53,12 @@ class FreeBodies:
             if int(self.model.body_parentid[i]) in bodies:
                 bodies.add(i)
         return bodies
+
+    def _touches_with_several(self, carried: set[int]) -> bool:
+        model = self.model
+        own = np.isin(model.geom_bodyid, [*carried])
+        colliding = own & ((model.geom_contype > 0) | (model.geom_conaffinity > 0))
+        return int(np.count_nonzero(colliding)) > 1
 
     def _of(self, joint: int) -> tuple[int, str, Array]:
         """Return the body of a joint, its name, and its rotation at the model's reference."""
@@ -89,6 +99,20 @@ class FreeBodies:
         angles = Rotation.from_matrix(self._axes.T @ now @ turned.T @ self._axes).as_euler("ZYX")
         names = (f"{name}_{what}" for what in (*_SLIDES, *_TURNS))
         return dict(zip(names, [*moved.tolist(), *angles.tolist()], strict=True))
+
+    def velocity(self, joint: int, qpos: Array, qvel: Array) -> dict[str, float]:
+        """Return the speeds of a body's slides and hinges in a state of the model."""
+        body, name, _ = self._of(joint)
+        at, first = int(self.model.jnt_qposadr[joint]), int(self.model.jnt_dofadr[joint])
+        now, turning = _rotation(qpos[at + 3 : at + 7]), qvel[first + 3 : first + 6]
+        moved = qvel[first : first + 3] + now @ np.cross(turning, self.model.body_ipos[body])
+        yaw, pitch, _ = [*self.position(joint, qpos).values()][3:]
+        # What one after the other turns by: about z, about y turned by yaw, and about x turned by both.
+        after = Rotation.from_euler("Z", yaw), Rotation.from_euler("ZY", [yaw, pitch])
+        axes = np.column_stack([[0.0, 0.0, 1.0], after[0].apply([0.0, 1.0, 0.0]), after[1].apply([1.0, 0.0, 0.0])])
+        rates = np.linalg.solve(axes, self._axes.T @ now @ turning)
+        names = (f"{name}_{what}" for what in (*_SLIDES, *_TURNS))
+        return dict(zip(names, [*moved.tolist(), *rates.tolist()], strict=True))
 
 
 def _rotation(real_first: Array) -> Array:

@@ -31,22 +31,20 @@ def read_keyframes(
         velocity = {read.names.joints[i]: float(qvel[model.jnt_dofadr[i]]) for i in joints}
         for i in free.kept:
             position |= free.position(i, qpos)
+            velocity |= free.velocity(i, qpos, qvel)
         moving = {key: speed for key, speed in velocity.items() if speed}
         inputs, moved = actuators.inputs(ctrl), shapes.object_states(k)
         keyframes.append(
             {"position": position, "velocity": moving, "inputs": inputs, **({"objects": moved} if moved else {})}
         )
-        _list_rest(read, free, name, k, act)
+        _list_rest(read, name, k, act)
     return dict(zip(names, keyframes, strict=True))
 
 
-def _list_rest(read: ElementReader, free: FreeBodies, name: str, k: int, act: Array) -> None:
-    """List what of a keyframe is left out: activations, speeds of free bodies in the tree, places of mocap bodies."""
+def _list_rest(read: ElementReader, name: str, k: int, act: Array) -> None:
+    """List what of a keyframe is left out: activations, and places of mocap bodies."""
     model = read.model
     if k and any(np.any(places[k] != places[0]) for places in (model.key_mpos, model.key_mquat)):
         read.rest.add(f"keyframe {name}: places of mocap bodies, which are where the first keyframe has them")
     if np.any(np.abs(act) > _SAME):
         read.rest.add(f"keyframe {name}: activations of its actuators, which start at zero")
-    starts = [int(model.jnt_dofadr[i]) for i in free.kept]
-    if model.nkey and any(np.any(model.key_qvel[k][at : at + 6]) for at in starts):
-        read.rest.add(f"keyframe {name}: speeds of free bodies that tendons or loops hold")

@@ -224,3 +224,27 @@ def test_mocap_bodies_stand_where_a_keyframe_has_them_and_lead_and_carry_what_is
     assert where["flex"] == pytest.approx(data.joint("flex").qpos[0], abs=1e-3)
     balls = [data.body(name).xpos for name in ("ball", "other")]
     np.testing.assert_allclose(result.object_position.values[-1], balls, atol=1e-3)
+
+
+ELL = """<mujoco><option timestep="2e-4" cone="elliptic"/><default><geom condim="1"/></default><worldbody>
+<geom type="plane" size="1 1 .1"/><body name="ell" euler="20 10 30"><freejoint/>
+ <geom type="box" size=".03 .008 .008" pos=".02 0 0" mass=".03"/>
+ <geom type="capsule" size=".008" fromto="0 0 0 0 .03 0" mass=".02"/></body>
+<body pos="1 0 1"><joint name="j"/><geom size=".01" mass=".2" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j"/></actuator>
+<keyframe><key name="thrown" qpos="0 0 .3 .96 .2 .1 .15 0" qvel=".3 .1 0 2 3 -4 0"/>
+<key name="slid" qpos="0 0 .008 .8 0 0 .6 0" qvel=".3 .1 0 0 0 2 0"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize("keyframe, seconds", [("thrown", 0.2), ("slid", 0.3)])
+def test_a_free_body_of_several_geoms_flies_and_slides_as_in_mujoco(keyframe, seconds):
+    """Off its middle, and turning about no principal axis; lying, it slides without friction on both geoms."""
+    data, result = both(ELL, seconds, keyframe)
+    start = mujoco.MjData(data.model)
+    mujoco.mj_forward(data.model, start)
+    centre = result.joint_position.sel(joint=["ell_x", "ell_y", "ell_z"]).values[-1] + start.body("ell").xipos
+    np.testing.assert_allclose(centre, data.body("ell").xipos, atol=3e-4)
+    velocity = result.joint_velocity.sel(joint=["ell_x", "ell_y", "ell_z"]).values[-1]
+    moved = np.zeros(6)
+    mujoco.mj_objectVelocity(data.model, data, mujoco.mjtObj.mjOBJ_BODY, data.body("ell").id, moved, 0)
+    np.testing.assert_allclose(velocity, moved[3:], atol=1e-3)
