@@ -113,7 +113,7 @@ class _Reader:
         if not self.kept_joints and not self.free.kept:
             raise InputError(
                 "model",
-                "has no joint that turns or slides, and no free body that a tendon or loop holds, or of several shapes",
+                "has no joint that turns or slides, nor a free body of several shapes or that a tendon or loop holds",
             )
         reader = TendonReader(*vars(self._read).values())
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
