@@ -105,11 +105,8 @@ def to_mjcf(
         raise InputError("timestep", "must be above 0", timestep)
     if description.tree.bodies:
         if friction:
-            allowed = (
-                "of a tree is added to what is written without: "
-                "finger_pin.mujoco.add_friction(mujoco.MjSpec.from_string(text), of=hand)"
-            )
-            raise InputError("friction", allowed)
+            way = "finger_pin.mujoco.add_friction(mujoco.MjSpec.from_string(text), of=hand)"
+            raise InputError("friction", f"of a tree is added to what is written without: {way}")
         return tree_to_mjcf(description, posture, timestep, integrator, limits is not False, shapes)
     tendons = Tendons.from_description(description)
     links = _links(description)

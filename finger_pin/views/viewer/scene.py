@@ -81,8 +81,7 @@ class Scene:
 
     Attributes:
         geometry: Its tendons in space.
-        strands: Labels of the strands whose tension is shown: the actuated tendons, two halves of each passive, and the
-            cords that servos, muscles and springs pull.
+        strands: Labels of what has a tension: the actuated tendons, two halves of each passive, and given cords.
         size: Length of the finger, m.
         tube_radius: Of the tubes that are drawn for tendons, m.
         tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots. Cords of
@@ -90,11 +89,7 @@ class Scene:
     """
 
     def __init__(self, finger: FingerLike, cords: Sequence[str] = ()) -> None:
-        """Prepare solids and tendons.
-
-        Args:
-            finger: The finger.
-            cords: Names of the cords that servos, muscles and springs pull with known tensions.
+        """Prepare solids and tendons, and a tree's cords that servos, muscles or springs pull, given by their names.
 
         Raises:
             InputError: If a joint of a description carries no link.
