@@ -111,7 +111,7 @@ class _Reader:
         """Return the description as a table."""
         model = self.model
         if not self.kept_joints and not self.free.kept:
-            allowed = "has no joint that turns or slides, nor a free body of several shapes or that a tendon or loop holds"
+            allowed = "has no joint that turns or slides, nor a free body of several shapes or held by a tendon or loop"
             raise InputError("model", allowed)
         reader = TendonReader(*vars(self._read).values())
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}

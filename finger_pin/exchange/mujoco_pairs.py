@@ -71,15 +71,11 @@ class Pairs(ElementReader):
         damping = self._shared("damping, s/m,", {pair: each[1] for pair, each in pressing.items()}, moves=False)
         # Torsion shares its limit with sliding, and has none where that is zero.
         torsion = self._shared("torsion, m,", {pair: each[1] * (each[0] > 0.0) for pair, each in met.items()})
-        for what, lost in (
-            (
-                "torsional friction without sliding friction",
-                [pair for pair, each in met.items() if each[1] > 0 == each[0]],
-            ),
-            ("rolling friction (condim 6)", [pair for pair, each in met.items() if each[2]]),
-        ):
-            if lost:
-                self.rest.add(f"{what} of geoms: {_few([self._pair(pair) for pair in lost])}")
+        alone = [self._pair(pair) for pair, each in met.items() if each[1] and not each[0]]
+        rolling = [self._pair(pair) for pair, each in met.items() if each[2]]
+        for what, pairs in (("torsional without sliding friction", alone), ("rolling friction (condim 6)", rolling)):
+            if pairs:
+                self.rest.add(f"{what} of geoms: {_few(pairs)}")
         columns = {"friction": friction, "torsion": torsion, "stiffness": stiffness, "damping": damping}
         return {i: {name: values[i] for name, values in columns.items()} for i in friction}
 

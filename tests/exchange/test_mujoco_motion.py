@@ -109,7 +109,7 @@ def test_free_bodies_that_tendons_alone_hold_are_a_model():
     moved = result.joint_position.sel(joint=["x_x", "x_y", "x_z", "y_x", "y_y", "y_z"]).values[-1]
     starts = [0.1, 0.0, 0.0, 0.1, 0.1, -0.1]
     np.testing.assert_allclose(moved + starts, [*data.qpos[:3], *data.qpos[7:10]], atol=1e-3)
-    with pytest.raises(fp.InputError, match="nor a free body of several shapes or that a tendon or loop holds"):
+    with pytest.raises(fp.InputError, match="nor a free body of several shapes or held by a tendon or loop"):
         fp.from_mujoco(mujoco.MjModel.from_xml_string(text % (bodies, "")))
 
 
