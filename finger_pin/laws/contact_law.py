@@ -15,7 +15,7 @@ two tangents and a load that varies.
 Where a contact resists spinning, the bend has a third component: the turn about the normal times a length r, at
 which the law above has the moment M = r F_3. So |F|^2 + (M / r)^2 <= (mu f_n)^2, the ellipsoid that is MuJoCo's
 elliptic cone (and, as a fair fit, a soft finger's limit surface: Howe and Cutkosky, Int. J. Robotics Research 15,
-1996), with r = torsion / mu_k. Without slip along the tangents the contact turns below r mu f_n.
+1996), with r = torsion / mu_k. Without slip along the tangents it begins to spin at r mu f_n.
 
 What follows, whatever the normal force does meanwhile:
 
