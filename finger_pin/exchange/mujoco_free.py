@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_equalities import linked_bodies
 from finger_pin.exchange.mujoco_names import Table
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
 
 _SLIDES, _TURNS = ("x", "y", "z"), ("yaw", "pitch", "roll")
+# Cosine of the middle hinge below which the other two turn about one axis.
+_UPRIGHT = 1e-6
 # The range of what searches and pictures go through, m.
 _REACH = 1.0
 
@@ -96,12 +100,19 @@ class FreeBodies:
         now = _rotation(qpos[at + 3 : at + 7])
         centre = model.body_ipos[body]
         moved = qpos[at : at + 3] + now @ centre - model.body_pos[body] - turned @ centre
-        angles = Rotation.from_matrix(self._axes.T @ now @ turned.T @ self._axes).as_euler("ZYX")
+        with warnings.catch_warnings():
+            # Where the first and the third hinge have one axis, any share of the turn will do.
+            warnings.filterwarnings("ignore", "Gimbal lock")
+            angles = Rotation.from_matrix(self._axes.T @ now @ turned.T @ self._axes).as_euler("ZYX")
         names = (f"{name}_{what}" for what in (*_SLIDES, *_TURNS))
         return dict(zip(names, [*moved.tolist(), *angles.tolist()], strict=True))
 
     def velocity(self, joint: int, qpos: Array, qvel: Array) -> dict[str, float]:
-        """Return the speeds of a body's slides and hinges in a state of the model."""
+        """Return the speeds of a body's slides and hinges in a state of the model.
+
+        Raises:
+            InputError: If it turns while the middle hinge is at a right angle.
+        """
         body, name, _ = self._of(joint)
         at, first = int(self.model.jnt_qposadr[joint]), int(self.model.jnt_dofadr[joint])
         now, turning = _rotation(qpos[at + 3 : at + 7]), qvel[first + 3 : first + 6]
@@ -110,7 +121,10 @@ class FreeBodies:
         # What one after the other turns by: about z, about y turned by yaw, and about x turned by both.
         after = Rotation.from_euler("Z", yaw), Rotation.from_euler("ZY", [yaw, pitch])
         axes = np.column_stack([[0.0, 0.0, 1.0], after[0].apply([0.0, 1.0, 0.0]), after[1].apply([1.0, 0.0, 0.0])])
-        rates = np.linalg.solve(axes, self._axes.T @ now @ turning)
+        if turning.any() and abs(math.cos(pitch)) < _UPRIGHT:
+            allowed = "turns where the second of its three hinges is at a right angle, which has no speed for it"
+            raise InputError(f"model: free body {name}", f"{allowed}; give another start")
+        rates = np.zeros(3) if not turning.any() else np.linalg.solve(axes, self._axes.T @ now @ turning)
         names = (f"{name}_{what}" for what in (*_SLIDES, *_TURNS))
         return dict(zip(names, [*moved.tolist(), *rates.tolist()], strict=True))
 

@@ -43,7 +43,7 @@ class Shapes:
             kind = kinds(int(model.geom_type[i])).name.removeprefix("mjGEOM_").lower()
             if not self._solid(i) and not self._is_plane(i):
                 moves = bool(self._moves[i])
-                self.rest.add(f"geom {self._name(i)}: a {kind} touches nothing here", moves)
+                self.rest.add(f"geom {self._name(i)}: {_with_article(kind)} touches nothing here", moves)
         pairs, self._placed_at = Pairs(*vars(read).values()), dict[int, str]()
         # Ellipsoids, meshes and planes that move were listed.
         carried = [i for i in self._colliding if self._solid(i) or self._is_plane(i)]
@@ -204,3 +204,7 @@ class Shapes:
             ]
             objects[name] |= {"apart": apart} if apart else {}
             others[i] = name
+
+
+def _with_article(kind: str) -> str:
+    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import finger_pin as fp
 from finger_pin.description.loading import read_scenario
@@ -249,3 +250,16 @@ def test_a_free_body_of_several_geoms_flies_and_slides_as_in_mujoco(keyframe, se
     mujoco.mj_objectVelocity(data.model, data, mujoco.mjtObj.mjOBJ_BODY, data.body("ell").id, moved, 0)
     # Which is that of the step before.
     np.testing.assert_allclose(velocity, moved[3:], atol=3e-3)
+    joints = fp.from_mujoco(data.model).tree.joints
+    turned = Rotation.identity()
+    for name in ("ell_yaw", "ell_pitch", "ell_roll"):
+        turned *= Rotation.from_rotvec(float(result.joint_position.sel(joint=name)[-1]) * np.array(joints[name].axis))
+    meant = Rotation.from_matrix(data.body("ell").xmat.reshape(3, 3))
+    assert (Rotation.from_matrix(start.body("ell").xmat.reshape(3, 3)).inv() * meant).magnitude() > 0.3
+    assert (meant.inv() * Rotation.from_matrix(start.body("ell").xmat.reshape(3, 3)) * turned).magnitude() < 2e-3
+
+
+def test_a_free_body_that_turns_where_its_hinges_cannot_is_refused_by_name():
+    text = ELL.replace('qpos="0 0 .3 .96 .2 .1 .15 0"', 'qpos="0 0 .3 1 0 1 0 0"').replace('euler="20 10 30"', "")
+    with pytest.raises(fp.InputError, match="free body ell: turns where the second of its three hinges"):
+        fp.from_mujoco(mujoco.MjModel.from_xml_string(text))

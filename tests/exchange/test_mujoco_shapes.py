@@ -53,7 +53,7 @@ def test_the_pairs_that_touch_are_those_that_mujoco_lets_collide(flags):
         return
     assert 5 < len(overlapping) < 35
     assert [line for line in tree.left_out if line.startswith("geom floor: it overlaps a1, a2")]
-    assert "geom d2: a ellipsoid touches nothing here" in tree.left_out
+    assert "geom d2: an ellipsoid touches nothing here" in tree.left_out
     # The greater of 0.4 and MuJoCo's 1 with all that it meets.
     assert shapes["c1"].friction == (0.3 if flags else 1.0)
     assert not flags or set(data.contact.friction[:, 0]) == {0.3} == {each.friction for each in shapes.values()}
