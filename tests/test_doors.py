@@ -111,11 +111,13 @@ def files(tmp_path_factory):
     return folder / "short.toml", folder / "ub.toml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("door", DOORS.values(), ids=DOORS.keys())
 def test_a_scenario_and_the_path_of_its_file_do_the_same(door, files):
     same(door(fp.load_scenario("reversals", SHORT)), door(str(files[0])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("door", FINGERS.values(), ids=FINGERS.keys())
 def test_a_finger_its_description_its_name_and_the_path_of_its_file_do_the_same(door, files):
     expected = door(fp.Finger("ub_stand_in"))
@@ -132,6 +134,7 @@ def hand(request, tmp_path_factory):
     return ways.get(request.param, path)
 
 
+@pytest.mark.slow
 def test_a_hand_is_taken_where_a_finger_is(hand):
     assert fp.Simulator(hand).finger.routing.joints == tuple(fp.load_scenario("hand").finger.joints)
     assert fp.analysis.closure_over_range(hand, samples=8).holds

@@ -178,6 +178,7 @@ def seen(answer):
     return " ".join(text.get_text() for text in answer.findobj(matplotlib.text.Text))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DOORS)
 def test_every_public_function_answers_or_says_in_one_line_why_not(hand, name):
     needed = required(DOORS[name])
@@ -197,6 +198,7 @@ def test_every_public_function_answers_or_says_in_one_line_why_not(hand, name):
     assert not RAW.search(text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", fp.studies.METRICS)
 def test_every_metric_is_a_number_or_says_in_one_line_why_not(hand, name):
     try:
@@ -207,6 +209,7 @@ def test_every_metric_is_a_number_or_says_in_one_line_why_not(hand, name):
         assert not np.isnan(value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", application.COMMANDS, ids=lambda each: each.__name__)
 def test_every_command_answers_or_says_in_one_line_why_not(hand, command, monkeypatch, tmp_path, capsys):
     for path in hand.folder.glob("*.*"):

@@ -27,6 +27,7 @@ def imported(path):
     return {name for name in names if name in MODULES}
 
 
+@pytest.mark.slow
 def test_no_file_imports_itself_through_others():
     # A cycle is an error of the sorter, which names it.
     order = tuple(TopologicalSorter({name: imported(path) for name, path in MODULES.items()}).static_order())

@@ -74,6 +74,7 @@ def test_joint_friction_grows_with_the_sum_of_the_tensions(finger):
     np.testing.assert_allclose(levels[2], 10.0 * levels[0], rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kinetic", "excess"),
     [
@@ -108,6 +109,7 @@ def test_n_plus_one_tendons_hold_each_other(routing):
         assert np.linalg.matrix_rank(routing.coupling[kept]) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("minimum", [1.0, 2.5])
 def test_without_friction_the_other_tendons_control_the_passive_one(minimum):
     """Conclusions, third point: T5 goes from 1 N to the 3.2 f0 that balance T1 to T4, when friction is switched off.

@@ -37,6 +37,7 @@ def test_a_map_of_a_finger_that_nothing_locks_says_so(finger):
     assert plot_self_locking_map(found).get_suptitle().startswith("no joint friction locks it; the finger has 0.35 mm")
 
 
+@pytest.mark.slow
 def test_runs_are_drawn_with_their_largest_tension():
     run = fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.05}))
     top, bottom = plot_runaway({"reversals": run}).axes

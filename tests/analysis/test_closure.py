@@ -200,6 +200,7 @@ def test_servos_in_position_drive_turn_a_hinge_by_the_lengths_of_its_paths():
     np.testing.assert_allclose(end.motor_position, (length[0] - length[1:] + stretched) / 0.005, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_the_margin_of_a_hand_is_that_of_its_weakest_finger_alone():
     hand = fp.load_hand("ub_hand")
     alone = [fp.analysis.closure_over_range(finger, 8).tension.min() for finger in hand.hand.built().values()]

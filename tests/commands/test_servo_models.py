@@ -71,6 +71,7 @@ def test_a_saturated_motor_speeds_up_as_in_closed_form(limit):
     assert simulate(made, values) == pytest.approx(expected, abs=1e-4 * rate * expected[-1])
 
 
+@pytest.mark.slow
 def test_parameters_of_a_simulated_recording_come_back():
     truth = {**FIRST, "K_v": 0.005, "K_c": 0.01, "K_l": 0.15}
     time = 0.002 * np.arange(2000)
@@ -108,6 +109,7 @@ def test_published_parameters_are_read_by_their_symbols(tmp_path):
     assert dict(servo_models.published(tmp_path)) == dict.fromkeys(servo_models.MODELS, expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [(["--step", "1"], "--step"), (["--published", "nowhere"], "m1.json"), (["--current-limit", "0"], "current")],

@@ -175,6 +175,7 @@ def test_a_full_disk_ends_with_one_line_and_earlier_results_stay(run, here, quic
     assert contents(here) == before
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_gone_is_no_error(here):
     process = subprocess_of("--list", folder=here)
     process.stdout.close()

@@ -20,6 +20,7 @@ def test_a_wrong_value_ends_with_one_line_and_leaves_everything_as_it_was(run, h
     assert contents(here) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", FILES)
 def test_a_wrong_file_ends_with_one_line_and_writes_nothing(run, here, case):
     data, names, says = FILES[case]

@@ -99,6 +99,7 @@ WAYS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_a_late_command_from_any_door_moves_a_servo_as_the_same_one_without_delay_but_later(way):
     at_once, late = WAYS[way](0.0), WAYS[way](DELAY)

@@ -61,6 +61,7 @@ def test_files_and_arrays_have_the_names_of_tables(names, expected, tmp_path):
     np.testing.assert_allclose(motion(fp.simulate(scenario(file=file))), expected, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("cord", "servo"), ("tensions.cord", "inputs.servo"), ()])
 def test_custom_controllers_return_them(names, expected):
     sampled = fp.simulate(scenario(), controller=ByName(names), control_period=1e-3)

@@ -46,6 +46,7 @@ def exact(scenarios):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["reversals", "stick_slip", "none_passive", "lugre"])
 @pytest.mark.parametrize("method", METHODS)
 def test_compiled_methods_approach_one_motion_as_tolerances_shrink(scenarios, exact, name, method):
@@ -59,12 +60,14 @@ def test_compiled_methods_approach_one_motion_as_tolerances_shrink(scenarios, ex
     assert gaps[2] < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "duration", "tolerance"), [("none_passive", 0.1, 1e-8), ("lugre", 0.02, 1e-8)])
 def test_scipy_s_radau_on_the_readable_model_gives_the_same_motion(scenarios, exact, name, duration, tolerance):
     assert gap(run(scenarios[name], tolerance=tolerance, duration=duration, method="Radau"), exact[name]) < 1e-4
 
 
 # A linearised flow makes too much of errors where joints stick and slip.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::finger_pin.exceptions.AccuracyWarning")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", ["reversals", "stick_slip", "none_passive", "two_passive"])
@@ -97,6 +100,7 @@ def test_sampled_control_converges_to_the_continuous_one_with_first_order_in_the
     np.testing.assert_allclose(orders, 1.0, atol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("period", [5e-3, 1e-3, 7e-4])
 def test_the_energy_account_closes_under_sampled_control_and_the_better_the_tighter(scenarios, method, period):
@@ -150,6 +154,7 @@ def coupling(scenarios):
     return fp.Finger(scenarios["reversals"].finger).coupling
 
 
+@pytest.mark.slow
 def test_a_continuous_controller_in_python_is_integrated_by_scipy_and_gives_the_same_motion(scenarios, exact, coupling):
     result = run(scenarios["reversals"], tolerance=1e-8, duration=0.03, controller=Mine(coupling))
     assert result.attrs["method"] == "Radau"

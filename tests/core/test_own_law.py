@@ -129,6 +129,7 @@ def simulated(rubber):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Rodas5P", "Radau"])
 def test_a_simulation_shows_its_signals_and_books_its_energy_and_its_loss(simulated, method):
     result = simulated[method]

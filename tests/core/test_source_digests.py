@@ -112,6 +112,7 @@ def digest_with(monkeypatch, tmp_path):
     return digest
 
 
+@pytest.mark.slow
 def test_changed_code_of_the_core_or_below_is_compiled_anew_and_of_a_room_above_is_not(digest_with):
     rooms = ("nowhere", "core/jit/calls.py", "laws/bristle.py", "mujoco/registration.py", "files.py", "views")
     found = {room: digest_with(room, lambda text: text + b"x = 1\n") for room in rooms}

@@ -35,6 +35,7 @@ def test_the_same_parts_have_the_same_thing_and_those_used_last_stay():
     assert known(1, Thing) is not made[1]
 
 
+@pytest.mark.slow
 def test_no_more_live_than_are_remembered_and_nothing_else_of_a_call_does():
     living, arguments, known = weakref.WeakSet(), weakref.WeakSet(), remembering(5)
 

@@ -20,6 +20,7 @@ def flat(table, prefix=""):
             yield from flat(value, f"{name}.")
 
 
+@pytest.mark.slow
 def test_every_key_of_what_ships_is_on_the_page_and_the_page_is_current():
     assert generate_keys.main(["--check"]) == 0
     rows = {key: unit.strip() for key, unit, _ in ROW.findall(generate_keys.PAGE.read_text("utf-8"))}

@@ -125,6 +125,7 @@ def flexors(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_finger_that_tendons_only_close_is_simulated_against_its_springs(flexors):
     result = fp.simulate(fp.load_scenario(flexors))
     assert float(abs(result.tracking_error).max()) < 0.03
@@ -219,6 +220,7 @@ def test_a_closed_loop_that_is_asked_of_it_is_refused_with_the_way_out(flexor, k
     assert caught.value.entry == "finger.tendons"
 
 
+@pytest.mark.slow
 def test_in_a_hand_only_the_finger_that_needs_it_is_in_open_loop(flexor, tmp_path):
     flexor.write_text(FLEXOR.partition("[simulation]")[0].replace("[finger]\n", ""))
     hand = """

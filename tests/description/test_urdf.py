@@ -21,6 +21,7 @@ def finger(request):
     return load_finger(*request.param)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name, overrides, closed_form",
     [

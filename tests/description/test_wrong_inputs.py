@@ -19,6 +19,7 @@ def load_overridden(text):
     return load_scenario("reversals", {key: parsed})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "entry", "says"), OVERRIDES, ids=[text[:60] for text, _, _ in OVERRIDES])
 def test_a_wrong_override_is_an_error_of_one_line_that_names_the_entry(text, entry, says, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -18,6 +18,7 @@ PULLED_BY = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", PULLED_BY)
 @pytest.mark.parametrize("coulomb", [0.0, 0.3])
 def test_a_cord_delivers_what_pulls_it_less_its_friction(drive, coulomb):

@@ -78,6 +78,7 @@ def test_every_fingertip_is_where_mujoco_has_it_and_its_force_turns_the_same_joi
     assert result.sizes["tip"] == len(_FORCES)
 
 
+@pytest.mark.slow
 def test_policies_players_and_linear_models_see_every_fingertip(hand):
     description, model, data = hand
     alone = _scenario(_alone(description), **{"finger.tree.actuators.thumb.delay": 0.02})

@@ -37,6 +37,7 @@ def inputs(hand, model, control):
     return [*pulled, *(given[name] for name in hand.description.tree.actuators)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_lengths_and_arms_are_mujoco_s(hands, name):
     model, hand = hands[name]
@@ -49,6 +50,7 @@ def test_lengths_and_arms_are_mujoco_s(hands, name):
         np.testing.assert_allclose(hand.paths.arms(data.qpos), arms(model, data), atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_accelerations_are_mujoco_s_without_its_constraints(name):
     """Inertia, gravity, springs, dampers, tendons and actuators at random states, by both evaluators."""

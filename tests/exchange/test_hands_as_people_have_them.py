@@ -70,6 +70,7 @@ def test_a_joint_follows_another_by_a_polynomial_from_both_references(degree):
             assert missed == pytest.approx(data.efc_pos[:1], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_postures_of_a_fingertip_keep_to_couplings_whatever_their_ratio():
     """The nearest point of the curve that coupled joints leave the tip, found along that curve."""
 

@@ -56,6 +56,7 @@ def moved(model, seconds=0.3, step=2e-4):
     return {model.joint(j).name: data.qpos[model.jnt_qposadr[j]] for j in range(model.njnt)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS_BY_NAME)
 def test_a_model_that_is_read_and_written_moves_in_mujoco_as_before_and_reads_the_same(name):
     model = mujoco.MjModel.from_xml_string(MODELS_BY_NAME[name])

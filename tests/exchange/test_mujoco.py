@@ -66,6 +66,7 @@ def random_states(finger, count, slack):
         yield position, velocity, passive_position, passive_velocity, generator.uniform(20.0, 60.0, actuated)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name, overrides",
     [("ub_stand_in", {}), ("dexmart_index", {}), ("planar", {}), ("ub_stand_in", TWO_PASSIVE)],
@@ -102,6 +103,7 @@ def test_without_masses_a_passive_tendon_is_one_spring_k_t_that_only_pulls():
         np.testing.assert_allclose(data.qacc, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name, overrides", [("reversals", {}), ("reversals", SOFT)], ids=["reversals", "soft passive tendon"]
 )
@@ -120,6 +122,7 @@ def test_mujoco_converges_to_our_trajectory_at_the_first_order_of_its_time_step(
     np.testing.assert_allclose(found.errors[:-1] / found.errors[1:], 2.0, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_a_finger_that_meets_a_plate_bounces_and_pushes_as_in_mujoco():
     """Before it touches, and over four bounces and a push after it, MuJoCo's motion nears ours at its first order."""
     found = mujoco_motion.converge("press", mujoco_motion.PRESSING)

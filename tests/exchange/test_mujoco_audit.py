@@ -122,6 +122,7 @@ def end_of(model, seconds=0.2):
     return data.qpos
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", EXAMPLES)
 def test_no_attribute_that_moves_a_model_in_mujoco_is_passed_over(place):
     """Its motion changes by more than 1e-3: what is read changes in more than its list, or a line is new there."""
@@ -164,6 +165,7 @@ MOTIONS = {
 SMOOTH = {"finger.joint_friction.coulomb": 0.0, "finger.joint_friction.stiction": 0.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
 def test_what_is_carried_moves_as_in_mujoco(name):
     given = {"VELOCITY": "0"} | MOTIONS[name]

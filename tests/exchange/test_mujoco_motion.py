@@ -36,6 +36,7 @@ SWING = """<mujoco><compiler angle="radian"/><option timestep="2e-5" gravity="0 
 TENDON<actuator><motor joint="j"/></actuator><keyframe><key qvel="SPEED"/></keyframe></mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["JOINT", "TENDON"])
 @pytest.mark.parametrize("soft", ["", 'solreflimit=".02 .3"', 'solreflimit="-4e4 -60"', 'solreflimit="-1e4 0"'])
 @pytest.mark.parametrize("speed", [1.0, 10.0])

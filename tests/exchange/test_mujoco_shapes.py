@@ -76,6 +76,7 @@ def scene(description, gravity, duration, closing):
     return read_scenario(table, {"simulation.rtol": 1e-4})
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:hand. not carried over")
 def test_the_shadow_hand_closes_on_a_bar_and_holds_it_when_it_is_turned_over():
     description = fp.from_mujoco(MODELS["shadow"]())

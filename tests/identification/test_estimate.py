@@ -30,6 +30,7 @@ def problem_of(measured, bounds):
     return build_problem(scenario, settings, [read_recording("pull", settings.recordings["pull"], data)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("greatest", [3.0, 0.3], ids=["inside", "at a bound"])
 def test_a_minimum_is_that_of_least_squares_with_the_same_loss_and_bounds(loss, greatest):

@@ -61,6 +61,7 @@ def test_noise_that_grows_weighs_readings_as_weighted_least_squares_do():
     assert 0.9 <= float(later.prediction_within[0]) <= 1.0
 
 
+@pytest.mark.slow
 def test_intervals_under_noise_that_grows_hold_the_truth():
     rng, held = np.random.default_rng(6), 0
     for _ in range(120):

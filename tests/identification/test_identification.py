@@ -169,6 +169,7 @@ def test_outliers_count_less_under_a_loss_that_is_robust(loss):
     assert robust.lower[0] <= robust.estimate[0] <= robust.upper[0] < plain.upper[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", ["linear", "soft_l1"])
 def test_a_reading_that_is_far_from_all_others_is_named_and_alters_no_robust_fit(loss):
     clean = readings(np.random.default_rng(9))

@@ -138,6 +138,7 @@ def test_a_number_that_nothing_recorded_of_a_motion_feels_is_refused_by_its_key(
         fp.identify("canal", **given, data={"pull": ramp(np.random.default_rng(1), 0.15, 0.5)})
 
 
+@pytest.mark.slow
 def test_windows_of_one_motion_are_held_out_in_turn_where_laws_are_compared():
     data = ramp(np.random.default_rng(5), 0.15, 0.5)
     result = fp.identify(
@@ -169,6 +170,7 @@ def test_a_law_to_compare_that_is_wrong_is_refused_before_any_search(wrong):
     assert not begun
 
 
+@pytest.mark.slow
 def test_windows_begin_before_what_is_compared_so_that_no_sample_but_the_first_is_lost():
     data = ramp(np.random.default_rng(4), 0.15, 0.5)
     settings = RecordingSettings.model_validate({**MOTION, "window": 1.0})
@@ -181,6 +183,7 @@ def test_windows_begin_before_what_is_compared_so_that_no_sample_but_the_first_i
     assert result.signal_samples.values.tolist() == [230, 230]
 
 
+@pytest.mark.slow
 def test_residuals_that_follow_each_other_count_as_fewer():
     """With a correlation of 0.9 between neighbours, one sample in 19 is independent (Bartlett)."""
     given = {"parameters": BOUNDS, "recordings": {"pull": MOTION}, "starts": 1}

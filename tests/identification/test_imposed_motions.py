@@ -144,6 +144,7 @@ def noisy_log(seed):
     }
 
 
+@pytest.mark.slow
 def test_mass_and_frictions_come_back_from_a_noisy_log_with_what_the_encoder_errs_by(tmp_path):
     lines = [line for line in ARM.splitlines() if not line.startswith("joints.elbow")]
     (tmp_path / "one.toml").write_text("\n".join(lines).replace("crossings.elbow", "crossings.shoulder"))

@@ -72,6 +72,7 @@ def test_readings_whose_law_holds_are_said_to_miss_something_as_rarely_as_chance
     assert np.mean(np.array(chances) < 0.2) == pytest.approx(0.2, abs=0.06)
 
 
+@pytest.mark.slow
 def test_repeated_runs_tell_a_law_that_lacks_a_term_from_one_that_does_not():
     """Two runs of one canal with drag: fitted with it nothing is said; without it the missing term is, and widens."""
     rng = np.random.default_rng(4)

@@ -64,6 +64,7 @@ def test_a_recorded_start_is_that_of_a_joint_whose_column_has_a_wrong_zero(late)
         assert initial.velocity["drum"] == pytest.approx(0.2 / nuisance.get(f"{key}.scale", 1.0), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_start_far_from_the_first_row_of_a_recording_is_told():
     data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
     table = {name: values[:60] for name, values in data.items()}

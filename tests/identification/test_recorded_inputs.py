@@ -31,6 +31,7 @@ def test_the_zero_and_the_gain_of_what_pulls_are_found_from_steady_readings():
     assert list(found.units.values) == ["1", "N", "1"]
 
 
+@pytest.mark.slow
 def test_how_late_an_input_is_and_its_wrong_zero_are_found_from_a_motion():
     """The motion is integrated apart from the package; the load cell of the pull tells 0.2 N too little, 20 ms late."""
     data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
@@ -48,6 +49,7 @@ def test_how_late_an_input_is_and_its_wrong_zero_are_found_from_a_motion():
     assert list(found.units.values) == ["1", "N", "s"]
 
 
+@pytest.mark.slow
 def test_a_stop_is_found_though_where_the_search_starts_nothing_touches_it():
     """The drum is pulled to 1.8 rad and stopped at 1.2: a stop at 4 rad, where the scenario has it, is not felt."""
     time = np.arange(0.0, 3.5, 0.02)
@@ -64,6 +66,7 @@ def test_a_stop_is_found_though_where_the_search_starts_nothing_touches_it():
     assert float(found.estimate[0]) == pytest.approx(1.2, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_joint_that_nothing_damps_is_said_as_its_runs_take_long():
     data = motion(np.random.default_rng(6), 0.15, 0.4, 0.0)
     given = {"parameters": {COULOMB: (0.1, 0.2)}, "recordings": {"pull": {**MOTION, "settle": 0.2}}, "starts": 1}

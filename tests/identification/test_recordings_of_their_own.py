@@ -57,6 +57,7 @@ def recording(**more):
     return {"time": "t", "inputs": {"joint_reference.pin": "goal"}, "outputs": {"joint_position.pin": "q"}, **more}
 
 
+@pytest.mark.slow
 def test_four_springs_and_a_gain_are_found_together_with_the_friction_they_share(bench):
     """Three gains and two masses are known by recording, the fourth gain is not."""
     data = {name: made(bench, name) for name in APART}

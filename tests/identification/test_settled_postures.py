@@ -29,6 +29,7 @@ def drum(**more):
     return {"settled": {"kind": "steady", "speed": {"column": "way", "scale": 0.01}, **columns, **more}}
 
 
+@pytest.mark.slow
 def test_springs_come_from_settled_postures_as_linear_regression_has_them(tmp_path):
     """Joints whose friction is that of the defaults, shaken: k q = r T, with angles left out here and there."""
     (tmp_path / "three.toml").write_text(THREE)
@@ -93,6 +94,7 @@ def test_postures_whose_friction_is_not_told_are_refused_in_one_line(change, ove
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 def test_springs_come_from_what_a_winch_winds_as_its_cord_shares_it(tmp_path):
     """T = K (w - sum r q) and k q = r T: the angles of three joints on one cord, of which one spring is weighed."""
     (tmp_path / "three.toml").write_text(THREE)

@@ -181,6 +181,7 @@ def test_vibration_of_load_and_normal_force_below_break_away_moves_nothing_on():
     assert np.ptp(found.y[0]) < 1e-11
 
 
+@pytest.mark.slow
 def test_no_closed_cycle_yields_energy_and_sliding_cycles_cost_some():
     rng = np.random.default_rng(8)
     for _ in range(4):
@@ -209,6 +210,7 @@ def test_a_contact_that_opens_forgets_with_its_time_constant_and_exerts_nothing(
     assert np.array(value(Touch(1e-4, 0.1, 0.3, -0.2, 0.0, *z, 0.0))[:3]) == pytest.approx(np.zeros(3), abs=0.0)
 
 
+@pytest.mark.slow
 def test_a_pinched_card_stays_level_until_its_moment_is_twice_the_torsion_times_the_pinch():
     """40 g held 18 mm off its centre, as by two soft tips; what holds it bends by moment / (2 k_t r^2)."""
     normal, torsion, inertia = 12.0, 4e-3, 2e-5

@@ -34,6 +34,7 @@ def break_aways():
     return {rate: lugre.break_away(rate) for rate in lugre.BREAK_AWAY}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate", "published", "tolerance"),
     [
@@ -98,6 +99,7 @@ def test_before_sliding_force_and_displacement_make_closed_loops_that_dissipate(
     assert slope == pytest.approx(STIFFNESS * (1.0 + bent / STATIC), rel=5e-2)
 
 
+@pytest.mark.slow
 def test_friction_lags_behind_the_velocity_the_more_the_faster_it_changes():
     """Section III-B: velocity between 0.5 and 2.5 mm/s; friction is larger while it grows than while it falls."""
     widths = []
@@ -156,6 +158,7 @@ def test_random_motion_at_any_speed_never_draws_energy_with_enough_viscous_frict
     assert np.min(dissipation(STATIC * share, velocity, level, 0.0, 0.0)) >= 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_random_motion_with_the_published_numbers_takes_more_than_the_bristles_store(seed):
     draw = np.random.default_rng(seed)

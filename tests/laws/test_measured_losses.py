@@ -57,6 +57,7 @@ def test_a_spring_with_hysteresis_gives_back_a_share_less_than_it_took():
     assert back == pytest.approx(share / (1.0 - share / ratio) * stiffness, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_account_of_a_servo_finger_with_all_of_these_losses_closes():
     losses = {
         "finger.tendon_friction.drag": 0.3,

@@ -175,6 +175,7 @@ def says_what_to_try(error: IntegrationError) -> None:
     assert "t = " in str(error) and error.reason and error.advice in str(error)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::finger_pin.exceptions.SelfLockingWarning")
 @FEW
 @given(scenarios())
@@ -220,6 +221,7 @@ def test_a_step_ends_finite_or_says_why_it_stopped(table, scale, pulls, steps, m
     assert np.isfinite(simulator.x).all()
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_go_on_ends_with_time_state_and_advice():
     """A passive tendon of a femtogram at the largest stiffness, whose waves have 2e13 Hz."""
     frantic = {

@@ -31,6 +31,7 @@ def close(actual, expected, name):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("evaluator", [lambda finger: finger, CompiledFinger], ids=["Python", "compiled"])
 def test_evaluation_agrees_with_the_scalar_model_at_random_states(case, evaluator):
     numbers, loop = case

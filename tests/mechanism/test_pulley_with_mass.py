@@ -161,6 +161,7 @@ def swing(block):
     return angles
 
 
+@pytest.mark.slow
 def test_a_block_without_mass_is_a_pulley_that_divides_the_tension():
     """Friction of canals and pins included: what differs falls with the mass and the cord's compliance."""
     massless = swing(None)

@@ -56,6 +56,7 @@ def postures(span, p, count):
     return found
 
 
+@pytest.mark.slow
 @every_case
 def test_lengths_and_arms_are_those_of_mujoco(span, side):
     sliding = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
@@ -140,6 +141,7 @@ def test_points_in_line_with_the_centre_have_a_path(span):
     assert np.isfinite(slopes(span, y, numbers("inside"))[1]).all()
 
 
+@pytest.mark.slow
 @every_case
 def test_compiled_spans_agree(span, side):
     p = numbers(side)

@@ -41,6 +41,7 @@ def test_coefficient_is_the_printed_exponential_form_of_equation_16():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("direction", "sign"), [(1.0, -1.0), (-1.0, 1.0)], ids=["pulling", "releasing"])
 @pytest.mark.parametrize("posture", [(0.0, 0.0, 0.0, 0.0), (-0.1, 0.6, 0.9, 0.7)])
 def test_steady_sliding_delivers_the_tension_of_the_capstan_law(dry, direction, sign, posture):

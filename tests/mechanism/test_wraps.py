@@ -110,6 +110,7 @@ def equations(scenario, pull):
     return rate
 
 
+@pytest.mark.slow
 def test_a_motion_with_reversals_is_that_of_the_equations_alone():
     times = np.array([0.0, 0.3, 0.5, 0.8])
     values = np.array([2.0, 8.0, 5.0, 9.0])

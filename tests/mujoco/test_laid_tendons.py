@@ -54,6 +54,7 @@ def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path, mcp,
     assert signals.tension[signals.index("flexor")] == pytest.approx(3.0)
 
 
+@pytest.mark.slow
 def test_they_move_alike_there_and_here_with_friction_around_joints_and_along_a_path():
     spec = mujoco.MjSpec.from_string(BARE)
     fp.mujoco.add_tendons(spec, tomllib.loads(LAID)["tendons"])

@@ -156,6 +156,7 @@ def test_a_process_that_has_not_imported_us_is_told_what_is_missing_by_the_xml()
     assert "finger_pin.friction" in told
 
 
+@pytest.mark.slow
 def test_a_binary_or_pickled_model_moves_alike_in_a_process_that_imports_us_first_and_is_lost_in_one_that_does_not(
     model,
 ):

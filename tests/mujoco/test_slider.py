@@ -77,6 +77,7 @@ def test_drag_adds_to_the_level():
     assert fp.mujoco.friction(model, data).bristle[0] == pytest.approx(-(20.0 * least + 0.5) / (1.0 + least), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("micro_damping", [0.0, 20.0])
 def test_motion_converges_to_the_equations_written_out_at_the_first_order_of_mujoco_s_step(micro_damping):
     law = {"coulomb": 0.3, "curvature_offset": 1.2, "stiction_ratio": 1.4, "stiffness": 2e3, "viscous": 5.0}

@@ -29,6 +29,7 @@ def test_the_paper_s_finger_in_mujoco_nears_our_motion_at_the_first_order_of_its
     assert np.all(errors[:-1] / errors[1:] > 1.8)
 
 
+@pytest.mark.slow
 def test_a_routed_hand_with_our_friction_moves_in_mujoco_as_here():
     """What `from_mujoco` reads and simulates, and the model itself with the same friction, at the first order."""
     spec = mujoco.MjSpec.from_string(ROUTED)

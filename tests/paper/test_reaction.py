@@ -182,6 +182,7 @@ def test_the_figure_draws_the_reactions_and_their_differences(along_fig6):
         np.testing.assert_allclose(figure.axes[5].lines[1].get_ydata(), share)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_row_per_joint_and_force_and_a_figure(tmp_path, capsys):
     settings = ["--set", "simulation.duration=0.02", "--forces", "1", "--output", str(tmp_path)]
     assert run_function(reaction, settings) == 0

@@ -76,6 +76,7 @@ def test_the_workspace_of_a_planar_finger_lies_in_its_plane():
     np.testing.assert_allclose(tips.min(axis=0), [-l2, 0.0, 0.0], atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ub_stand_in", "planar"])
 def test_fig2_prints_ranges_in_centimetres_and_accepts_finger_and_description(name, tmp_path):
     description = load_finger(name)

@@ -17,6 +17,7 @@ def rate(times):
     return np.transpose([np.cos(times), 1.4 * np.sin(0.7 * times)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [7, 9, 15])
 @pytest.mark.parametrize("uneven", [0.0, 0.4])
 def test_slopes_of_rounded_samples_are_those_of_what_was_sampled(digits, uneven):

@@ -126,6 +126,7 @@ def test_each_finger_has_a_lambda_of_its_own(scenario, result):
         np.testing.assert_allclose(result.tendon_command.sel(tendon=own).min("tendon"), 1.0, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "overrides",
     [

@@ -133,6 +133,7 @@ def test_the_account_exposes_a_wrong_law(plant, loop, monkeypatch):
     assert share_left_open(loop) > 1e-3
 
 
+@pytest.mark.slow
 def test_the_account_does_not_judge_the_controller(loop, monkeypatch):
     """Whatever the actuators are told, the books balance: the account is about the finger."""
     wrong_command(monkeypatch)

@@ -68,6 +68,7 @@ def built(scenario):
     return build_tables(loop.finger.mechanism), compiled_control(loop), loop.initial_state(), loop.fingertip_force
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_number_that_ships_makes_what_reading_it_anew_does(name):
     """The scenario of each number, and of an integer there; and, of all together, everything a run computes with."""
@@ -84,6 +85,7 @@ def test_every_number_that_ships_makes_what_reading_it_anew_does(name):
     assert same(built(family.with_values([*together.values()])), built(fp.load_scenario(name, together)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "finger"), [("reversals", ""), ("servo_position", ""), ("pinch", "left"), ("hand", "thumb")]
 )

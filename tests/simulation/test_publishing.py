@@ -117,6 +117,7 @@ def killed(tmp_path_factory, result):
     return [home / f"at{number}" for number in range(int(done.stdout))], sets
 
 
+@pytest.mark.slow
 def test_a_run_killed_at_any_instant_of_publishing_leaves_one_whole_set_to_any_reader(killed):
     """The earlier set up to one instant and the new one after it, without anybody's help."""
     folders, (old, new) = killed
@@ -130,6 +131,7 @@ def test_a_run_killed_at_any_instant_of_publishing_leaves_one_whole_set_to_any_r
     assert load_scenario(folders[switched] / "scenario.toml").simulation.duration == 0.003
 
 
+@pytest.mark.slow
 def test_the_next_run_tidies_up_after_any_kill(killed, tmp_path, monkeypatch, result):
     monkeypatch.setattr("finger_pin.files._PATIENCE", 0.0)
     for folder in killed[0]:

@@ -19,6 +19,7 @@ LED = {
 TIGHT = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "entries", "keys", "variables", "bound"),
     [
@@ -139,6 +140,7 @@ def test_of_a_sampled_controller_they_are_the_differences_of_tight_runs_too():
     assert np.max(np.abs(error)) < 1e-2 * np.max(np.abs(expected))
 
 
+@pytest.mark.slow
 def test_of_a_hand_whose_controller_is_sampled_every_finger_keeps_steps_of_its_own():
     entries = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0, "controller.sampling": {"period": 5e-3}}
     keys = ["hand.fingers.index.finger.tendon_friction.coulomb[2,3,4]"]
@@ -152,6 +154,7 @@ def test_of_a_hand_whose_controller_is_sampled_every_finger_keeps_steps_of_its_o
     assert np.sqrt(np.mean((slopes - expected) ** 2)) < 1e-2 * np.sqrt(np.mean(expected**2))
 
 
+@pytest.mark.slow
 def test_each_finger_of_a_hand_feels_numbers_of_its_own_alone():
     entries = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0}
     keys = [f"hand.fingers.{name}.finger.tendon_friction.coulomb[2,3,4]" for name in ("middle", "thumb")]

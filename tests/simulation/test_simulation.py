@@ -84,6 +84,7 @@ class Constant:
         return ControlSignals(np.zeros_like(position), tension)
 
 
+@pytest.mark.slow
 def test_a_reference_of_one_s_own_is_followed():
     result = fp.simulate(short(), reference=Hold((0.02, 0.3, 0.5, 0.346)))
     np.testing.assert_array_equal(result.joint_reference, np.broadcast_to([0.02, 0.3, 0.5, 0.346], (21, 4)))
@@ -91,6 +92,7 @@ def test_a_reference_of_one_s_own_is_followed():
     np.testing.assert_allclose(result.joint_position[-1], [0.02, 0.3, 0.5, 0.346], atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_controller_of_one_s_own_is_obeyed():
     """T1 alone pulls: joints 1 and 2 are turned positively with the same radius, against friction and gravity."""
     result = fp.simulate(short(), controller=Constant((4.0, 0.0, 0.0, 0.0, 0.0)), reference=Hold((0.0, 0.5, 0.5, 0.4)))
@@ -106,6 +108,7 @@ def test_progress_rises_to_the_end(fig6_runs, fig6_progress, method):
     assert fig6_progress[method][-1] == pytest.approx(fig6_runs[method].attrs["end_time"], rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_an_interruption_keeps_what_was_computed(fig6_runs, method):
     seen = []
@@ -135,6 +138,7 @@ def test_an_interruption_of_the_compiled_core_keeps_what_was_computed(method, re
     np.testing.assert_allclose(error.result.joint_position, whole.joint_position, atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_a_failed_integration_raises_and_keeps_what_was_computed(method):
     controller = Constant((1.0, 1.0, 4.0, 3.0, 3.0), broken_after=0.01)
@@ -148,6 +152,7 @@ def test_a_failed_integration_raises_and_keeps_what_was_computed(method):
     assert error.reason and error.advice in str(error)
 
 
+@pytest.mark.slow
 def test_a_failure_in_the_first_step_keeps_the_start():
     controller = Constant((1.0, 1.0, 4.0, 3.0, 3.0), broken_after=0.0)
     with pytest.raises(IntegrationError) as caught:

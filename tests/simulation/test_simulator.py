@@ -27,6 +27,7 @@ def walk(simulator: Simulator, steps: int, seed: int = 0) -> np.ndarray:
     return np.array([simulator.step(TENSION * random.uniform(0.5, 1.5, 4), 1e-3).position for _ in range(steps)])
 
 
+@pytest.mark.slow
 def test_a_step_follows_the_numpy_dynamics_integrated_by_another_method(finger: fp.Finger) -> None:
     simulator = Simulator(finger, START, rtol=1e-8, atol_scale=1e-8)
     for _ in range(3):
@@ -38,6 +39,7 @@ def test_a_step_follows_the_numpy_dynamics_integrated_by_another_method(finger: 
     np.testing.assert_allclose(simulator.x / finger.layout.scales(), expected / finger.layout.scales(), atol=5e-7)
 
 
+@pytest.mark.slow
 def test_a_fingertip_force_acts_during_its_step_only(finger: fp.Finger) -> None:
     force = np.array([0.2, -0.1, 0.3])
     simulator = Simulator(finger, START, rtol=1e-8, atol_scale=1e-8)

@@ -85,6 +85,7 @@ def test_a_copy_keeps_its_result_when_the_other_one_is_given_other_numbers(finge
     assert np.array_equal(twin.result().tendon_tension, before.tendon_tension)
 
 
+@pytest.mark.slow
 def test_a_result_is_marked_and_drawn_and_saved_like_any_other(finger: fp.Finger, tmp_path: Path) -> None:
     reference = (np.array([0.0, 1.0]), np.array([START[:3], START[:3] + 0.1]))
     result = pushed(fp.Simulator(finger, START), 10, seed=5).result(reference=reference)

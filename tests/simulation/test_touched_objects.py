@@ -188,6 +188,7 @@ def test_a_contact_too_stiff_for_its_tolerance_is_named():
     assert "\n" not in str(said[0].message) and found.attrs["accuracy"] == str(said[0].message)
 
 
+@pytest.mark.slow
 def test_powers_of_many_states_are_those_of_each_alone(scene, pushed):
     loop = ClosedLoop.from_scenario(fp.load_scenario(scene)).compiled()
     x = np.array([last_state(loop.finger, pushed, k) for k in range(0, 1200, 8)])

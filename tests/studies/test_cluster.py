@@ -71,6 +71,7 @@ def test_a_run_that_kills_its_workers_is_recorded_with_its_reason(cluster, execu
     assert "died" in str(result["reason"].values[1])
 
 
+@pytest.mark.slow
 def test_a_stop_ends_a_sweep_on_a_cluster(executor):
     done = []
     result = fp.sweep(
@@ -84,6 +85,7 @@ def test_a_stop_ends_a_sweep_on_a_cluster(executor):
     )
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_told_and_what_was_done_stays(tmp_path):
     def leave(finished, failed, total):
         if finished == 2:
@@ -107,6 +109,7 @@ def test_workers_of_another_source_are_refused(executor, monkeypatch):
         fp.sweep("reversals", {"controller.gain": [1.0]}, metrics=[GAIN], overrides=SHORT, executor=executor)
 
 
+@pytest.mark.slow
 def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(SCRIPTS))

@@ -133,6 +133,7 @@ print(list(map(digest, things)))
 """
 
 
+@pytest.mark.slow
 def test_equal_values_have_equal_digests_in_processes_that_order_sets_and_texts_otherwise():
     told = []
     for seed in ("1", "2"):

@@ -92,6 +92,7 @@ def test_more_keys_and_samples_are_drawn_as_a_point_per_run_over_each_key_with_f
     assert [axes.get_ylabel() for axes in panels[:, 0]] == ["m (N)", "n (N)"][: size[0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", ["column", "page", None])
 def test_the_text_of_many_keys_overlaps_at_no_width(width):
     keys = {name: 1e-3 * np.arange(1.0, 6.0) for name in (RADIUS, "controller.gain", "c", "simulation.method")}

@@ -58,6 +58,7 @@ def test_a_sweep_writes_its_results_and_says_what_came_out(script, tmp_path, mon
     assert dict(fp.load(folder / "sweep.nc").sizes) == {"controller.gain": 2, radius: 2}
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("default:out/runs.jsonl")
 def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(script, tmp_path, monkeypatch, capsys):
     arguments = (
@@ -84,6 +85,7 @@ def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(scr
     assert np.isfinite(fp.load(tmp_path / "out" / "sweep.nc")["tracking_rms"]).all()
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_what_was_done_and_says_so(tmp_path):
     arguments = ("--over", "controller.gain=0.5:2:40", "--set", "simulation.duration=0.3", "--output", "out")
     path = tmp_path / "out" / "runs.jsonl"

@@ -60,6 +60,7 @@ def whole(robot, hand):
     return fp.Finger.from_model(hand, robot.model, joints, tips, base_axis=AXIS, visuals=robot.visual_model)
 
 
+@pytest.mark.slow
 def test_every_figure_of_a_finger_takes_it(foreign):
     figures = [
         plot_workspace(foreign),

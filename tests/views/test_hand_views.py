@@ -32,6 +32,7 @@ def test_the_part_of_a_result_about_a_finger_has_its_own_names_and_values(hand):
         finger_of(ring, "ring")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw_figure", [plots.plot_fig6, plots.plot_losses])
 def test_figures_have_a_row_for_each_finger_or_show_one_as_a_finger(hand, draw_figure):
     figure = draw_figure(hand)

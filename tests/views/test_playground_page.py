@@ -104,6 +104,7 @@ def until(condition, patience=30.0):
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_a_message_with_a_wrong_value_does_not_end_the_playing(playground):
     """Every control of the page is sent every wrong value, as by a page that has gone wrong."""
     session, netloc = playground.session, urlsplit(playground.url).netloc

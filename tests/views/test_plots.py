@@ -61,6 +61,7 @@ def test_fig3_curves_are_the_law_written_out():
     assert len(top.get_lines()) == len(bottom.get_lines()) == 4
 
 
+@pytest.mark.slow
 def test_fig6_shows_angles_over_references_and_errors_in_degrees(result):
     (angles, errors), _ = columns(plots.plot_fig6(result))
     time, count = result["time"].values, result.sizes["joint"]
@@ -94,6 +95,7 @@ def test_fig6_shows_planned_and_delivered_tension_and_both_sides_of_passive_tend
             assert_shows(dotted[0], time, proximal[:, index - (count - passive)])
 
 
+@pytest.mark.slow
 def test_losses_show_forces_and_torques_before_and_after_friction(result):
     left, right = columns(plots.plot_losses(result))
     time, count = result["time"].values, result.sizes["tendon"]
@@ -114,6 +116,7 @@ def test_losses_show_forces_and_torques_before_and_after_friction(result):
         assert_shows(drawn["after joint friction"], time, net)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
 def test_every_panel_of_a_result_names_its_unit(draw, result):
     figure = draw(result)
@@ -146,6 +149,7 @@ def test_positions_and_forces_of_a_hand_stand_in_panels_by_their_units():
     assert shown["tension (N)"] == ["trunk"] and shown["cord tension (N)"] == ["cord"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [1, 2])
 def test_the_shortest_results_can_be_drawn(samples, tmp_path):
     still = synthetic(samples=5).isel(time=slice(samples)) * 0.0
@@ -159,6 +163,7 @@ def test_a_result_without_time_is_refused_in_one_line(draw, result):
             draw(timeless)
 
 
+@pytest.mark.slow
 def test_draw_all_writes_whole_pictures_of_a_size_for_the_screen(tmp_path):
     folder = tmp_path / "new" / "figures"
     paths = plots.draw_all(synthetic(), folder)
@@ -193,6 +198,7 @@ def test_an_earlier_picture_survives_a_figure_that_cannot_be_drawn(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.slow
 def test_two_results_lie_over_each_other_each_on_its_own_time(result):
     other = 2.0 * result.isel(time=slice(0, 1000, 2))
     angles, rest = columns(plots.compare(result, other, ("one", "two")))

@@ -60,6 +60,7 @@ def test_angles_are_drawn_in_degrees_and_no_text_says_rad(draw):
     assert not [text for text in said if "rad" in text.replace("N m/rad", "")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-7, 1.0, 1e7])
 @pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
 def test_no_power_of_ten_stands_on_a_title_however_large_the_numbers(draw, factor):

@@ -48,6 +48,7 @@ def test_colour_blind_people_tell_the_joints_apart(blindness):
     assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)) > 12.0
 
 
+@pytest.mark.slow
 def test_figures_open_no_windows_and_leave_settings_alone():
     code = """
 import sys
@@ -95,6 +96,7 @@ def nothing_overlaps(figure):
         assert shared is None or min(shared.width, shared.height) < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", ["column", "page"])
 @pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
 @pytest.mark.parametrize("titles", [True, False])
@@ -159,6 +161,7 @@ def critical(**options):
 
 
 # Two panels of a sweep stand side by side from 5.71 in on, and there as close to each other as ever.
+@pytest.mark.slow
 @pytest.mark.parametrize("width", ["column", 5.75])
 @pytest.mark.parametrize("draw", [touched, swept, identified, compared, mapped, sensitivity, critical])
 def test_long_names_are_broken_before_they_meet_or_leave_the_figure(draw, width):
@@ -170,6 +173,7 @@ def test_a_width_that_is_none_is_refused():
         plots.plot_fig6(synthetic(), width="narrow")
 
 
+@pytest.mark.slow
 def test_figures_are_written_in_the_format_that_was_asked_for(tmp_path):
     beginnings = {"pdf": b"%PDF", "svg": b"<?xml", "png": b"\x89PNG"}
     for name, begins in beginnings.items():

@@ -46,6 +46,7 @@ def test_it_is_played_in_real_time_and_touches_nothing_but_the_finger(played):
     assert {command["type"] for _, command in sent} == {"set_object", "set_transform"}
 
 
+@pytest.mark.slow
 def test_links_stand_where_the_kinematics_say_and_tendons_have_the_colour_of_their_tension(played):
     sent = dict((command["path"], command) for _, command in played())
     q = joint_position(DURATION)

@@ -23,6 +23,7 @@ def pictures(path):
         return found, film.info["duration"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", ["ffmpeg", "pillow"])
 def test_a_gif_lasts_as_long_as_the_motion_and_traces_the_fingertip(result, tmp_path, monkeypatch, tool):
     if tool == "pillow":
@@ -42,6 +43,7 @@ def test_a_gif_lasts_as_long_as_the_motion_and_traces_the_fingertip(result, tmp_
     assert np.all(np.diff(tops) < 0)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not video.find_ffmpeg(), reason="needs ffmpeg")
 def test_an_mp4_in_slow_motion_has_frames_for_all_of_its_time(result, tmp_path):
     path = write_video(result.sel(time=slice(0.0, 0.2)), tmp_path / "film.mp4", speed=0.25, rate=20.0)
