@@ -8,8 +8,6 @@ from finger_pin.mechanism.coerce import as_finger, description_of
 from finger_pin.simulation.energy import entries
 
 SHORT = {"simulation.duration": 0.005}
-
-
 COULOMB = "finger.tendon_friction.coulomb"
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from finger_pin.description.finger import FingerDescription
-from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import (
     COUNT,
     GROUP,
@@ -17,6 +16,7 @@ from finger_pin.exchange.mujoco_friction import (
     TENDON,
     Coefficients,
     PluginFriction,
+    check_friction,
 )
 from finger_pin.mechanism.joints import JointFriction
 from finger_pin.mechanism.tendons import Tendons
@@ -31,13 +31,7 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
         InputError: If tendons rub at several bends, as a tendon of MuJoCo has one force along all of its length, or
             joints by another law.
     """
-    law = description.joint_friction.law
-    if law != "lugre" and any(description.bearings):
-        allowed = 'must be "lugre", law (9), the only one that is computed in the step of MuJoCo; or leave out friction'
-        raise InputError("finger.joint_friction.law", allowed, law)
-    if tendons.at_bends:
-        allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
-        raise InputError("finger.tendon_friction.place", allowed, description.tendon_friction.place)
+    check_friction(description, tendons.at_bends)
     frictions = [*_of_tendons(description, tendons, massless), *_of_joints(description, tendons)]
     elements = {(each.tag, each.get("name")): each for kind in ("joint", "fixed") for each in root.iter(kind)}
     for friction in frictions:

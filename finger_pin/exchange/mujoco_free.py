@@ -34,6 +34,7 @@ class FreeBodies:
     def __init__(self, read: ElementReader, passed: set[int]) -> None:
         """Find the free bodies of a model, given those that tendons pass."""
         self.model, self.names, mujoco = read.model, read.names, read.mujoco
+        self._colliding = read.colliding
         model = self.model
         joints = [int(i) for i in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)]
         trees = {i: self._carried(int(model.jnt_bodyid[i])) for i in joints}
@@ -59,10 +60,7 @@ class FreeBodies:
         return bodies
 
     def _touches_with_several(self, carried: set[int]) -> bool:
-        model = self.model
-        own = np.isin(model.geom_bodyid, [*carried])
-        colliding = own & ((model.geom_contype > 0) | (model.geom_conaffinity > 0))
-        return int(np.count_nonzero(colliding)) > 1
+        return int(np.count_nonzero(np.isin(self.model.geom_bodyid[self._colliding], [*carried]))) > 1
 
     def _of(self, joint: int) -> tuple[int, str, Array]:
         """Return the body of a joint, its name, and its rotation at the model's reference."""
@@ -75,12 +73,12 @@ class FreeBodies:
         body, name, turned = self._of(joint)
         first = int(model.jnt_dofadr[joint])
         centre = model.body_ipos[body].tolist()
-        for k, (what, axis) in enumerate(zip((*_SLIDES, *_TURNS), (*np.eye(3), *self._axes.T[::-1]), strict=True)):
+        for k, (coordinate, axis) in enumerate(zip(_names(name), (*np.eye(3), *self._axes.T[::-1]), strict=True)):
             reach = _REACH if k < len(_SLIDES) else math.pi
             damping, armature = float(model.dof_damping[first + k]), float(model.dof_armature[first + k])
             spring = {"spring": {"stiffness": 0.0, "damping": damping}} if damping else {}
             yield (
-                f"{name}_{what}",
+                coordinate,
                 {"range": [-reach, reach], "limited": False, **spring},
                 {
                     "body": name,
@@ -104,8 +102,7 @@ class FreeBodies:
             # Where the first and the third hinge have one axis, any share of the turn will do.
             warnings.filterwarnings("ignore", "Gimbal lock")
             angles = Rotation.from_matrix(self._axes.T @ now @ turned.T @ self._axes).as_euler("ZYX")
-        names = (f"{name}_{what}" for what in (*_SLIDES, *_TURNS))
-        return dict(zip(names, [*moved.tolist(), *angles.tolist()], strict=True))
+        return dict(zip(_names(name), [*moved.tolist(), *angles.tolist()], strict=True))
 
     def velocity(self, joint: int, qpos: Array, qvel: Array) -> dict[str, float]:
         """Return the speeds of a body's slides and hinges in a state of the model.
@@ -125,10 +122,14 @@ class FreeBodies:
             allowed = "turns where the second of its three hinges is at a right angle, which has no speed for it"
             raise InputError(f"model: free body {name}", f"{allowed}; give another start")
         rates = np.zeros(3) if not turning.any() else np.linalg.solve(axes, self._axes.T @ now @ turning)
-        names = (f"{name}_{what}" for what in (*_SLIDES, *_TURNS))
-        return dict(zip(names, [*moved.tolist(), *rates.tolist()], strict=True))
+        return dict(zip(_names(name), [*moved.tolist(), *rates.tolist()], strict=True))
 
 
 def _rotation(real_first: Array) -> Array:
     """Return the rotation of a quaternion w, x, y, z."""
     return np.asarray(Rotation.from_quat(np.roll(real_first, -1)).as_matrix())
+
+
+def _names(body: str) -> list[str]:
+    """Return the names of a body's slides and hinges."""
+    return [f"{body}_{what}" for what in (*_SLIDES, *_TURNS)]

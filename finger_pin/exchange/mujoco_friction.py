@@ -11,6 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from finger_pin.description.finger import FingerDescription
+from finger_pin.exceptions import InputError
+
 #: The plugin, and the actuator and tuple that `add_friction` makes.
 PLUGIN = "finger_pin.friction"
 NAME = "finger_pin_friction"
@@ -24,6 +27,21 @@ LEAST_LOSS = 1e-6
 #: Kinds of friction: of a tendon that is pulled, of a joint's pin (17), of a slide that is a passive tendon's mass
 #: (14c), of a fixed tendon over one joint that is pulled by what drives the joint, and of a branch behind a pulley.
 TENDON, PIN, MASS, LINK, BRANCH = range(5)
+
+
+def check_friction(description: FingerDescription, at_bends: bool) -> None:
+    """Refuse friction that no step of MuJoCo computes: joints under another law than (9), tendons that rub at bends.
+
+    Raises:
+        InputError: Naming the entry.
+    """
+    law = description.joint_friction.law
+    if law != "lugre" and any(description.bearings):
+        allowed = 'must be "lugre", law (9), the only one that is computed in the step of MuJoCo; or leave out friction'
+        raise InputError("finger.joint_friction.law", allowed, law)
+    if at_bends:
+        allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
+        raise InputError("finger.tendon_friction.place", allowed, description.tendon_friction.place)
 
 
 class Coefficients(NamedTuple):

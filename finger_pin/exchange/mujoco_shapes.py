@@ -33,12 +33,8 @@ class Shapes:
             int(kinds.mjGEOM_CYLINDER): "cylinder",
             int(kinds.mjGEOM_BOX): "box",
         }
-        self._disabled = disabled(mujoco, model)
-        touching = "contact" not in self._disabled
-        paired = {int(each) for each in (*model.pair_geom1, *model.pair_geom2) if touching}
-        self._colliding = [
-            i for i in range(model.ngeom) if model.geom_contype[i] or model.geom_conaffinity[i] or i in paired
-        ]
+        touching = "contact" not in disabled(mujoco, model)
+        self._colliding = read.colliding
         for i in self._colliding:
             kind = kinds(int(model.geom_type[i])).name.removeprefix("mjGEOM_").lower()
             if not self._solid(i) and not self._is_plane(i):

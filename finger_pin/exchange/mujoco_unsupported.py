@@ -133,6 +133,13 @@ class ElementReader:
         weld = self.model.body_weldid
         return np.asarray((weld > 0) & (self.model.body_mocapid[weld] < 0))
 
+    @property
+    def colliding(self) -> list[int]:
+        """Geoms that touch something by their bits, or by a pair that is listed."""
+        model, pairs = self.model, "contact" not in disabled(self.mujoco, self.model)
+        listed = {int(each) for each in (*model.pair_geom1, *model.pair_geom2) if pairs}
+        return [i for i in range(model.ngeom) if model.geom_contype[i] or model.geom_conaffinity[i] or i in listed]
+
     def start_data(self, keyframe: int = 0) -> Any:
         """Return the model's data where runs start: at a keyframe, or at its reference without any."""
         data = self.mujoco.MjData(self.model)

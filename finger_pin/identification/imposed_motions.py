@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PPoly, make_interp_spline, make_splrep
 
 from finger_pin.control.closed_loop import ClosedLoop
@@ -21,7 +20,6 @@ from finger_pin.exceptions import InputError
 from finger_pin.identification.motions import RecordedMotion
 from finger_pin.identification.recorded_inputs import Corrections, corrections
 from finger_pin.identification.recordings import BEYOND, Recording
-from finger_pin.mechanism.finger import Finger
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 
@@ -33,20 +31,14 @@ _ON = 1e-9
 class ImposedMotion(RecordedMotion):
     """Recorded motion of all joints, or a window of one, whose effort is compared."""
 
-    def __init__(
-        self,
-        recording: Recording,
-        scenario: Scenario,
-        rows: NDArray[np.intp],
-        window: int = 0,
-        finger: Finger | None = None,
-    ) -> None:
-        """Fit the splines, and put further inputs into the scenario.
+    def _read_imposed(self, scenario: Scenario) -> None:
+        """Fit the splines.
 
         Raises:
-            InputError: Also if a joint's motion is missing, too short, smoothed away or beyond the joint's stops.
+            InputError: If a joint's motion is missing, too short, smoothed away or beyond the joint's stops.
         """
-        entry = f"identify.recordings.{recording.name}.inputs"
+        recording = self.recording
+        entry = f"{self._entry}.inputs"
         self._columns = {joint: f"{IMPOSED}.{joint}" for joint in scenario.finger.joints}
         missing = [joint for joint, name in self._columns.items() if name not in recording.inputs]
         if missing:
@@ -57,10 +49,8 @@ class ImposedMotion(RecordedMotion):
                 raise InputError(f"{entry}.{name}", f"there is no such joint; there are {', '.join(self._columns)}")
         for joint, name in self._columns.items():
             _check_range(f"{entry}.{name}", recording.inputs[name], scenario, joint)
-        _check_actuators(f"identify.recordings.{recording.name}.inputs", recording, scenario)
-        self._first = float(recording.time[rows[0]])
+        _check_actuators(entry, recording, scenario)
         self._splines = _splines(recording)
-        super().__init__(recording, scenario, rows, window, finger)
 
     def _loop(self, scenario: Scenario, nuisance: Mapping[str, float]) -> ClosedLoop:
         return super()._loop(scenario, nuisance).along(self._motion(nuisance))

@@ -65,14 +65,15 @@ class RecordedMotion:
         """
         self.recording, self.rows = recording, rows
         self._entry = f"identify.recordings.{recording.name}"
-        self._times = recording.time[rows] - recording.time[rows[0]]
+        self._first = float(recording.time[rows[0]])
+        self._times = recording.time[rows] - self._first
         self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
+        self._read_imposed(scenario)
         table = copy.deepcopy(scenario.model_dump(mode="python", exclude_unset=True, exclude_none=True))
         put_inputs(table, recording, scenario)
-        first = float(recording.time[rows[0]])
         settings = {"duration": float(self._times[-1]), "sample_rate": 1.0 / float(self._times[-1])}
         table["simulation"] = {**table.get("simulation", {}), **settings}
-        table["simulation"]["start_time"] = scenario.simulation.start_time + first
+        table["simulation"]["start_time"] = scenario.simulation.start_time + self._first
         self._put_start(table, scenario, window)
         # The steps of an encoder would make the likelihood as rough as what ends an interval.
         self.scenario = with_exact_encoders(read_scenario(table))
@@ -184,6 +185,9 @@ class RecordedMotion:
     def _loop(self, scenario: Scenario, nuisance: Mapping[str, float]) -> ClosedLoop:
         finger = None if self._finger is None else with_parameters_of(self._finger, self.scenario, scenario)
         return ClosedLoop.from_scenario(scenario, finger=finger)
+
+    def _read_imposed(self, scenario: Scenario) -> None:
+        """Read the motion of joints that is given: none here."""
 
     def _imposed(self, nuisance: Mapping[str, float]) -> dict[str, Corrections]:
         """Return the corrections of joints whose motion is given, by column: none here."""

@@ -171,7 +171,7 @@ class Problem:
         return residuals
 
     def errors(self, z: Array) -> list[Array]:
-        """Return measured less computed of every signal, shape (m,) each; infinite where values do not go together."""
+        """Return the errors of every signal, measured less computed, shape (m,) each, or infinite ones."""
         if self.stop():
             raise Stopped
         self.evaluations += 1

@@ -56,12 +56,9 @@ class SteadyReadings:
                 self._position[:, joints.index(joint)] = angle
         for name, values in recording.inputs.items():
             variable, _, label = name.partition(".")
-            if variable in ("tendon_command", "spool_tension"):
-                check_pulling(f"{self._entry}.inputs.{name}", values)
-                place = self._place(f"inputs.{name}", label, tendons)
-                self.load[:, place] = values
-                self._inputs.append((name, self.load, place))
-            elif variable == _WINDING:
+            if variable in ("tendon_command", "spool_tension", _WINDING):
+                if variable != _WINDING:
+                    check_pulling(f"{self._entry}.inputs.{name}", values)
                 place = self._place(f"inputs.{name}", label, tendons)
                 self.load[:, place] = values
                 self._inputs.append((name, self.load, place))

@@ -165,7 +165,7 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
                 axis = (1, 7, 10, 1)[leg.column]
                 loads = [(rotation @ out[axis : axis + 3], frame.act(out[4:7]))] if out[0] < 0.0 else []
             arm = np.zeros(width)
-            if piece.shape.columns > 1 and leg.column == SPIN and loads:
+            if leg.column == SPIN and loads:
                 arm += loads[0][0] @ (twists[piece.ends[0].joint] - twists[piece.joint])[3:]
                 loads = []
             for (force, point), end in zip(loads, piece.ends[:2], strict=False):

@@ -10,6 +10,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.validation import Description, expand, quantity, real, suggestion, validate
 from finger_pin.exceptions import InputError
+from finger_pin.exchange.mujoco_friction import check_friction
 
 
 class RoutedFriction(TendonFrictionSettings):
@@ -68,12 +69,7 @@ def keys_of(description: FingerDescription) -> tuple[dict[str, dict[str, Any]], 
             another law than (9).
     """
     rubbing, turning = description.tendon_friction, description.joint_friction
-    if rubbing.place != "canal":
-        allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
-        raise InputError("finger.tendon_friction.place", allowed, rubbing.place)
-    if turning.law != "lugre" and any(description.bearings):
-        allowed = 'must be "lugre", law (9), the only one that is computed in the step of MuJoCo; or leave out friction'
-        raise InputError("finger.joint_friction.law", allowed, turning.law)
+    check_friction(description, rubbing.place != "canal")
     of_tendons = {name: each.along or name for name, each in description.tendons.items()}
     of_tendons |= {name: name for name in description.canals}
     tendons = {}

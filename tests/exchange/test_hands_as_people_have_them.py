@@ -53,10 +53,8 @@ def test_a_joint_follows_another_by_a_polynomial_from_both_references(degree):
     """The coupling's springs rest where MuJoCo's residual is zero, at random postures."""
     random = np.random.default_rng(degree)
     powers = np.append(random.uniform(-0.4, 0.4, degree + 1), np.zeros(4 - degree))
-    text = " ".join(map(str, powers))
-    model = chain(
-        f'<equality><joint joint1="pip" joint2="mcp" polycoef="{text}"/></equality>{SERVOS}', far_joint='ref="0.2"'
-    )
+    coupling = f'<joint joint1="pip" joint2="mcp" polycoef="{" ".join(map(str, powers))}"/>'
+    model = chain(f"<equality>{coupling}</equality>{SERVOS}", far_joint='ref="0.2"')
     hand = fp.Hand(fp.from_mujoco(model))
     for q in random.uniform(-0.4, 1.4, (4, 2)):
         data = mujoco.MjData(model)
