@@ -7,12 +7,12 @@ from . import studies as studies
 from . import views as views
 from .analysis.linearise import linearise as linearise
 from .description.finger import FingerDescription as FingerDescription
-from .description.loading import list_scenarios as list_scenarios
 from .description.loading import load_finger as load_finger
 from .description.loading import load_hand as load_hand
 from .description.loading import load_scenario as load_scenario
 from .description.loading import to_toml as to_toml
 from .description.scenario import Scenario as Scenario
+from .description.tables import list_scenarios as list_scenarios
 from .exceptions import FingerPinError as FingerPinError
 from .exceptions import InputError as InputError
 from .exceptions import IntegrationError as IntegrationError

@@ -17,10 +17,11 @@ from finger_pin.commands.application import run_function
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.controller import ControllerSettings
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.loading import list_scenarios, load_scenario
+from finger_pin.description.loading import load_scenario
 from finger_pin.description.objects import EnvironmentSettings
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.tables import list_scenarios
 from finger_pin.description.validation import Description
 from finger_pin.simulation.sampled_trajectory import Quantity
 from finger_pin.simulation.setup import Setup

@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from finger_pin.commands.application import run_function
-from finger_pin.description.loading import list_fingers, load_finger
+from finger_pin.description.loading import load_finger
+from finger_pin.description.tables import list_fingers
 from finger_pin.mechanism.urdf import to_urdf
 
 FOLDER = Path(__file__).resolve().parents[1] / "urdf"

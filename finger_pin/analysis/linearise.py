@@ -21,8 +21,7 @@ from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.tableaus import rodas5p
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import as_finger, as_inputs, as_packed, input_names

@@ -32,7 +32,7 @@ def export(
     settings: Settings = [],  # noqa: B006
 ) -> None:
     """Write a finger as URDF, MJCF or TOML, or the signals of a result as CSV."""
-    from finger_pin.description.reading import is_path
+    from finger_pin.description.tables import is_path
     from finger_pin.files import write_text
 
     results = Path(source).is_dir() or source.endswith(".nc")
@@ -69,8 +69,9 @@ def export(
 
 def described(source: str, settings: list[str]) -> FingerDescription | Scenario:
     """Return the finger, hand or scenario of a name or a file."""
-    from finger_pin.description.loading import list_benches, list_scenarios, load_finger, load_hand, load_scenario
-    from finger_pin.description.reading import is_path, kind_of, shipped
+    from finger_pin.description.loading import load_finger, load_hand, load_scenario
+    from finger_pin.description.resolution import kind_of
+    from finger_pin.description.tables import is_path, list_benches, list_scenarios, shipped
     from finger_pin.description.validation import suggestion
 
     kind, changed = kind_of(source), overrides(settings)

@@ -67,7 +67,7 @@ def identify(
 
 
 def _listing() -> str:
-    from finger_pin.description.loading import list_benches
+    from finger_pin.description.tables import list_benches
 
     return "\n".join(["Benches", *(f"  {name:18}{title}" for name, title in list_benches().items())])
 

@@ -190,8 +190,8 @@ def draw(
 
 def listing() -> str:
     """Return the names that the command line takes, with a line about each."""
-    from finger_pin.description.loading import list_fingers, list_hands, list_motors, list_scenarios
     from finger_pin.description.simulation_settings import METHODS
+    from finger_pin.description.tables import list_fingers, list_hands, list_motors, list_scenarios
 
     tables = {
         "Scenarios": list_scenarios(),

@@ -18,11 +18,11 @@ from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import ProportionalController, RoutedController
 from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward
 from finger_pin.control.torque import FingertipForce, TorqueLaw
-from finger_pin.description.by_finger import of_finger
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
+from finger_pin.description.tables import settings_of_finger
 from finger_pin.description.validation import Numbers, expand
 from finger_pin.exceptions import ClosureWarning, InputError
 from finger_pin.mechanism.finger import Finger
@@ -150,7 +150,7 @@ def _joint_compensation(scenario: Scenario, finger: Finger) -> JointCompensation
 
 def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:
     names = finger.description.tree.tip_names or ("",)
-    tips = [of_finger(scenario.controller, name).fingertip_force or {} for name in names]
+    tips = [settings_of_finger(scenario.controller, name).fingertip_force or {} for name in names]
     if not any(tips):
         return None
     settings = [signals.get(axis, ForceSignal()) for signals in tips for axis in AXES]

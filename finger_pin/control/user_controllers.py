@@ -18,9 +18,9 @@ from finger_pin.control.interface import Controller, ControlSignals, LoopControl
 from finger_pin.control.named_inputs import inputs_by_name
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.description.loading import load_scenario
-from finger_pin.description.recordings.series import Series
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.tables import Series
 from finger_pin.description.validation import choices
 from finger_pin.description.winding import WINDINGS, command_place
 from finger_pin.exceptions import InputError

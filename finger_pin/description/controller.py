@@ -6,9 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, field_serializer, field_validator
 
-from finger_pin.description.by_finger import dump_set_fields, flatten, unflatten
+from finger_pin.description.fields import flatten, unflatten
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.signals import ForceSignal, InputSignal, SpoolAngle, VoltageSignal, WoundLength, of_axes
+from finger_pin.description.tables import dump_set_fields
 from finger_pin.description.validation import (
     Description,
     FullName,

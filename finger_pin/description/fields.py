@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -59,3 +59,28 @@ def nested(table: Mapping[str, Any]) -> dict[str, Any]:
         else:
             outer[name] = value
     return outer
+
+
+def flatten(table: Any, numbers: bool = False) -> Any:
+    """Return ``{index = {medial = ...}}`` as ``{index.medial = ...}``, the inverse of `nested`.
+
+    Entries are tables, so that a table of tables is that of a finger; or ``numbers``, so that every table is.
+    """
+    if not isinstance(table, dict):
+        return table
+    flat = {}
+    for name, value in table.items():
+        if (
+            isinstance(value, dict)
+            and value
+            and (numbers or all(isinstance(v, dict | BaseModel) for v in value.values()))
+        ):
+            flat.update({f"{name}.{inner}": entry for inner, entry in value.items()})
+        else:
+            flat[name] = value
+    return flat
+
+
+def unflatten(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> Any:
+    """Serialise ``{index.medial = ...}`` as ``{index = {medial = ...}}``."""
+    return None if table is None else nested(handler(table))

@@ -1,60 +1,42 @@
-"""From TOML to validated descriptions: shipped data, a user's files, overrides, and one-line errors."""
+"""From TOML to validated descriptions and back: every door, one-line errors, and families of scenarios."""
 
 from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
+import numpy as np
 import tomli_w
 
+from finger_pin.description.fields import find_field
 from finger_pin.description.finger import FingerDescription, HandSettings
-from finger_pin.description.overriding import normalise_overrides, override
-from finger_pin.description.reading import as_name, bench_file, is_path, kind_of, merge, read_scenario_file, shipped
 from finger_pin.description.recordings.bench import IdentifySettings
-from finger_pin.description.recordings.series import PACKED, Series, packed
 from finger_pin.description.recordings.signal_files import resolve_commands, resolve_signals
+from finger_pin.description.resolution import kind_of, override, read_scenario_file, refuse_other
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.tables import Series, as_name, entry_at, is_path, match_paths, merge, packed, shipped, split
 from finger_pin.description.validation import Description, Table, as_table, suggestion, validate
 from finger_pin.exceptions import InputError
 
-# Of more numbers than this a text is written that is read at once; nobody reads them one by one.
-_MANY = 10_000
 _Described = TypeVar("_Described", bound=Description)
-# Few: some have millions of numbers.
 #: Wherever a scenario is taken: itself, the name of one that ships, or the path of a file.
 ScenarioLike: TypeAlias = Scenario | str | Path
 #: Likewise a finger; a hand is one, too, and a scenario stands for its own.
 DescriptionLike: TypeAlias = FingerDescription | Scenario | str | Path
 
 
-def list_fingers() -> dict[str, str]:
-    """Return the fingers that ship with the package, with a line about each."""
-    return shipped("fingers")
-
-
-def list_hands() -> dict[str, str]:
-    """Return the hands that ship with the package, with a line about each."""
-    return shipped("hands")
-
-
-def list_scenarios() -> dict[str, str]:
-    """Return the scenarios that ship with the package, with a line about each."""
-    return shipped("scenarios")
-
-
-def list_benches() -> dict[str, str]:
-    """Return the benches that ship with the package, with a line about each."""
-    return shipped("benches")
-
-
-def list_motors() -> dict[str, str]:
-    """Return the motors that ship with the package, with a line about each."""
-    return shipped("motors")
+@contextmanager
+def _depth_limited(what: str) -> Iterator[None]:
+    """Refuse, in one line, what is nested more deeply than calls can be."""
+    try:
+        yield
+    except RecursionError:
+        raise InputError(what, "is nested too deeply") from None
 
 
 def load_finger(name: str | Path | FingerDescription, overrides: Mapping[str, Any] | None = None) -> FingerDescription:
@@ -92,7 +74,7 @@ def describe(finger: DescriptionLike) -> FingerDescription:
         InputError: Naming the entry that is wrong.
     """
     if isinstance(finger, str | Path):
-        kind, names = kind_of(str(finger)), [*list_fingers(), *list_hands()]
+        kind, names = kind_of(str(finger)), [*shipped("fingers"), *shipped("hands")]
         if kind == "scenario" and _is_scenario(str(finger)):
             return load_scenario(finger).finger
         if kind == "scenario" and not is_path(str(finger)):
@@ -116,6 +98,7 @@ def _is_scenario(name: str) -> bool:
     return not is_path(name) or not {"extends", "finger", "hand"}.isdisjoint(table)
 
 
+@_depth_limited("scenario")
 def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None) -> Scenario:
     """Load a scenario by the name of a shipped one or the path of a TOML file.
 
@@ -132,24 +115,22 @@ def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    if isinstance(name, Scenario) and not overrides:
+    if not overrides and isinstance(name, Scenario):
         return name
     if not overrides and not is_path(str(name)):
         return _shipped_scenario(str(name))
-    overrides = normalise_overrides(overrides or {}, set(Scenario.model_fields))
-    with _depth_limited("scenario"):
-        if isinstance(name, Scenario):
-            return _resolved(name.set_entries(), overrides)
-        return _scenario(*read_scenario_file(str(name), Path()), str(name), overrides)
+    if isinstance(name, Scenario):
+        return _resolved(overrides, "", name.set_entries())
+    return _resolved(overrides, str(name), *read_scenario_file(str(name), Path()))
 
 
 @cache
 def _shipped_scenario(name: str) -> Scenario:
     """Return a scenario that ships; it is frozen, so that all may have the same one."""
-    with _depth_limited("scenario"):
-        return _scenario(*read_scenario_file(name, Path()), name, {})
+    return _resolved(None, name, *read_scenario_file(name, Path()))
 
 
+@_depth_limited("scenario")
 def load_bench(
     name: ScenarioLike, overrides: Mapping[str, Any] | None = None, identify: Mapping[str, Any] | None = None
 ) -> tuple[Scenario, IdentifySettings]:
@@ -163,50 +144,47 @@ def load_bench(
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    checked = normalise_overrides(overrides or {}, set(Scenario.model_fields))
-    if isinstance(name, str) and not is_path(name) and name not in {**list_benches(), **list_scenarios()}:
-        near = suggestion(name, list_benches())
-        allowed = f"no such bench; there are {', '.join(list_benches())}, or the path of a .toml file{near}"
+    benches = shipped("benches")
+    if isinstance(name, str) and not is_path(name) and name not in {**benches, **shipped("scenarios")}:
+        near = suggestion(name, benches)
+        allowed = f"no such bench; there are {', '.join(benches)}, or the path of a .toml file{near}"
         raise InputError("bench", allowed, name)
-    with _depth_limited("scenario"):
-        table, folder = (
-            ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(bench_file(str(name)), Path())
-        )
-        wanted = merge(as_table(table.pop("identify", None)), dict(identify or {}))
-        if not wanted:
-            raise InputError("identify", "is missing: which parameters are to be found, and from which recordings")
-        made = (
-            load_scenario(name, overrides)
-            if isinstance(name, Scenario)
-            else _scenario(table, folder, str(name), checked)
-        )
-        return made, validate(IdentifySettings, wanted, ("identify",))
+    table, folder = ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(str(name), Path(), bench=True)
+    entries = merge(as_table(table.pop("identify", None)), dict(identify or {}))
+    if not entries:
+        raise InputError("identify", "is missing: which parameters are to be found, and from which recordings")
+    scenario = isinstance(name, Scenario)
+    name = load_scenario(name, overrides) if scenario else _resolved(overrides, str(name), table, folder)
+    return name, validate(IdentifySettings, entries, ("identify",))
 
 
-def _scenario(table: Table, folder: Path, name: str, overrides: Table) -> Scenario:
-    """Return the scenario of a file's table, without its table ``[identify]``."""
-    table.pop("identify", None)
-    table.setdefault("name", as_name(Path(name).stem))
-    return _resolved(table, overrides, folder)
-
-
-def _resolved(table: Table, overrides: Table, folder: Path = Path()) -> Scenario:
-    """Return the scenario of a table, which is changed; descriptions that no key touches stay the same objects."""
-    override(overrides, table, folder)
-    resolve_signals(table, Path())
-    resolve_commands(table)
-    return validate(Scenario, table, ())
-
-
+@_depth_limited("scenario")
 def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> Scenario:
     """Return the scenario of a table, as `load_scenario` does for a file.
 
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    checked = normalise_overrides(overrides or {}, set(Scenario.model_fields))
-    with _depth_limited("scenario"):
-        return _resolved(copy.deepcopy(dict(table)), checked)
+    return _resolved(overrides, "", copy.deepcopy(dict(table)))
+
+
+def _resolved(overrides: Mapping[str, Any] | None, name: str, table: Table, folder: Path = Path()) -> Scenario:
+    """Return the scenario of a table, which is changed; descriptions that no key touches stay the same objects."""
+    if name:
+        table.pop("identify", None)
+        table.setdefault("name", as_name(Path(name).stem))
+    override(table, overrides, folder)
+    resolve_signals(table, Path())
+    resolve_commands(table)
+    return validate(Scenario, table, ())
+
+
+def _load(kind: str, model: type[_Described], name: Any, overrides: Mapping[str, Any] | None) -> _Described:
+    """Load a finger or a hand."""
+    table: Table = {kind: name if isinstance(name, model) else str(name)}
+    with _depth_limited(kind):
+        override(table, overrides, section=kind)
+        return validate(model, table[kind], (kind,))
 
 
 def to_toml(description: Description) -> str:
@@ -223,50 +201,99 @@ def to_toml(description: Description) -> str:
     if isinstance(description, FingerDescription) and description.hand is not None:
         description = description.hand
     long: list[str] = []
-    text = tomli_w.dumps(_plain(description.model_dump(mode="python", exclude_none=True), long))
+    text = tomli_w.dumps(packed(description.model_dump(mode="python", exclude_none=True), long))
     # In the single quotes of TOML nothing is escaped, so that nobody looks at each letter.
     pieces = re.split(r'^((?:times|values) = )"base64:\d+"$', text, flags=re.MULTILINE)
     pieces[1::2] = [f"{key}'{series}'" for key, series in zip(pieces[1::2], long, strict=True)]
     return "".join(pieces)
 
 
-def _load(
-    kind: str, model: type[_Described], name: str | Path | _Described, overrides: Mapping[str, Any] | None
-) -> _Described:
-    """Load a finger or a hand."""
-    checked = normalise_overrides(overrides or {}, {kind})
-    table: Table = {kind: name if isinstance(name, model) else str(name)}
-    with _depth_limited(kind):
-        override(checked, table, Path())
-        return validate(model, table[kind], (kind,))
+class ParametrisedScenario:
+    """Scenario of which some keys take other values.
 
+    A scenario with other numbers is what `load_scenario` returns with the same overrides.
 
-@contextmanager
-def _depth_limited(what: str) -> Iterator[None]:
-    try:
-        yield
-    except RecursionError:
-        raise InputError(what, "is nested too deeply") from None
-
-
-def _plain(value: Any, long: list[str]) -> Any:
-    """Return a value for TOML; long series are put aside, and their place says at which index.
-
-    Times that a neighbour has already are that neighbour's name.
+    Attributes:
+        scenario: The scenario itself.
+        keys: Dotted keys, as of `load_scenario`; ``[2]`` at the end of one stands for one number of a list, ``[0,1]``
+            for two that are equal, a star for every name, ``{T1,T2}`` for some names.
+        values: Their present values; None where there is nothing.
     """
-    if isinstance(value, dict):
-        plain, timed = {}, dict[str, Any]()
-        for key, item in value.items():
-            times = item.get("times") if isinstance(item, dict) else None
-            if times is not None and len(times) > _MANY:
-                same = next((name for name, other in timed.items() if other == times), None)
-                item = item if same is None else item | {"times": same}
-                timed[key] = times
-            plain[key] = _plain(item, long)
-        return plain
-    if not isinstance(value, tuple | Series):
-        return value
-    if len(value) > _MANY:
-        long.append(packed(value))
-        return f"{PACKED}{len(long) - 1}"
-    return [_plain(item, long) for item in value]
+
+    def __init__(self, scenario: Scenario, keys: Sequence[str]) -> None:
+        """Read the keys and their present values.
+
+        Raises:
+            InputError: If there is no such key.
+        """
+        self.scenario, self.keys = scenario, tuple(keys)
+        self._names = [split(key) for key in self.keys]
+        for name, _ in self._names:
+            if name not in ("finger.base", "hand.base"):
+                refuse_other(name, hand=scenario.hand is not None, finger=scenario.hand is None)
+        self._paths = [list(match_paths(name.split("."), scenario)) for name, _ in self._names]
+        self.values: tuple[Any, ...] = tuple(self._value(key) for key in range(len(self.keys)))
+        for (name, index), value in zip(self._names, self.values, strict=True):
+            if value is not None:
+                continue
+            # Its name is wrong, or nothing is there.
+            if index is not None:
+                raise InputError(name, "has no numbers of which one could be given; give all of them")
+            override(scenario.set_entries(), {name: 0.0})
+            if "*" not in name and find_field(Scenario, name.split(".")) is None:
+                load_scenario(scenario, {name: 0.0})
+
+    @classmethod
+    def from_finger(cls, description: FingerDescription, keys: Sequence[str]) -> ParametrisedScenario:
+        """Return the family of a scenario of which only the finger or hand matters.
+
+        Raises:
+            InputError: If there is no such key, or one is not of a finger or a hand.
+        """
+        for key in keys:
+            if key.partition(".")[0] not in ("finger", "hand"):
+                raise InputError(key, "does not act on a finger alone; keys begin with finger or hand")
+        hand, table = description.hand, {"name": description.name, "controller": {"kind": "tensions"}}
+        return cls(validate(Scenario, table | ({"hand": hand} if hand else {"finger": description}), ()), keys)
+
+    def with_values(self, values: Sequence[Any]) -> Scenario:
+        """Return the scenario with values at the keys, in their order.
+
+        Raises:
+            InputError: Naming the entry that is wrong.
+        """
+        if len(values) != len(self.keys):
+            raise InputError("values", f"must be {len(self.keys)}, one per key ({', '.join(self.keys)})", len(values))
+        if not self.keys:
+            return self.scenario
+        overrides: dict[str, Any] = {}
+        for (name, index), paths, value, old in zip(self._names, self._paths, values, self.values, strict=True):
+            number = _toml_value(value, old)
+            if index is None:
+                overrides[name] = number
+                continue
+            for path in paths:
+                numbers = overrides.get(".".join(path), entry_at(self.scenario, path))
+                overrides[".".join(path)] = [number if k in index else other for k, other in enumerate(numbers)]
+        return load_scenario(self.scenario, overrides)
+
+    def _value(self, key: int) -> Any:
+        (name, index), paths = self._names[key], self._paths[key]
+        value = entry_at(self.scenario, paths[0])
+        if index is None or value is None:
+            return value
+        if isinstance(value, tuple | Series) and max(index) < len(value):
+            return value[index[0]]
+        allowed = "there is no such list of numbers"
+        if isinstance(value, int | float):
+            allowed = f"{name} is one number for all; give it a list first, or leave out the index"
+        elif isinstance(value, tuple | Series):
+            allowed = f"{name} has {len(value)} numbers, [0] to [{len(value) - 1}]"
+        raise InputError(self.keys[key], allowed)
+
+
+def _toml_value(value: Any, old: Any) -> Any:
+    """Return a value as TOML has it: arrays as lists, whole numbers as such."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    return int(value) if type(old) is int and isinstance(value, float) and value.is_integer() else value

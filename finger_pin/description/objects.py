@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, field_serializer, field_validator, model_validator
 
-from finger_pin.description.by_finger import dump_set_fields
 from finger_pin.description.placement import PathSignal
 from finger_pin.description.signals import ForceSignal, of_axes
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
+from finger_pin.description.tables import dump_set_fields
 from finger_pin.description.validation import Description, FullName, Name, choice, problem, quantity, real, vector
 
 Array = NDArray[np.float64]

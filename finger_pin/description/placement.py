@@ -11,8 +11,8 @@ from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.parameters import Joint, Link, Tendon
-from finger_pin.description.recordings.series import Series, series
 from finger_pin.description.signals import SignalSettings
+from finger_pin.description.tables import Series, series
 from finger_pin.description.validation import (
     Description,
     Name,

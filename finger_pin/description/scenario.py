@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.by_finger import error_of_finger, of_finger
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.effects import CLOSED_LOOP, OF_SCENARIO, idle, shown
@@ -18,6 +17,7 @@ from finger_pin.description.objects import EnvironmentSettings, Object
 from finger_pin.description.routing import Routing
 from finger_pin.description.signals import ReferenceSettings
 from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
+from finger_pin.description.tables import error_of_hand, settings_of_finger
 from finger_pin.description.tautness import Tautness, check_currents
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.description.validation import Description, Name, expand, problem, suggestion
@@ -84,7 +84,7 @@ class Scenario(Description):
         """Choose the open loop for fingers without closed-loop settings that can run in open loop alone."""
         alone, chosen = {} if self.hand is None else self.hand.parts(), {}
         for name in alone or ("",):
-            settings, prefix = of_finger(self.controller, name), f"{name}." if name else ""
+            settings, prefix = settings_of_finger(self.controller, name), f"{name}." if name else ""
             chosen_loop = settings.model_fields_set & {"kind", *CLOSED_LOOP}
             if chosen_loop or any(key.startswith(prefix) for key in self.reference.joints):
                 continue
@@ -129,7 +129,7 @@ class Scenario(Description):
             try:
                 part._check()
             except PydanticCustomError as error:
-                raise error_of_finger(name, error) from None
+                raise error_of_hand(name, error) from None
 
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -170,13 +170,13 @@ class Scenario(Description):
         """Return the environments of a hand's fingers or a tree's tips, by name; of a single one under no name."""
         shared = self.environment
         names = self.finger.tree.tip_names if self.hand is None else tuple(self.hand.fingers)
-        return {name: of_finger(shared, name) if shared.fingers else shared for name in names} or {"": shared}
+        return {name: settings_of_finger(shared, name) if shared.fingers else shared for name in names} or {"": shared}
 
     def _part(self, name: str, alone: HandSettings) -> Scenario:
         def entries_of_finger(table: Mapping[str, _Item]) -> dict[str, _Item]:
             return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
 
-        controller, settings = of_finger(self.controller, name), (self.controller.fingers or {}).get(name)
+        controller, settings = settings_of_finger(self.controller, name), (self.controller.fingers or {}).get(name)
         for table in BY_SOURCE:
             if getattr(controller, table) is not None:
                 # In a finger's own table its name may be left out.
@@ -194,7 +194,7 @@ class Scenario(Description):
             hand=alone,
             controller=controller,
             reference={"joints": entries_of_finger(self.reference.joints)},
-            environment=of_finger(self.environment, name),
+            environment=settings_of_finger(self.environment, name),
             simulation=simulation,
         )
 
@@ -281,7 +281,7 @@ class Scenario(Description):
         if self.hand is not None:
             fingers = {name: placed.finger for name, placed in self.hand.fingers.items()}
         wishes = [
-            expand(of_finger(self.controller, name).passive_tension, len(finger.passive_names))
+            expand(settings_of_finger(self.controller, name).passive_tension, len(finger.passive_names))
             for name, finger in fingers.items()
         ]
         return PassiveCoupling.from_routing(

@@ -10,8 +10,8 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, field_serializer, field_validator, model_validator
 
-from finger_pin.description.by_finger import flatten, unflatten
-from finger_pin.description.recordings.series import Series, series
+from finger_pin.description.fields import flatten, unflatten
+from finger_pin.description.tables import Series, series
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_serializer, field_validator, model_validator
 
-from finger_pin.description.by_finger import flat_numbers, unflatten
+from finger_pin.description.fields import flatten, unflatten
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
@@ -42,7 +42,7 @@ class InitialSettings(Description):
         None, description="Of a tree, the posture that it starts from, below position; by default its first, if any."
     )
 
-    _flat = field_validator("position", "velocity", mode="before")(flat_numbers)
+    _flat = field_validator("position", "velocity", mode="before")(lambda table: flatten(table, numbers=True))
     _nested = field_serializer("position", "velocity", mode="wrap")(unflatten)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.scenario_parameters import ScenarioPart, bare, entry_of
 from finger_pin.typing import Array

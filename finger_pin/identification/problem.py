@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.threads import in_threads
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.likelihood import NoiseGrowth, means_of, minus_twice_likelihood

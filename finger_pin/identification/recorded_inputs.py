@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.description.recordings.bench import IMPOSED
-from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.tables import Series
 from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import Recording, check_pulling

@@ -12,8 +12,7 @@ import numpy as np
 import tomli_w
 import xarray as xr
 
-from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
 from finger_pin.identification.comparison import LawComparison, bic

@@ -9,9 +9,10 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.parametrised_scenario import ParametrisedScenario, split
+from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.description.recordings.bench import OF_RECORDINGS, RecordingSettings
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.tables import split
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 

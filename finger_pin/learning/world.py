@@ -15,8 +15,7 @@ from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.caching import cached_property
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError

@@ -1,13 +1,20 @@
-"""Results in the world's frame in place of the palm's."""
+"""Frames and subject of results: vectors in the world, and the finger and objects that moved."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
+from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.objects import Object
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME
 from finger_pin.typing import Array
@@ -71,3 +78,47 @@ class _Palm:
         """Change vectors or quaternions, shape (m, ..., k), at all samples, for each of several items."""
         flat = values.reshape(len(values), -1, values.shape[-1])
         return np.stack([change(flat[:, k]) for k in range(flat.shape[1])], axis=1).reshape(values.shape)
+
+
+class Scene(NamedTuple):
+    """The subject of a result: a finger, or all fingers of a hand together, and the objects around it, by name."""
+
+    finger: FingerDescription
+    objects: Mapping[str, Object]
+
+
+def scene_metadata(scenario: Scenario) -> dict[str, str]:
+    """Return the attributes of a result of a scenario from which `read_scene` reads."""
+    kind, subject = ("hand", scenario.hand) if scenario.hand else ("finger", scenario.finger)
+    objects = {name: _plain(body) for name, body in (scenario.environment.objects or {}).items()}
+    return {kind: json.dumps(_plain(subject)), "objects": json.dumps(objects)}
+
+
+def read_scene(attributes: Mapping[Any, Any]) -> Scene:
+    """Return the subject of a result, given its attributes.
+
+    Raises:
+        InputError: If they do not say.
+    """
+    for kind in ("finger", "hand"):
+        if kind in attributes:
+            return _read_scene(kind, str(attributes[kind]), str(attributes.get("objects", "{}")))
+    raise InputError("result.attrs.finger", "is missing; give a result of simulate or saved, in this version")
+
+
+# What reads a result asks for it more than once.
+@lru_cache(maxsize=4)
+def _read_scene(kind: str, text: str, objects: str) -> Scene:
+    entry = f"result.attrs.{kind}"
+    try:
+        table, bodies = json.loads(text), json.loads(objects)
+    except ValueError as error:
+        raise InputError(entry, "must be a description in JSON") from error
+    around = {name: validate(Object, body, ("result.attrs.objects", name)) for name, body in bodies.items()}
+    if kind == "hand":
+        return Scene(validate(HandSettings, table, (entry,)).joined(), around)
+    return Scene(validate(FingerDescription, table, (entry,)), around)
+
+
+def _plain(description: Description) -> dict[str, Any]:
+    return description.model_dump(mode="python", exclude_none=True)

@@ -14,8 +14,7 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
-from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger, with_parameters_of

@@ -15,11 +15,11 @@ from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import physical_memory
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.scene_metadata import scene_metadata
 from finger_pin.description.simulation_settings import SimulationSettings
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.frames import scene_metadata
 from finger_pin.simulation.sampled_trajectory import BASE_FRAME, SampledTrajectory
 from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
 from finger_pin.typing import Array

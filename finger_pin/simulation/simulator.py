@@ -18,7 +18,7 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.batch_stepper import BatchStepper
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.coerce import FingerLike, as_finger

@@ -14,8 +14,7 @@ import xarray as xr
 from finger_pin.analysis import locking_advice
 from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger

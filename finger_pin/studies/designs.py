@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.stats import qmc
 
-from finger_pin.description.parametrised_scenario import split
+from finger_pin.description.tables import split
 from finger_pin.exceptions import InputError
 from finger_pin.studies.keys import Point, Value
 

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from finger_pin.description.fields import find_field
-from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.parametrised_scenario import ParametrisedScenario, split
-from finger_pin.description.recordings.series import Series
+from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.tables import Series, split
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger, with_parameters_of

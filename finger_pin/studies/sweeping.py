@@ -12,7 +12,7 @@ import xarray as xr
 
 from finger_pin.cancellation import Stop
 from finger_pin.description.loading import ScenarioLike
-from finger_pin.description.parametrised_scenario import split
+from finger_pin.description.tables import split
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.netcdf import save

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.scene_metadata import read_scene
+from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
 
 _DEGREES = {"rad": "°", "rad/s": "°/s", "rad/s^2": "°/s²"}

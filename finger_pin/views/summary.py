@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.scene_metadata import read_scene
 from finger_pin.mechanism.canals import WRAPS, is_canal
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.tree_mechanism import MUSCLES, STATEFUL, STATELESS
 from finger_pin.simulation.energy import entries
+from finger_pin.simulation.frames import read_scene
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.simulation.recording import custom_of, is_tracking
 from finger_pin.typing import Array

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.scene_metadata import read_scene
+from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
 
 SETTLED = 1.0

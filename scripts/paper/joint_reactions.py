@@ -14,10 +14,10 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import one_finger
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
 from paper.pin_wrench import pin_wrench
 from paper.tendon_cuts import Groove

@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.description.loading import list_scenarios, load_scenario
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.tables import list_scenarios
 from finger_pin.simulation.simulate import simulate
 from finger_pin.views.plots.lines import series, trace
 from finger_pin.views.plots.style import new_figure, styled

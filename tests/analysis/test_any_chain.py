@@ -19,7 +19,7 @@ from finger_pin.analysis import (
     self_locking_margin,
     tension_for_force,
 )
-from finger_pin.description.scene_metadata import scene_metadata
+from finger_pin.simulation.frames import scene_metadata
 from finger_pin.views import plots
 from finger_pin.views.viewer.animation import animation_page, posture_page
 

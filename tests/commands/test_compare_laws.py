@@ -8,8 +8,7 @@ import pytest
 import xarray as xr
 from compare_laws import DESCRIBED, LAWS, Law, Row
 
-from finger_pin.description.loading import load_bench
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, load_bench
 from finger_pin.exceptions import InputError
 
 TENDON = "tendon_tension.T1"

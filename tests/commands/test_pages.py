@@ -24,7 +24,7 @@ from harness import quick_figures
 import finger_pin as fp
 import finger_pin.studies as studies
 from finger_pin.commands import application
-from finger_pin.description import loading, reading
+from finger_pin.description import loading, resolution, tables
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "finger_pin" / "QUESTIONS.md", *sorted(ROOT.glob("[fst]*/**/README.md"))]
@@ -78,12 +78,13 @@ def shown(tmp_path_factory):
     (folder / "urdf").symlink_to(ROOT / "urdf")
     shipped = folder / "shipped"
     for kind in ("fingers", "hands", "scenarios", "motors", "benches"):
-        shutil.copytree(Path(reading.__file__).parent / kind, shipped / kind)
+        shutil.copytree(Path(tables.__file__).parent / kind, shipped / kind)
     for path in (shipped / "scenarios").iterdir():
         path.write_text(re.sub(r"(?m)^duration = .*", f"duration = {DURATION}", path.read_text("utf-8")), "utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr(reading, "resources", SimpleNamespace(files=lambda package: shipped))
+        for module in (tables, resolution):
+            patch.setattr(module, "resources", SimpleNamespace(files=lambda package: shipped))
         forget_what_ships()
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
         patch.setattr("finger_pin.views.viewer.viewing.PageHandle.wait", lambda viewing: viewing.close())
@@ -100,7 +101,7 @@ def shown(tmp_path_factory):
 
 
 def forget_what_ships():
-    for kept in (reading._shipped_texts, reading._shipped_table, loading._shipped_scenario):
+    for kept in (tables.shipped_texts, tables._parsed, loading._shipped_scenario):
         kept.cache_clear()
 
 
@@ -174,8 +175,8 @@ def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, ca
             assert not kind, f"nothing here knows what {kind} is"
 
 
-def tables(table):
-    return [table, *(each for child in table.get_children() for each in tables(child))]
+def symbol_tables(table):
+    return [table, *(each for child in table.get_children() for each in symbol_tables(child))]
 
 
 def names(code):
@@ -184,7 +185,7 @@ def names(code):
     defined = {each.get_name() for each in top.get_symbols() if each.is_assigned() or each.is_imported()}
     asked = {
         each.get_name()
-        for table in tables(top)
+        for table in symbol_tables(top)
         for each in table.get_symbols()
         if each.is_referenced() and (table is top or each.is_global())
     }

@@ -16,7 +16,7 @@ from finger_pin.core.islands import Selection, selections
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
 

@@ -3,7 +3,8 @@
 import pytest
 
 import finger_pin as fp
-from finger_pin.description.loading import list_motors, load_finger, load_scenario
+from finger_pin.description.loading import load_finger, load_scenario
+from finger_pin.description.tables import list_motors
 from finger_pin.exceptions import InputError
 
 SPOOL = {"motor": "XL330-M288", "tendons": ["T1"], "spool_radius": 0.005}

@@ -7,7 +7,8 @@ import generate_keys
 import pytest
 
 import finger_pin as fp
-from finger_pin.description.loading import list_scenarios, to_toml
+from finger_pin.description.loading import to_toml
+from finger_pin.description.tables import list_scenarios
 
 ROW = re.compile(r"^\| `([^`]+)` \| ([^|]*) \| (.*) \|$", re.MULTILINE)
 

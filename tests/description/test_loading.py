@@ -7,7 +7,8 @@ import pytest
 from wrong_inputs import PLANAR
 
 import finger_pin as fp
-from finger_pin.description.loading import list_fingers, list_scenarios, load_finger, load_scenario, to_toml
+from finger_pin.description.loading import load_finger, load_scenario, to_toml
+from finger_pin.description.tables import list_fingers, list_scenarios
 from finger_pin.exceptions import InputError
 
 

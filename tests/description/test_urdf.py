@@ -9,7 +9,8 @@ import pytest
 from urdf_cases import FINGERS, JOINTS, OTHER_LENGTHS, links_of
 from validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 
-from finger_pin.description.loading import list_fingers, load_finger
+from finger_pin.description.loading import load_finger
+from finger_pin.description.tables import list_fingers
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
 

@@ -7,7 +7,7 @@ import pytest
 from validation import mujoco_motion
 
 import finger_pin as fp
-from finger_pin.description.loading import list_fingers
+from finger_pin.description.tables import list_fingers
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf import to_mjcf
 from finger_pin.mechanism.state import State

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.description.loading import load_bench
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, load_bench
 from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.limits import Limits
 from finger_pin.identification.models import build_problem

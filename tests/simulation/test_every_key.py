@@ -10,7 +10,8 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.position_drive import PositionDrives, given_voltages, loop_period, spool_goals, wound_spools
-from finger_pin.description.loading import list_scenarios, read_scenario, to_toml
+from finger_pin.description.loading import read_scenario, to_toml
+from finger_pin.description.tables import list_scenarios
 from finger_pin.exceptions import InputError
 
 # States at which x' is compared; with many objects the first ones alone, which take long there.

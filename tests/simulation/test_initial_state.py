@@ -6,7 +6,7 @@ import xarray as xr
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.description.loading import list_scenarios
+from finger_pin.description.tables import list_scenarios
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.initial_state import started
 from finger_pin.simulation.motor_variables import LOOP_VARIABLES

@@ -10,8 +10,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.tables import build_tables
-from finger_pin.description.loading import read_scenario
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, read_scenario
 from finger_pin.exceptions import InputError, Interrupted
 
 SCENARIOS = ("reversals", "stick_slip", "servo", "servo_position", "press", "pinch", "hand", "grasp")

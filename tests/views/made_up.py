@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import finger_pin as fp
-from finger_pin.description.scene_metadata import scene_metadata
+from finger_pin.simulation.frames import scene_metadata
 
 STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
 LOST = (

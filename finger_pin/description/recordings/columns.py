@@ -13,7 +13,6 @@ from pydantic import Field, model_validator
 
 from finger_pin.description.recordings.bench import Column
 from finger_pin.description.recordings.csv_files import TableFormat, read_columns
-from finger_pin.description.recordings.series import Series
 from finger_pin.description.recordings.units import (
     APPENDED,
     BRACKETED,
@@ -23,6 +22,7 @@ from finger_pin.description.recordings.units import (
     parse_unit,
     split_unit,
 )
+from finger_pin.description.tables import Series
 from finger_pin.description.validation import suggestion, validate
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from finger_pin.description.recordings.columns import read_signals
-from finger_pin.description.recordings.series import PACKED
+from finger_pin.description.tables import PACKED
 from finger_pin.description.validation import Table, as_table
 from finger_pin.description.winding import COMMANDS, command_place
 from finger_pin.exceptions import InputError

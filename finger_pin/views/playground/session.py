@@ -10,8 +10,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.parametrised_scenario import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.finger import Finger

@@ -9,9 +9,9 @@ from typing import Any
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
+from finger_pin.simulation.frames import read_scene
 from finger_pin.views.plots.bends import plot_bends
 from finger_pin.views.plots.contact_forces import plot_contact
 from finger_pin.views.plots.convergence_check import plot_convergence

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
+from finger_pin.simulation.frames import read_scene
 from finger_pin.views.plots.lines import names, series, shade, times, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, Width, colour, styled, thin

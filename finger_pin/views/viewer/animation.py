@@ -12,12 +12,12 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.description.scene_metadata import read_scene
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_text
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.simulation.frames import read_scene
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.typing import Array
 from finger_pin.views.viewer.page import render

@@ -12,8 +12,8 @@ import pinocchio as pin
 import xarray as xr
 
 from finger_pin.description.objects import Object
-from finger_pin.description.scene_metadata import read_scene
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
 from finger_pin.views.viewer.meshcat_solids import (
     ROOT,

@@ -11,8 +11,8 @@ from selenium.webdriver.support.ui import WebDriverWait
 import finger_pin as fp
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
-from finger_pin.description.scene_metadata import scene_metadata
 from finger_pin.exchange.from_mujoco import from_mujoco
+from finger_pin.simulation.frames import scene_metadata
 from finger_pin.views.plots.style import new_figure
 from finger_pin.views.viewer import write_animation
 from finger_pin.views.viewer.animation import Playback

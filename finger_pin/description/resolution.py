@@ -1,0 +1,297 @@
+"""From files, names and overrides to one complete table: bases, motors, and values by dotted key."""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeAlias, get_origin
+
+from finger_pin.description.effects import without_unread
+from finger_pin.description.fields import find_field
+from finger_pin.description.recordings.signal_files import fingers_of, resolve_signals
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.tables import (
+    NONE,
+    as_name,
+    is_other_kind,
+    is_path,
+    match_paths,
+    merge,
+    shipped_table,
+    shipped_texts,
+)
+from finger_pin.description.validation import Description, Table, as_table, nearest, suggestion
+from finger_pin.exceptions import InputError
+from finger_pin.files import expand, read_text
+
+_Opened: TypeAlias = tuple[Path, ...]
+# Keys that put another finger or hand in place of what there is.
+_OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?")
+_PLACE = re.compile(r"hand\.fingers\.[^.]+")
+# Tables by joint or tendon, and which of the two.
+_BY_NAME = {
+    ("reference", "joints"): "joint",
+    ("controller", "tensions"): "tendon",
+    ("simulation", "initial", "position"): "joint",
+    ("simulation", "initial", "velocity"): "joint",
+}
+
+
+def _read(kind: str, name: str, folder: Path, entry: str = "") -> tuple[Table, Path]:
+    """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
+    if not is_path(name):
+        names = shipped_texts(f"{kind}s")
+        if name not in names:
+            near = suggestion(name, [*names, *(shipped_texts("benches") if kind == "scenario" else ())])
+            allowed = f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{near}"
+            raise InputError(entry or kind, allowed, name)
+        return shipped_table(f"{kind}s", name), Path(name)
+    what, path = f"{kind} file {name}", folder / expand(name)
+    text = read_text(what, path)
+    try:
+        return tomllib.loads(text), path
+    except RecursionError:
+        raise InputError(what, "is nested too deeply") from None
+    except ValueError as error:
+        raise InputError(what, f"is not valid TOML: {error}") from None
+
+
+def kind_of(name: str, folder: Path = Path()) -> str:
+    """Return the kind of a name, or of a file relative to a folder: ``finger``, ``hand``, or else ``scenario``."""
+    if not is_path(name):
+        return next((kind for kind in ("finger", "hand") if name in shipped_texts(f"{kind}s")), "scenario")
+    try:
+        table, path = _read("finger", name, folder)
+        if "base" in table and "fingers" not in table:
+            return kind_of(str(table["base"]), path.parent)
+    except (InputError, RecursionError):
+        return "scenario"
+    return "hand" if "fingers" in table else "finger" if {"joints", "tendons"} & table.keys() else "scenario"
+
+
+def read_scenario_file(name: str, folder: Path, opened: _Opened = (), bench: bool = False) -> tuple[Table, Path]:
+    """Return the table of a scenario on top of the ones that it extends, and the folder that it lies in.
+
+    A bench is a scenario too; where a scenario has the same name, that one is meant, unless ``bench`` says otherwise.
+    """
+    if (bench or name not in shipped_texts("scenarios")) and name in shipped_texts("benches"):
+        name = str(resources.files("finger_pin.description").joinpath(f"benches/{name}.toml"))
+    table, folder, opened = _open("scenario", name, folder, opened)
+    resolve_signals(table, folder)
+    for recording in as_table(as_table(table.get("identify")).get("recordings")).values():
+        file = as_table(recording).get("file")
+        if isinstance(file, str):
+            # A scenario that extends this one finds it, too.
+            recording["file"] = str((folder / expand(file)).absolute())
+    if "extends" not in table:
+        return table, folder
+    base = table.pop("extends")
+    if not isinstance(base, str):
+        raise InputError("extends", "must be the name or path of another scenario", base)
+    parent, parent_folder = read_scenario_file(base, folder, opened)
+    parent.pop("name", None)
+    for kind, other in (("finger", "hand"), ("hand", "finger")):
+        if kind in parent:
+            parent[kind] = resolve(kind, parent[kind], parent_folder)
+        if other in table or _replaces(table.get(kind)):
+            parent.pop(kind, None)
+    if "hand" in parent and "hand" in table:
+        table["hand"] = _on_top(parent.pop("hand"), table["hand"], folder)
+    return merge(parent, table), folder
+
+
+def _open(kind: str, name: str, folder: Path, opened: _Opened, entry: str = "") -> tuple[Table, Path, _Opened]:
+    """Return the table of a name or path, the folder that its paths start from, and the files opened so far."""
+    table, path = _read(kind, name, folder, entry)
+    identity = path.resolve()
+    if identity in opened:
+        entry = entry or ("extends" if kind == "scenario" else f"{kind}.base")
+        raise InputError(entry, f"a {kind} cannot start from itself", name)
+    return table, path.parent, (*opened, identity)
+
+
+def resolve(kind: str, value: Any, folder: Path, opened: _Opened = (), entry: str = "") -> Any:
+    """Return the table of a finger, hand or motor given by name, by path, or as a table that may start from a base."""
+    if isinstance(value, str):
+        table, folder, opened = _open(kind, value, folder, opened, entry)
+        if kind != "motor":
+            table.setdefault("name", as_name(Path(value).stem))
+        return resolve(kind, table, folder, opened, entry)
+    if isinstance(value, Description) or (kind == "motor" and not isinstance(value, dict)):
+        return value
+    if not isinstance(value, dict):
+        raise InputError(kind, f"must be the name of a {kind}, the path of a .toml file, or a table", value)
+    top, base = dict(value), {}
+    if "base" in top:
+        base = top.pop("base")
+        if kind != "motor" and not isinstance(base, str if kind == "finger" else str | dict):
+            raise InputError(f"{kind}.base", f"must be the name or path of a {kind}", base)
+        base = as_table(resolve(kind, base, folder, opened, entry))
+    if kind == "hand":
+        return _on_top(base, top, folder)
+    return with_motors(merge(base, top), folder) if kind == "finger" else merge(base, top)
+
+
+def _replaces(finger: Any) -> bool:
+    """Return whether a finger or hand stands for itself, rather than for changes of the one that it is put on."""
+    return isinstance(finger, str) or "base" in as_table(finger)
+
+
+def with_motors(finger: Table, folder: Path) -> Table:
+    """Replace names and paths of motors in a finger by their tables; return the finger."""
+    for name, actuator in as_table(finger.get("actuators")).items():
+        if isinstance(actuator, dict) and "motor" in actuator:
+            entry = f"finger.actuators.{name}.motor"
+            actuator["motor"] = resolve("motor", actuator["motor"], folder, entry=entry)
+    return finger
+
+
+def _on_top(base: Table, hand: Table, folder: Path) -> Table:
+    """Return the table of a hand merged with another on top.
+
+    What is the name or path of a finger, and no table, is that finger where its place is the base's.
+    """
+    fingers = as_table(as_table(hand).get("fingers"))
+    for name, placed in fingers.items():
+        if isinstance(placed, str) and placed != NONE:
+            placed = fingers[name] = {"finger": placed}
+        finger = as_table(placed).get("finger")
+        if _replaces(finger):
+            try:
+                placed["finger"] = resolve("finger", finger, folder)
+            except InputError as error:
+                raise InputError(f"hand.fingers.{name}.{error.entry}", error.allowed, error.value) from None
+            as_table(as_table(base.get("fingers")).get(name)).pop("finger", None)
+    return merge(base, hand)
+
+
+def override(table: Table, overrides: Mapping[str, Any] | None, folder: Path = Path(), section: str = "") -> None:
+    """Resolve the fingers of a table, and apply overrides: other fingers before entries on top of them."""
+    overrides = _normalised(overrides or {}, [section] if section else [*Scenario.model_fields])
+    whole = {key: value for key, value in overrides.items() if _OTHER_FINGER.fullmatch(key)}
+    for kind, other in (("hand", "finger"), ("finger", "hand")):
+        chosen = {key: whole.pop(key) for key in (kind, f"{kind}.base") if key in whole}
+        if chosen:
+            table.pop(other, None)
+        _apply(chosen, table)
+    entries = {key: value for key, value in overrides.items() if not _OTHER_FINGER.fullmatch(key)}
+    for key in (*whole, *entries):
+        refuse_other(key, hand="hand" in table, finger="finger" in table)
+    if "hand" in table:
+        table["hand"] = resolve("hand", table["hand"], folder)
+        _apply(_expand_wildcards(whole, table), table)
+        table["hand"] = resolve("hand", table["hand"], folder)
+    elif "finger" not in table:
+        raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
+    else:
+        table["finger"] = resolve("finger", table["finger"], folder)
+    entries = _expand_wildcards(entries, table)
+    # A choice comes before what belongs to it, and a motor before its entries.
+    first = (".kind", ".motor", ".law", ".drive")
+    for early in (True, False):
+        _apply({key: value for key, value in entries.items() if key.endswith(first) == early}, table)
+        for owner in fingers_of(table).values() or [table]:
+            with_motors(as_table(as_table(owner).get("finger")), Path())
+
+
+def _expand_wildcards(overrides: Table, table: Table) -> Table:
+    return {".".join(path): value for key, value in overrides.items() for path in match_paths(key.split("."), table)}
+
+
+def refuse_other(key: str, *, hand: bool, finger: bool) -> None:
+    """Refuse a key of a finger in a hand's scenario, and a key of a hand in a finger's."""
+    if key.startswith("finger.") and hand:
+        raise InputError(key, "there is a hand; keys of its fingers begin with hand.fingers.NAME.finger")
+    if key.startswith("hand.") and finger:
+        raise InputError(key, 'there is one finger; hand = "ub_hand" puts a hand in its place')
+
+
+def _apply(overrides: Mapping[str, Any], table: Table) -> None:
+    for key, value in overrides.items():
+        *path, last = key.split(".")
+        inner = table
+        for depth, part in enumerate(path):
+            _refuse_new([*path[:depth], part], inner, table)
+            below = inner.get(part)
+            if isinstance(below, str) and part in ("finger", "hand"):
+                below = {"base": below}
+            if not isinstance(below, dict | Description | None):
+                raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
+            # Of a description what lies on the way becomes a table; all else stays, checked.
+            inner[part] = inner = as_table(below)
+        if last == "kind" and isinstance(value, str) and is_other_kind(inner, {"kind": value}):
+            inner.clear()
+        _refuse_new([*path, last], inner, table)
+        read = without_unread(inner, {last: value})
+        for unread in inner.keys() - read.keys():
+            del inner[unread]
+        if last in inner and isinstance(value, str) and value == NONE:
+            del inner[last]
+        else:
+            inner[last] = copy.deepcopy(value)
+
+
+def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
+    """Refuse an override that would bring a joint, a tendon or the like into being: only a file does."""
+    *owner, name = path
+    if name in siblings:
+        return
+    finger = as_table(table.get("finger"))
+    hand = {key: as_table(each).get("finger") for key, each in fingers_of(table).items()}
+    # A signal for a joint or a tendon that is there may have no entry of its own yet.
+    present: dict[tuple[str, ...], tuple[str, Iterable[str]]] = {}
+    for place, what in _BY_NAME.items():
+        present[place] = ("finger", hand) if hand else (what, as_table(finger.get(f"{what}s")))
+        for key, table_of_finger in hand.items():
+            present[*place, key] = what, as_table(as_table(table_of_finger).get(f"{what}s"))
+    if hand := hand or as_table(as_table(finger.get("tree")).get("tips")):
+        present |= {("controller", "fingers"): ("finger", hand), ("environment", "fingers"): ("finger", hand)}
+    present["environment", "objects"] = "object", siblings
+    field = find_field(Scenario, owner) if owner else None
+    if tuple(owner) not in present and (field is None or get_origin(field.annotation) is not dict):
+        return
+    what, names = present.get(tuple(owner), (owner[-1].removesuffix("s"), siblings))
+    if name not in names:
+        allowed = f"no such {what}; there are {', '.join(names) or 'none'}"
+        if not names and (what == "object" or tuple(owner) not in present):
+            allowed = f"{allowed}; {'.'.join(owner)} = {{ {name} = {{ ... }} }} puts it there"
+        raise InputError(".".join(path), f"{allowed}{suggestion(name, names)}")
+
+
+def _normalised(overrides: Mapping[str, Any], sections: Iterable[str]) -> Table:
+    """Return overrides whose keys begin with a section, with the path of a finger's file made absolute."""
+    checked: Table = {}
+    if not isinstance(overrides, Mapping):
+        raise InputError("overrides", 'must be values by dotted key, such as {"controller.gain": 2.0}', overrides)
+    for key, value in _flatten_overrides(overrides):
+        first, *rest = key.split(".")
+        if first not in sections:
+            near = nearest(first, sections)
+            hint = f"; did you mean {'.'.join([near, *rest])}?" if near else ""
+            raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(sections))}{hint}")
+        if _PLACE.fullmatch(key) and isinstance(value, str):
+            # Another finger at the same place.
+            key = f"{key}.finger"
+        if _OTHER_FINGER.fullmatch(key):
+            value = _absolute(value)
+        if key.endswith("finger") and isinstance(value, dict) and "base" in value:
+            value = {**value, "base": _absolute(value["base"])}
+        checked[key] = value
+    return checked
+
+
+def _flatten_overrides(overrides: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield overrides, tables of a hand's fingers entry by entry: they go on top of earlier entries, as in a file."""
+    for key, value in overrides.items():
+        if isinstance(value, Mapping) and (key == "hand.fingers" or _PLACE.fullmatch(key)):
+            yield from _flatten_overrides({f"{key}.{name}": entry for name, entry in value.items()})
+        else:
+            yield key, value
+
+
+def _absolute(finger: Any) -> Any:
+    return str(expand(finger).absolute()) if isinstance(finger, str) and is_path(finger) else finger
