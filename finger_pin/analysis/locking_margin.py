@@ -89,7 +89,7 @@ def self_locking_margin(
     directions = np.sign(np.hstack([speed, sliding_velocity(tendons, speed)]))
     chosen = _extremes(directions, (np.abs(motion.position) @ routing.curvature_matrix.T).sum(axis=1))
     signs, sliding = directions[chosen, :size], directions[chosen, size:]
-    weights = signs * expand(scenario.finger.joint_friction.break_away, size)
+    weights = signs * scenario.finger.numbers["joint_friction"][scenario.finger.joint_friction.break_away_entry]
     gain = expand(scenario.controller.gain, size)
     # Without gain there is no lag that would say what passive tendons carry: they count as planned.
     gears = gear_shares(scenario.finger) if servos else np.ones((2, routing.actuated))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.validation import Numbers, expand
 from finger_pin.laws.bristle import passive_micro_damping
 from finger_pin.typing import Array
 
@@ -15,23 +14,19 @@ from finger_pin.typing import Array
 # Many runs are of one finger.
 def micro_damping_advice(finger: FingerDescription) -> str:
     """Return the warning about micro-damping that can drive motion, in one line; empty if it cannot."""
-    tendons, joints = finger.tendon_friction, finger.joint_friction
+    tendons, joints = finger.numbers["tendon_friction"], finger.numbers["joint_friction"]
     # The normal force of a tendon is a factor of both coefficients: their ratio counts.
-    ratio = expand(tendons.stiction_ratio, len(finger.tendons))
-    coulomb = expand(joints.coulomb, len(finger.joints))
-    static = expand(joints.stiction, len(finger.joints))
+    ratio = tendons["stiction_ratio"]
     warnings = [
-        _exceeded("tendon", finger.tendons, tendons.micro_damping, tendons.viscous, np.ones_like(ratio), ratio),
-        _exceeded("joint", finger.joints, joints.micro_damping, joints.viscous, coulomb, static),
+        _exceeded("tendon", finger.tendons, tendons, np.ones_like(ratio), ratio),
+        _exceeded("joint", finger.joints, joints, joints["coulomb"], joints["stiction"]),
     ]
     return "; ".join(filter(None, warnings))
 
 
-def _exceeded(
-    kind: str, names: Iterable[str], micro_damping: Numbers, viscous: Numbers, kinetic: Array, static: Array
-) -> str:
+def _exceeded(kind: str, names: Iterable[str], numbers: Mapping[str, Array], kinetic: Array, static: Array) -> str:
     listed = list(names)
-    micro, b = expand(micro_damping, len(listed)), expand(viscous, len(listed))
+    micro, b = numbers["micro_damping"], numbers["viscous"]
     most = passive_micro_damping(b, kinetic, static)
     wrong = [index for index in range(len(listed)) if micro[index] > most[index]]
     if not wrong:

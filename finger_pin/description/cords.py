@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from finger_pin.description.parameters import Tendon
+from finger_pin.description.validation import problem
 
 
 class CordElement(NamedTuple):
@@ -98,3 +99,17 @@ class Cord(NamedTuple):
         trunk = CordPart(1.0, self.elements[first:last])
         for joint in joints:
             yield sum(1.0 / part.divisor for part in (trunk, *self.parts[1:]) if joint in part.crossed)
+
+
+def check_tendons(tendons: Mapping[str, Tendon], joints: tuple[str, ...], paths: tuple[str, ...]) -> None:
+    """Refuse tendons that cross joints, or run along tendons of a tree, which are not there."""
+    for name, tendon in tendons.items():
+        if tendon.along is not None and tendon.along not in paths:
+            allowed = f"no such tendon of the tree; there are {', '.join(paths) or 'none'}"
+            raise problem(f"tendons.{name}.along", allowed, tendon.along)
+        if name in paths and tendon.along != name:
+            raise problem(f"tendons.{name}", "a tendon of the tree has this name; choose another")
+        for joint in tendon.crossings:
+            if joint not in joints:
+                allowed = f"no such joint; the joints are {', '.join(joints)}"
+                raise problem(f"tendons.{name}.crossings.{joint}", allowed)

@@ -6,9 +6,9 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
-import numpy as np
 from pydantic import (
     Field,
     PrivateAttr,
@@ -20,17 +20,17 @@ from pydantic import (
 
 from finger_pin.description.actuators import Actuator, check_actuators
 from finger_pin.description.caching import memoised
-from finger_pin.description.cords import Cord
+from finger_pin.description.cords import Cord, check_tendons
 from finger_pin.description.effects import OF_FINGER, OF_HAND, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
-from finger_pin.description.parameters import Joint, PassiveTendon, StrokeLimiterSettings, Tendon
+from finger_pin.description.parameters import Joint, PassiveTendon, PerItem, StrokeLimiterSettings, Tendon, per_item
 from finger_pin.description.placement import (
     PLACE,
     Palm,
     actuator_of_hand,
     joined_table,
+    placed_finger,
     rotation,
-    scaled,
     tendon_of_hand,
 )
 from finger_pin.description.tree import EMPTY, Tree
@@ -70,6 +70,7 @@ class FingerDescription(Description):
         description="Whether links that are not neighbours touch each other, where there are contacts.",
     )
     _hand: HandSettings | None = PrivateAttr(None)
+    _numbers: PerItem = PrivateAttr(default_factory=PerItem)
     tree: Tree = Field(EMPTY, description="Bodies in place of links, with joints, tendons and actuators.")
 
     @model_serializer(mode="wrap")
@@ -86,22 +87,12 @@ class FingerDescription(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        joints, tendons = tuple(self.joints), tuple(self.tendons)
+        joints = tuple(self.joints)
         if not self.tendons and not self.tree.bodies:
             raise problem("tendons", "must have at least one entry")
         if self.tree.bodies and tuple(self.tree.joints) != joints:
             raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
-        paths = tuple(self.tree.tendons)
-        for name, tendon in self.tendons.items():
-            if tendon.along is not None and tendon.along not in paths:
-                allowed = f"no such tendon of the tree; there are {', '.join(paths) or 'none'}"
-                raise problem(f"tendons.{name}.along", allowed, tendon.along)
-            if name in paths and tendon.along != name:
-                raise problem(f"tendons.{name}", "a tendon of the tree has this name; choose another")
-            for joint in tendon.crossings:
-                if joint not in self.joints:
-                    allowed = f"no such joint; the joints are {', '.join(joints)}"
-                    raise problem(f"tendons.{name}.crossings.{joint}", allowed)
+        check_tendons(self.tendons, joints, tuple(self.tree.tendons))
         driven = (*self.actuated_names, *self.tree.actuators)
         for key, keyframe in self.tree.keyframes.items():
             for name in keyframe.inputs:
@@ -114,16 +105,33 @@ class FingerDescription(Description):
                 if self.tendons[name].maximum_tension is not None:
                     allowed = f"is for ideal sources: actuators.{key} pulls it"
                     raise problem(f"tendons.{name}.maximum_tension", allowed, self.tendons[name].maximum_tension)
+        self._expand()
+        refuse_idle(self, OF_FINGER)
+        return self
+
+    def _expand(self) -> PerItem:
+        """Refuse lists of another length than their joints or tendons, and expand one number for all."""
         for group, names, what in (
-            ("tendon_friction", (*tendons, *self.canals), "tendon"),
-            ("joint_friction", joints, "joint"),
+            ("tendon_friction", (*self.tendons, *self.canals), "tendon"),
+            ("joint_friction", tuple(self.joints), "joint"),
             ("passive_tendon", self.passive_names, "passive tendon"),
-            ("stroke_limiter", joints, "joint"),
+            ("stroke_limiter", tuple(self.joints), "joint"),
         ):
             for field, value in getattr(self, group):
                 check_size(value, names, f"{group}.{field}", what)
-        refuse_idle(self, OF_FINGER)
-        return self
+            self._numbers[group] = per_item(getattr(self, group), len(names))
+        return self._numbers
+
+    def updated(self, **entries: Any) -> Self:
+        """Return a copy with other values of some entries, unchecked, as of any description."""
+        copy = super().updated(**entries)
+        copy._numbers = PerItem()
+        return copy
+
+    @property
+    def numbers(self) -> Mapping[str, Mapping[str, Array]]:
+        """Numbers of friction, passive tendons and stops as arrays of one per item, by table and entry."""
+        return self._numbers or self._expand()
 
     def cord(self, name: str) -> Cord:
         """Return one of its tendons as a cord, or else a tendon of its tree that something else pulls."""
@@ -146,9 +154,8 @@ class FingerDescription(Description):
             sizes = f"{len(self.joints)} joints, {len(self.tendons)} tendons"
             return f"{self.name}: fingers {', '.join(self.hand.fingers)}; {sizes}"
         if self.tree.bodies:
-            tree, pulled = self.tree, len(self.tendons)
-            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
-            return f"{self.name}: a tree of {sizes}, {len(tree.actuators)} actuators"
+            sizes = f"{len(self.joints)} joints, {len(self.tree.tendons)} tendons ({len(self.tendons)} pulled)"
+            return f"{self.name}: a tree of {sizes}, {len(self.tree.actuators)} actuators"
         tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in self.tendons.items())
         return f"{self.name}: joints {', '.join(self.joints)}; tendons {tendons}"
 
@@ -259,7 +266,7 @@ class HandSettings(Description):
 
     def built(self) -> dict[str, FingerDescription]:
         """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
-        return {name: _placed_finger(name, placed, self.gravity) for name, placed in self.fingers.items()}
+        return {name: placed_finger(name, placed, self.gravity) for name, placed in self.fingers.items()}
 
     def joined(self) -> FingerDescription:
         """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
@@ -291,10 +298,3 @@ class HandSettings(Description):
             actuators={name: actuator_of_hand(name.split(".")[0], actuator) for name, actuator in actuators.items()},
             touches_itself=any(part.touches_itself for part in parts.values()),
         )
-
-
-@memoised(lambda name, placed, gravity: (name, placed, gravity))
-def _placed_finger(name: str, placed: PlacedFinger, gravity: tuple[float, float, float]) -> FingerDescription:
-    gravity_of_finger = placed.rotation.T @ np.array(gravity)
-    finger = scaled(placed.finger, placed.scale)
-    return finger.updated(name=name, gravity=tuple(gravity_of_finger.tolist()))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from finger_pin.description.validation import Description, Numbers, choice, expand, problem, quantity, reals, suggestion
+from finger_pin.description.validation import Description, Numbers, choice, problem, quantity, reals, suggestion
 from finger_pin.exceptions import toml_like
 from finger_pin.typing import Array, Number
 
@@ -119,7 +121,13 @@ class JointFrictionSettings(Description):
     @property
     def break_away(self) -> Numbers:
         """The coefficient at which a joint lets go, m: M^c, or M^d of a law without Stribeck's curve."""
-        return self.coulomb if self.law in ("dahl", "coulomb") else self.stiction
+        value: Numbers = getattr(self, self.break_away_entry)
+        return value
+
+    @property
+    def break_away_entry(self) -> str:
+        """Name of the entry that is `break_away`."""
+        return "coulomb" if self.law in ("dahl", "coulomb") else "stiction"
 
     @model_validator(mode="after")
     def _stiction_above_coulomb(self) -> Self:
@@ -137,21 +145,22 @@ class JointFrictionSettings(Description):
         return self
 
 
-def bristles(law: JointFrictionSettings | TendonFrictionSettings, size: int, more: Number = 0.0) -> dict[str, Array]:
-    """Return the numbers that friction of tendons and of joints share, by the laws' names, one for each of ``size``.
+def bristles(
+    law: JointFrictionSettings | TendonFrictionSettings, numbers: Mapping[str, Array], more: Number = 0.0
+) -> dict[str, Array]:
+    """Return the numbers that friction of tendons and of joints share, by the laws' names, one per item.
 
     Args:
         law: Numbers of friction.
-        size: Number of tendons or joints.
+        numbers: Those of ``law``, one per tendon or joint.
         more: Level without load besides the drag and the floor of ``law``, of the same unit.
     """
     names = ("viscous", "stribeck_velocity", "floor", "stribeck_exponent")
-    numbers: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}
+    shared: dict[str, Array] = {name: numbers[name] for name in names}
     softest, give = _TENDON_BRISTLES if isinstance(law, TendonFrictionSettings) else _JOINT_BRISTLES
-    level = np.maximum(np.maximum(expand(law.drag, size), numbers["floor"]), more)
+    level = np.maximum(np.maximum(numbers["drag"], numbers["floor"]), more)
     # In a hand some fingers may give it.
-    stated = law.stiffness if isinstance(law.stiffness, tuple) else (law.stiffness,) * size
-    free = np.array([each is None for each in stated])
-    stiffness = np.array([0.0 if each is None else each for each in stated])
-    numbers["stiffness"] = np.where(free, np.maximum(softest, level / give), stiffness)
-    return numbers | {"hardening": _PARTS * free / give, "lag": expand(law.micro_damping, size) / numbers["stiffness"]}
+    stiffness = numbers.get("stiffness", np.full(len(numbers["floor"]), math.nan))
+    free = np.isnan(stiffness)
+    shared["stiffness"] = np.where(free, np.maximum(softest, level / give), stiffness)
+    return shared | {"hardening": _PARTS * free / give, "lag": numbers["micro_damping"] / shared["stiffness"]}

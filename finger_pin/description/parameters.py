@@ -18,12 +18,14 @@ from finger_pin.description.validation import (
     Name,
     Numbers,
     choice,
+    expand,
     problem,
     quantity,
     real,
     reals,
     vector,
 )
+from finger_pin.typing import Array
 
 _MILLIMETRES = " m (is it in millimetres?)"
 # Osmium, kg/m3 (CRC Handbook of Chemistry and Physics), and the least mass, kg, that is asked about: in grams a link
@@ -255,3 +257,24 @@ class StrokeLimiterSettings(Description):
     viscous: Annotated[Numbers, reals(0.0, 1e7)] = quantity(
         0.0, unit="N m s/rad", source="chosen", doc="b of a damper beside it, k d (1 + c d') + b d', while that pushes."
     )
+
+
+class PerItem(dict[str, dict[str, Array]]):
+    """Tables of one number for all or one per item, as arrays of one per item, by table and entry.
+
+    They follow from the description that has them, so that they make no two differ.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether another is one, too."""
+        return isinstance(other, PerItem)
+
+    __hash__ = None
+
+
+def per_item(table: Description, size: int) -> dict[str, Array]:
+    """Return the numbers of a table by entry, read-only, shape (size,); NaN where a hand's finger has none."""
+    numbers = {entry: expand(value, size) for entry, value in table if isinstance(value, int | float | tuple)}
+    for array in numbers.values():
+        array.flags.writeable = False
+    return numbers

@@ -10,20 +10,11 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator
+from finger_pin.description.caching import memoised
 from finger_pin.description.parameters import Joint, Link, Tendon
 from finger_pin.description.signals import SignalSettings
 from finger_pin.description.tables import Series, series
-from finger_pin.description.validation import (
-    Description,
-    Name,
-    Numbers,
-    expand,
-    problem,
-    quantity,
-    real,
-    suggestion,
-    vector,
-)
+from finger_pin.description.validation import Description, Name, Numbers, problem, quantity, real, suggestion, vector
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
@@ -80,11 +71,17 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
     joints = {name: _scaled_joint(joint, scale) for name, joint in tables.joints.items()}
     tendons = {name: _scaled_tendon(tendon, scale) for name, tendon in tables.tendons.items()}
     friction = tables.joint_friction
-    lengths = {
-        key: tuple((scale * expand(getattr(friction, key), len(joints))).tolist()) for key in ("coulomb", "stiction")
-    }
+    lengths = {key: tuple((scale * tables.numbers["joint_friction"][key]).tolist()) for key in ("coulomb", "stiction")}
     update = {"joints": joints, "tendons": tendons, "joint_friction": friction.updated(**lengths)}
     return finger.updated(**update)
+
+
+@memoised(lambda name, placed, gravity: (name, placed, gravity))
+def placed_finger(name: str, placed: Any, gravity: tuple[float, float, float]) -> Any:
+    """Return a finger as it is on a hand: to scale, with gravity in its own base frame."""
+    gravity_of_finger = placed.rotation.T @ np.array(gravity)
+    finger = scaled(placed.finger, placed.scale)
+    return finger.updated(name=name, gravity=tuple(gravity_of_finger.tolist()))
 
 
 def tendon_of_hand(finger: str, tendon: Tendon) -> Tendon:

@@ -285,7 +285,7 @@ class Scenario(Description):
             for name, finger in fingers.items()
         ]
         return PassiveCoupling.from_routing(
-            routing, np.concatenate(wishes), expand(self.finger.passive_tendon.stiffness, routing.passive)
+            routing, np.concatenate(wishes), self.finger.numbers["passive_tendon"]["stiffness"]
         )
 
     def sample_times(self) -> Array:

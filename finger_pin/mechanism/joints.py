@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.parameters import Spring
-from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
@@ -77,21 +76,21 @@ class JointFriction:
     @classmethod
     def from_description(cls, description: FingerDescription, loads: Array) -> JointFriction:
         """Read one number per joint; ``loads`` comes from the routing."""
-        law, size = description.joint_friction, len(description.joints)
+        law, numbers = description.joint_friction, description.numbers["joint_friction"]
         bearing = np.array(description.bearings)
-        numbers = bristles(law, size)
-        numbers["viscous"] = bearing * numbers["viscous"]
+        shared = bristles(law, numbers)
+        shared["viscous"] = bearing * shared["viscous"]
         chosen = joint_law(law.law)
         if np.any(law.drag) and "drag" not in chosen.parameters:
             raise InputError("finger.joint_friction.drag", f"has no effect with law = {law.law!r}, which lacks it")
         return cls(
             loads=bearing[:, None] * loads,
             bearing=bearing,
-            kinetic=expand(law.coulomb, size),
-            static=expand(law.break_away, size),
-            **numbers,
-            drag=bearing * expand(law.drag, size),
-            reversal_speed=expand(law.reversal_speed, size),
+            kinetic=numbers["coulomb"],
+            static=numbers[law.break_away_entry],
+            **shared,
+            drag=bearing * numbers["drag"],
+            reversal_speed=numbers["reversal_speed"],
             law=chosen,
         )
 
@@ -161,11 +160,9 @@ class StrokeLimiter:
     def from_description(cls, description: FingerDescription) -> StrokeLimiter:
         """Read the ranges and the contact's stiffness and damping."""
         ranges = np.array([joint.range for joint in description.joints.values()])
-        settings = description.stroke_limiter
-        size = len(ranges)
-        stiffness, damping = expand(settings.stiffness, size), expand(settings.damping, size)
+        numbers = description.numbers["stroke_limiter"]
         limited = np.array([joint.limited for joint in description.joints.values()])
-        return cls(ranges[:, 0], ranges[:, 1], stiffness, damping, expand(settings.viscous, size), limited)
+        return cls(ranges[:, 0], ranges[:, 1], limited=limited, **numbers)
 
     def rows(self, names: tuple[str, ...], width: int) -> Rows:
         """Return the table of the limiters."""

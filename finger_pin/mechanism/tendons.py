@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.routing import Routing
-from finger_pin.description.validation import expand
 from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coefficient
 from finger_pin.laws.spring import TENDON_HALF
@@ -85,11 +84,11 @@ class Tendons:
     def from_description(cls, description: FingerDescription) -> Tendons:
         """Read friction and passive tendons, one number per tendon."""
         routing = Routing.from_description(description)
-        law, passive = description.tendon_friction, description.passive_tendon
-        size, among = len(routing.tendons), len(routing.tendons) + len(description.canals)
-        friction = {"surface": expand(law.coulomb, among), "stiction_ratio": expand(law.stiction_ratio, among)}
+        law, passive = description.numbers["tendon_friction"], description.numbers["passive_tendon"]
+        size = len(routing.tendons)
+        friction = {"surface": law["coulomb"], "stiction_ratio": law["stiction_ratio"], "drag": law["drag"]}
         losses = [description.tree.tendons[name].friction for name in description.canals]
-        friction |= bristles(law, among, np.array([0.0] * size + losses)) | {"drag": expand(law.drag, among)}
+        friction |= bristles(description.tendon_friction, law, np.array([0.0] * size + losses))
         wraps = [find_wraps(description, name) for name in (*routing.tendons, *description.canals)]
         return cls(
             routing=routing,
@@ -101,9 +100,9 @@ class Tendons:
                 for k, through_space in enumerate(routing.through_space)
                 if len(wraps[k]) > 1 and not through_space
             },
-            half_stiffness=2.0 * expand(passive.stiffness, routing.passive),
-            hysteresis=expand(passive.hysteresis, routing.passive),
-            mass=expand(passive.mass, routing.passive),
+            half_stiffness=2.0 * passive["stiffness"],
+            hysteresis=passive["hysteresis"],
+            mass=passive["mass"],
         )
 
     @property

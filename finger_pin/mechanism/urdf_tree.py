@@ -11,7 +11,6 @@ import pinocchio as pin
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree_parts import Body, Coupling, TreeJoint, TreeSolid
-from finger_pin.description.validation import expand
 from finger_pin.mechanism.tendon_paths import joint_placement, rotation
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
 
@@ -88,13 +87,13 @@ def _complete(
     limits: tuple[float, float],
 ) -> None:
     """Add limits, damping and friction of a joint, and the joint that it follows."""
-    place, size = list(description.joints).index(name), len(description.joints)
-    friction, spring = description.joint_friction, description.joints[name].spring
+    place, spring = list(description.joints).index(name), description.joints[name].spring
+    friction = description.numbers["joint_friction"]
     lower, upper = description.joints[name].range
     ends = {} if joint.get("type") == "continuous" else {"lower": _numbers(lower), "upper": _numbers(upper)}
     ET.SubElement(joint, "limit", ends | {"effort": _numbers(limits[0]), "velocity": _numbers(limits[1])})
-    damping = float(expand(friction.viscous, size)[place]) * moved.bearing + (spring.damping if spring else 0.0)
-    loss = max(float(expand(each, size)[place]) for each in (friction.floor, friction.drag)) * moved.bearing
+    damping = float(friction["viscous"][place]) * moved.bearing + (spring.damping if spring else 0.0)
+    loss = max(float(friction[entry][place]) for entry in ("floor", "drag")) * moved.bearing
     ET.SubElement(joint, "dynamics", damping=_numbers(damping), friction=_numbers(loss))
     if course is not None and course.other is not None:
         followed = {"joint": course.other, "multiplier": _numbers(course.slope), "offset": _numbers(course.offset)}

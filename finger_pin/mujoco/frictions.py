@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings, bristles
+from finger_pin.description.parameters import per_item
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, Coefficients, PluginFriction
 from finger_pin.mujoco.name_matching import RoutedFriction
@@ -201,7 +202,7 @@ def _tendon_law(model: mujoco.MjModel, name: str, law: Any) -> Coefficients:
 
 def _bristles(law: JointFrictionSettings | TendonFrictionSettings, level: float) -> tuple[float, float]:
     """Return the stiffness of bristles and its growth with their force, of friction that has a level without load."""
-    numbers = bristles(law, 1, level)
+    numbers = bristles(law, per_item(law, 1), level)
     return float(numbers["stiffness"][0]), float(numbers["hardening"][0])
 
 

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
-from finger_pin.description.validation import Description, expand, quantity, real, suggestion, validate
+from finger_pin.description.parameters import per_item
+from finger_pin.description.validation import Description, quantity, real, suggestion, validate
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import check_friction
 
@@ -96,5 +97,5 @@ def keys_of(description: FingerDescription) -> tuple[dict[str, dict[str, Any]], 
 
 def _at(settings: TendonFrictionSettings | JointFrictionSettings, index: int, count: int) -> dict[str, Any]:
     """Return the numbers of one of several tendons or joints."""
-    numbers = {key: value for key, value in settings if isinstance(value, int | float | tuple)}
-    return {key: float(expand(value, count)[index]) for key, value in numbers.items() if key != "reversal_speed"}
+    numbers = per_item(settings, count)
+    return {key: float(values[index]) for key, values in numbers.items() if key != "reversal_speed"}

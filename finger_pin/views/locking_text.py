@@ -6,7 +6,6 @@ import numpy as np
 
 from finger_pin.analysis import SelfLockingMap, SelfLockingMargin, SpringReturn, critical_friction, self_locking_margin
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import expand
 from finger_pin.views.summary import table
 
 # A margin below this is none.
@@ -24,7 +23,7 @@ def summarize_locking(scenario: Scenario, locking_map: SelfLockingMap) -> str:
         InputError: If there is no force closure.
     """
     finger = scenario.finger
-    static = expand(finger.joint_friction.break_away, len(finger.joints))
+    static = finger.numbers["joint_friction"][finger.joint_friction.break_away_entry]
     alone = [(name, critical_friction(finger, joints=[name]).coefficient) for name in finger.joints]
     together = critical_friction(finger).coefficient
     rows = [(name, _millimetres(value), f"{1e3 * own:.3f}") for (name, value), own in zip(alone, static, strict=True)]

@@ -9,6 +9,7 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from finger_pin.description.finger import FingerDescription
+from finger_pin.description.loading import load_finger
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import (
     Description,
@@ -99,6 +100,16 @@ def test_one_number_is_expanded_to_all_and_a_list_is_copied():
     expanded = expand(2.0, 3)
     expanded[0] = 5.0
     np.testing.assert_array_equal(expanded, [5.0, 2.0, 2.0])
+
+
+def test_numbers_of_a_finger_are_one_per_item_read_only_and_follow_an_unchecked_copy():
+    finger = load_finger("ub_stand_in")
+    changed = finger.updated(joint_friction={"viscous": (1.0, 2.0, 3.0, 4.0)})
+    for description, expected in ((finger, [finger.joint_friction.viscous] * 4), (changed, [1.0, 2.0, 3.0, 4.0])):
+        np.testing.assert_array_equal(description.numbers["joint_friction"]["viscous"], expected)
+    np.testing.assert_array_equal(finger.numbers["tendon_friction"]["drag"], np.zeros(5))
+    with pytest.raises(ValueError, match="read-only"):
+        finger.numbers["joint_friction"]["viscous"][0] = 5.0
 
 
 def test_descriptions_are_frozen():
