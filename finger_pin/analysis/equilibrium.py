@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.validation import finite_vector
@@ -113,6 +114,7 @@ class _Statics:
         pushed: F, shape (3,), N.
         rest: The packed state at the start, with actuators that have settled.
         scale: Of joints and passive tendons, shape (k,), rad and m.
+        on_paths: Which of the joints are moved along paths, shape (n,): they stay where they are.
     """
 
     finger: Finger
@@ -120,6 +122,7 @@ class _Statics:
     pushed: Array
     rest: Array
     scale: Array
+    on_paths: NDArray[np.bool_]
 
     @classmethod
     def from_posture(cls, finger: Finger, command: Array, pushed: Array, position: Array) -> _Statics:
@@ -133,7 +136,9 @@ class _Statics:
                 least, most, lowest, highest = table.parameters[limits]
                 actuator_state[: table.count] = np.clip(np.clip(command[table.channels], least, most), lowest, highest)
                 actuator_state = actuator_state[table.count :]
-        return cls(finger, command, pushed, rest, np.concatenate([np.ones(len(position)), np.full(passive, 1e-3)]))
+        on_paths = np.isin(finger.routing.joints, list(finger.description.tree.on_paths))
+        scale = np.concatenate([np.ones(len(position)), np.full(passive, 1e-3)])
+        return cls(finger, command, pushed, rest, scale, on_paths)
 
     @property
     def start(self) -> Array:
@@ -145,14 +150,14 @@ class _Statics:
         """Return the packed state at rest in a posture."""
         x, joints, places = self.rest.copy(), len(self.finger.routing.joints), self.scale * y
         state = self.finger.layout.unpack(x)
-        state.position[:], state.passive_position[:] = places[:joints], places[joints:]
+        state.position[~self.on_paths], state.passive_position[:] = places[:joints][~self.on_paths], places[joints:]
         return x
 
     def energy(self, y: Array) -> float:
         """Return the stored energy less the work of inputs and force, J."""
         finger, joints, actuated = self.finger, len(self.finger.routing.joints), self.finger.routing.actuated
-        theta = (self.scale * y)[:joints]
-        signals = finger.evaluate(self.packed(y), self.command, self.pushed)
+        x = self.packed(y)
+        theta, signals = finger.layout.unpack(x).position, finger.evaluate(x, self.command, self.pushed)
         stored, _ = signals.mechanism.account()
         raised = finger.motion(theta, np.zeros(joints)).potential_energy
         work = (~finger.routing.winched * signals.tendons.entering[:actuated]) @ finger.excursion(theta)

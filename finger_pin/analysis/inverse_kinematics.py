@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 import scipy
@@ -24,6 +24,8 @@ _THERE = 1e-6
 _NEAR = 1e-9
 # Weight of couplings and loops against the distance, m/rad, and steps that bring the posture found onto them.
 _CONSTRAINT_WEIGHT, _LAST_STEPS = 1e3, 3
+# How far what is moved along paths may be from its place, rad or m.
+_STAYS = 1e-9
 # Shares of the joints' ranges from which a search begins, and most of their combinations.
 _STARTS, _MOST = (0.1, 0.5, 0.9), 27
 
@@ -51,6 +53,7 @@ class TipPosture(BriefRepr):
 def _constraints(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
     """Return a function of theta: by how much couplings and loops are missed, shape (k,), and its slopes, (k, n)."""
     joints = len(finger.routing.joints)
+    moves = ~np.isin(finger.routing.joints, list(finger.description.tree.on_paths))
     tables = [table for table in finger.mechanism.rows if table.group in ("coupling", "loop")]
     if not tables:
         return lambda theta: (np.zeros(0), np.zeros((0, joints)))
@@ -60,7 +63,7 @@ def _constraints(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
 
     def missed(theta: Array) -> tuple[Array, Array]:
         kinematics = path_kinematics(finger.rigid_body, theta, paths, joints)
-        return arm @ theta + kinematics.length - rest, arm + kinematics.arm
+        return arm @ theta + kinematics.length - rest, (arm + kinematics.arm) * moves
 
     return missed
 
@@ -93,6 +96,9 @@ def inverse_kinematics(
     target = np.array(finite_vector("point", point, 3))
     low, high = (np.clip(each, -np.pi, np.pi) for each in (finger.stroke_limiter.lower, finger.stroke_limiter.upper))
     wanted = np.clip(0.0, low, high) if near is None else np.array(finite_vector("near", near, len(low)))
+    # What is moved along paths stays.
+    led = np.isin(finger.routing.joints, list(finger.description.tree.on_paths))
+    low, high = (np.where(led, wanted + half, each) for half, each in ((-_STAYS, low), (_STAYS, high)))
     coupling = PassiveCoupling.inextensible(finger.routing)
     free = coupling.free
     followers, moved = list(coupling.followers), coupling.matrix[:, free]
@@ -113,7 +119,7 @@ def inverse_kinematics(
 
     span = high[free] - low[free]
     starts = [np.clip(wanted[free], low[free], high[free])]
-    starts += [low[free] + np.array(shares) * span for shares in list(product(_STARTS, repeat=len(free)))[:_MOST]]
+    starts += [low[free] + np.array(shares) * span for shares in islice(product(_STARTS, repeat=len(free)), _MOST)]
     solutions: list[tuple[float, Array]] = []
     for start in starts:
         # Strictly inside, as bounded least squares want it.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger_pin.control.interface import Controller, ControlSignals, Dynamics, LoopController
-from finger_pin.control.palm import Guides, PalmPath, PrescribedJoints, PrescribedObjects, at_start, with_paths
+from finger_pin.control.palm import Guides, PalmPath, PrescribedJoints, PrescribedPaths, at_start, with_paths
 from finger_pin.control.position_drive import DriveSignals, LoopMemory
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -55,7 +55,7 @@ class ClosedLoop:
         drives: Loops of motors in position drive; None without any.
         last_samples: Of these loops, from the run that this one goes on from; None for loops that start.
         palm: Path of the palm of a hand; None at rest.
-        guides: Paths of moved objects, or of all joints; None without any.
+        guides: Paths of moved objects and joints, or the motion of all joints; None without any.
     """
 
     finger: Finger
@@ -104,7 +104,7 @@ class ClosedLoop:
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
             palm=PalmPath.from_hand(scenario.hand, start, finger, scenario.simulation.rtol),
-            guides=PrescribedObjects.from_finger(finger, start, scenario.simulation.rtol),
+            guides=PrescribedPaths.from_finger(finger, start, scenario.simulation.rtol),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:

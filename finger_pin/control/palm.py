@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.core.inputs import InputTable, core_signal
 from finger_pin.description.finger import HandSettings
@@ -115,51 +116,60 @@ class PrescribedJoints:
 
 
 @dataclass(frozen=True, eq=False)
-class PrescribedObjects:
-    """The paths of k objects.
+class PrescribedPaths:
+    """The paths of j joints of a tree and of k objects.
 
     Attributes:
-        signal: Of each its displacement along x, y, z, m, and three turns, which are zero: 6 k functions of time.
-        places: Which of the objects that move they are, shape (k,).
+        signal: Of each joint its growth, rad or m, then of each object its displacement along x, y, z, m, and three
+            turns, which are zero: j + 6 k functions of time.
+        joints: Which of the joints they are, shape (j,).
+        objects: Which of the objects that move they are, shape (k,).
         gravity: In the base frame, shape (3,), m/s2.
     """
 
     signal: Signal
-    places: Array
+    joints: NDArray[np.int64]
+    objects: NDArray[np.int64]
     gravity: Array
 
     @classmethod
-    def from_finger(cls, finger: Finger, start: float, tolerance: float) -> PrescribedObjects | None:
-        """Return the paths of the moved objects around a finger from a time on, s, or None.
+    def from_finger(cls, finger: Finger, start: float, tolerance: float) -> PrescribedPaths | None:
+        """Return the paths of joints of a finger and of objects around it from a time on, s, or None.
 
         The tolerance is that of `Signal.from_settings`.
         """
-        around = finger.scene
-        paths = {} if around is None else {name: each.path for name, each in around.free.items() if each.path}
-        if around is None or not paths:
+        moving = {} if finger.scene is None else finger.scene.free
+        on_paths, paths = (
+            finger.description.tree.on_paths,
+            {name: each.path for name, each in moving.items() if each.path},
+        )
+        if not on_paths and not paths:
             return None
         settings = [path.get(axis, _STILL) for path in paths.values() for axis in (*OBJECT_PATH, "", "", "")]
-        names = list(around.free)
-        places = np.array([names.index(name) for name in paths])
-        return cls(
-            Signal.from_settings(settings, tolerance).later(start), places, np.array(around.body.model.gravity.linear)
+        joints, objects = (
+            np.array([names.index(name) for name in led], dtype=np.int64)
+            for names, led in ((list(finger.routing.joints), on_paths), (list(moving), paths))
         )
+        signal = Signal.from_settings([*on_paths.values(), *settings], tolerance).later(start)
+        return cls(signal, joints, objects, np.array(finger.rigid_body.model.gravity.linear))
 
     def place(self, finger: Finger, x: Array) -> Array:
-        """Return a packed state with the objects at the beginnings of their paths."""
-        state = finger.layout.unpack(x)
-        value, rate = (each.reshape(-1, 6)[:, :3] for each in self.signal.at(0.0))
-        state.object_pose.reshape(-1, POSE)[self.places, :3] += value
-        state.object_velocity.reshape(-1, VELOCITY)[self.places, :3] = rate
+        """Return a packed state with joints and objects at the beginnings of their paths."""
+        state, split = finger.layout.unpack(x), len(self.joints)
+        value, rate = self.signal.at(0.0)
+        state.position[self.joints] += value[:split]
+        state.velocity[self.joints] = rate[:split]
+        state.object_pose.reshape(-1, POSE)[self.objects, :3] += value[split:].reshape(-1, VELOCITY)[:, :3]
+        state.object_velocity.reshape(-1, VELOCITY)[self.objects, :3] = rate[split:].reshape(-1, VELOCITY)[:, :3]
         return x
 
     def base(self, time: Array | float) -> Array:
-        """Return the 27 numbers of `base_motion` for a base at rest, and the 6 k accelerations, at times (...)."""
+        """Return the 27 numbers of `base_motion` for a base at rest, and the j + 6 k accelerations, at times (...)."""
         return _resting_base(self.gravity, self.signal.derivative(time, 2))
 
 
 #: What moves coordinates along paths.
-Guides = PrescribedJoints | PrescribedObjects
+Guides = PrescribedJoints | PrescribedPaths
 
 
 def _resting_base(gravity: Array, acceleration: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -18,6 +19,20 @@ from finger_pin.description.validation import Description, FullName, Name, choic
 Array = NDArray[np.float64]
 #: The coordinates of an object's path.
 PATH = ("x", "y", "z")
+
+
+def inertia_matrix(moments: Sequence[float]) -> Array:
+    """Return the matrix of moments xx, yy, zz, xy, xz, yz, shape (3, 3)."""
+    xx, yy, zz, xy, xz, yz = moments
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def check_moments(value: tuple[float, ...]) -> tuple[float, ...]:
+    """Return moments of inertia xx, yy, zz, xy, xz, yz; refuse negative principal ones."""
+    principal = np.linalg.eigvalsh(inertia_matrix(value))
+    if principal[0] < -1e-12 * principal[-1]:
+        raise problem("", "must have principal moments that are not negative", list(value))
+    return value
 
 
 class ObjectState(Description):
@@ -57,7 +72,16 @@ class Object(ObjectState, Shaped):
         "palm", unit="1", source="chosen", doc="Where a fixed object stands, also while the palm moves: palm or world."
     )
     mass: Annotated[float, real(0.0, 100.0, above=True, hint=" kg (is it in grams?)")] | None = quantity(
-        None, unit="kg", source="design", doc="Of a solid of even density that is free to move; fixed without one."
+        None, unit="kg", source="design", doc="Of a solid that is free to move; fixed without one."
+    )
+    centre: Annotated[tuple[float, float, float], vector(3, -2.0, 2.0, MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre of a free object, in its frame."
+    )
+    inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] | None = quantity(
+        None,
+        unit="kg m2",
+        source="design",
+        doc="About the mass centre, along the object's axes: xx, yy, zz, xy, xz, yz; of even density without.",
     )
     path: dict[Name, PathSignal] | None = Field(
         None, description="Path along which it is moved: growth of x, y and z of its position over time, base frame."
@@ -70,6 +94,11 @@ class Object(ObjectState, Shaped):
         if value == "mesh":
             raise problem("", f"meshes are not supported; put the body together of {', '.join(SIZES)}", value)
         return value
+
+    @field_validator("inertia")
+    @classmethod
+    def _positive(cls, value: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        return None if value is None else check_moments(value)
 
     @field_validator("path")
     @classmethod
@@ -89,6 +118,9 @@ class Object(ObjectState, Shaped):
             raise problem("path", "is for objects without a mass: one with a mass is free, and goes where it is pushed")
         if self.mass is None:
             self.check_at_rest()
+            for entry in ("centre", "inertia"):
+                if any(getattr(self, entry) or ()):
+                    raise problem(entry, "is for objects with a mass", getattr(self, entry))
         return self
 
     @property
@@ -108,8 +140,13 @@ class Object(ObjectState, Shaped):
         return np.append(self.position, self.quaternion)
 
     @property
-    def inertia(self) -> tuple[float, float, float]:
-        """Moments of inertia of a free object about x, y and z of its frame, kg m2; zero for a fixed one."""
+    def moments(self) -> tuple[float, ...]:
+        """Inertia about the mass centre as `inertia` has it, kg m2; zero for a fixed one."""
+        return self.inertia or (*self.even_moments, 0.0, 0.0, 0.0)
+
+    @property
+    def even_moments(self) -> tuple[float, float, float]:
+        """Moments of inertia of a solid of even density about x, y and z of its frame, kg m2; zero for a fixed one."""
         mass = self.mass
         if mass is None:
             return 0.0, 0.0, 0.0

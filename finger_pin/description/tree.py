@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from finger_pin.description.cords import Cord, CordElement, CordPart
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.objects import Object
+from finger_pin.description.placement import PathSignal
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeJoint, TreeSolid, TreeTendon
@@ -84,6 +85,7 @@ class Tree(Description):
             _check(f"actuators.{name}.joint", actuator.joint, self.joints, "joint")
             _check(f"actuators.{name}.tendon", actuator.tendon, self.tendons, "tendon")
         self._check_shapes()
+        self._check_paths()
         if self.tip is not None and self.tips:
             raise problem("tip", "is for a single fingertip; leave it out beside tips", list(self.tips))
         for entry, tip in (("tip", self.tip), *((f"tips.{name}", each) for name, each in self.tips.items())):
@@ -104,6 +106,21 @@ class Tree(Description):
                 _check("touching", shape, owner, "shape")
             if owner[pair[0]] == owner[pair[1]]:
                 raise problem("touching", "shapes of one body do not touch each other", list(pair))
+
+    def _check_paths(self) -> None:
+        """Refuse inertia on joints with paths, which would act on what moves freely beside them."""
+        for name, joint in self.joints.items():
+            if joint.path is None:
+                continue
+            if joint.armature:
+                raise problem(f"joints.{name}.armature", "has no effect on a joint with a path", joint.armature)
+            carried = {joint.body}
+            for key, body in self.bodies.items():
+                carried |= {key} if body.parent in carried else set()
+                if key in carried and (body.mass or any(body.inertia)):
+                    allowed = f"is for joints that move no mass, and {key} has {body.mass:g} kg"
+                    hint = "; make it the joint of a body without mass, and join that one to it by loops"
+                    raise problem(f"joints.{name}.path", allowed + hint)
 
     def objects_at(self, keyframe: Keyframe | None) -> dict[str, Object]:
         """Return the objects as they are at a keyframe."""
@@ -126,6 +143,11 @@ class Tree(Description):
         parts = [(divisor, (*arms, *trunk)), *branches]
         cord_parts = tuple(CordPart(divisor, tuple(elements)) for divisor, elements in parts)
         return Cord(cord_parts, described.curvature_offset, through_space=path is not None)
+
+    @property
+    def on_paths(self) -> dict[str, PathSignal]:
+        """Paths of the joints that are moved along one, by name."""
+        return {name: joint.path for name, joint in self.joints.items() if joint.path is not None}
 
     @property
     def tip_names(self) -> tuple[str, ...]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from finger_pin.description.objects import ObjectState
+from finger_pin.description.objects import ObjectState, check_moments
+from finger_pin.description.placement import PathSignal
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.validation import (
     MOST_ANGLE,
@@ -87,11 +87,7 @@ class Body(Description):
     @field_validator("inertia")
     @classmethod
     def _positive(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        xx, yy, zz, xy, xz, yz = value
-        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if moments[0] < -1e-12 * moments[-1]:
-            raise problem("", "must have principal moments that are not negative", list(value))
-        return value
+        return check_moments(value)
 
 
 class TreeJoint(Description):
@@ -115,6 +111,9 @@ class TreeJoint(Description):
     )
     bearing: bool = Field(
         True, strict=True, description="Whether it is a pin or a guide that rubs; the joints of a free body are none."
+    )
+    path: PathSignal | None = Field(
+        None, description="Along which it is moved, whatever that takes: growth of its position from the start on."
     )
 
 

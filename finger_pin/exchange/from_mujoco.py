@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.meshes import Mesh
@@ -22,12 +21,12 @@ from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.exchange.mujoco_actuators import ActuatorReader
 from finger_pin.exchange.mujoco_compliance import read_stops
 from finger_pin.exchange.mujoco_equalities import linked_bodies, read_equalities
-from finger_pin.exchange.mujoco_free import FreeBodies
+from finger_pin.exchange.mujoco_free import FreeBodies, LedBodies
 from finger_pin.exchange.mujoco_keyframes import read_keyframes
 from finger_pin.exchange.mujoco_names import Names, Table, entry_name, free_name, quaternion
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
-from finger_pin.exchange.mujoco_tendons import TendonReader, within_margin
+from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies, within_margin
 from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest, apply_flags
 from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.version import installing
@@ -49,7 +48,8 @@ def from_mujoco(
     their margins, are guarded by (2), which is as stiff as ``solref`` and ``solimp`` ask at the model's own inertia, as
     are equalities. Joints' friction loss is the least level of (9). Without a keyframe, the reference is one. A free
     body that a tendon passes moves by three slides and three hinges, of which the second must not come to a right
-    angle; others, and geoms of the world, become objects. Names keep letters, digits and underscores: ``a/b`` is
+    angle; others, and geoms of the world, become objects. Mocap bodies are led along the paths of six joints,
+    ``tree.joints.NAME_x.path`` and so on. Names keep letters, digits and underscores: ``a/b`` is
     ``a_b``. What is not carried over stands in ``tree.left_out``, and is warned of where it moves or carries anything.
 
     Args:
@@ -105,7 +105,9 @@ class _Reader:
             raise InputError(f"joint {self.names.joints[i]}", allowed)
         self.actuators = ActuatorReader(*vars(self._read).values())
         self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
-        self.free = FreeBodies(self._read, self._passed())
+        self.free = FreeBodies(self._read, passed_bodies(self._read))
+        self.bodies = self._bodies()
+        self.led = LedBodies(self._read, self.bodies, set(self.names.joints).union(*self.free.labels.values()))
 
     def table(self, name: str) -> Table:
         """Return the description as a table."""
@@ -115,14 +117,14 @@ class _Reader:
             raise InputError("model", allowed)
         reader = TendonReader(*vars(self._read).values())
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
-        bodies = self._bodies()
+        bodies = self.bodies
         actuators, pulled = self.actuators.table(), self.actuators.pulled()
         used = {*tendons, *pulled}
         couplings, loops, differences = read_equalities(self._read)
         joints, moving, loss = self._joints()
         stops = read_stops(self._read, joints)
         objects, pairs = self.shapes.objects(self.free.loose), self.shapes.pairs(bodies)
-        keyframes = read_keyframes(self._read, self.actuators, self.free, self.shapes, self.kept_joints)
+        keyframes = read_keyframes(self._read, self.actuators, self.free, self.led, self.shapes, self.kept_joints)
         self.shapes.set_apart(objects, bodies)
         return {
             "name": entry_name(name),
@@ -147,33 +149,22 @@ class _Reader:
             },
         }
 
-    def _passed(self) -> set[int]:
-        """Return the bodies that tendons pass or whose geoms they wrap."""
-        model, types = self.model, self.mujoco.mjtWrap
-        sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE]
-        wraps = model.wrap_objid[self._wraps()]
-        return {int(body) for body in (*model.site_bodyid[sites], *model.geom_bodyid[wraps])}
-
     def _joints(self) -> tuple[Table, Table, list[float]]:
         """Return the joints of the finger, those of its tree, and their losses by friction, in the bodies' order."""
-        joints, moving, loss = dict[str, Any](), dict[str, Any](), list[float]()
-        for i in range(self.model.njnt):
-            if i in self.kept_joints:
-                name = self.names.joints[i]
-                joints[name], moving[name] = self._joint(i), self._moving(i)
-                loss.append(float(self.model.dof_frictionloss[self.model.jnt_dofadr[i]]))
-            elif i in self.free.kept:
-                for name, joint, moved in self.free.joints(i):
-                    joints[name], moving[name] = joint, moved
-                    loss.append(0.0)
-        return joints, moving, loss
+        rows, model = list[tuple[int, str, Table, Table, float]](), self.model
+        for i in self.kept_joints:
+            loss = float(model.dof_frictionloss[model.jnt_dofadr[i]])
+            rows.append((int(model.jnt_bodyid[i]), self.names.joints[i], self._joint(i), self._moving(i), loss))
+        sixes = [(int(model.jnt_bodyid[i]), self.free.joints(i)) for i in self.free.kept]
+        sixes += [(body, self.led.joints(body)) for body in self.led.labels]
+        rows += [(body, *joint, 0.0) for body, six in sixes for joint in six]
+        rows.sort(key=lambda row: row[0])
+        return {row[1]: row[2] for row in rows}, {row[1]: row[3] for row in rows}, [row[4] for row in rows]
 
     def _bodies(self) -> list[int]:
         """Return the bodies that move, are passed by tendons, or carry such bodies, parents first."""
         model = self.model
-        needed = self._passed() | self.shapes.still() | linked_bodies(self.mujoco, model)
-        sides = [int(site) for site in model.wrap_prm[self._wraps()] if site >= 0]
-        needed |= {int(body) for body in model.site_bodyid[sides]}
+        needed = passed_bodies(self._read, sides=True) | self.shapes.still() | linked_bodies(self.mujoco, model)
         moved: set[int] = set()
         for i in range(1, model.nbody):
             has_joints = any(model.jnt_bodyid[j] == i for j in (*self.kept_joints, *self.free.kept))
@@ -192,18 +183,24 @@ class _Reader:
 
     def _body(self, i: int) -> Table:
         model = self.model
-        turned = rotation(quaternion(model.body_iquat[i]))
-        moments = turned @ np.diag(model.body_inertia[i]) @ turned.T
         return {
             **self.names.carrier(int(model.body_parentid[i]), "parent"),
             "position": model.body_pos[i].tolist(),
             "orientation": quaternion(model.body_quat[i]),
+            # A motion that is prescribed takes no mass.
+            **({} if i in self.led else self._inertia(i)),
+            "solids": self._solids(i),
+            "shapes": self.shapes.of_body(i),
+        }
+
+    def _inertia(self, i: int) -> Table:
+        model, turned = self.model, rotation(quaternion(self.model.body_iquat[i]))
+        moments = turned @ np.diag(model.body_inertia[i]) @ turned.T
+        return {
             "mass": float(model.body_mass[i]),
             "gravity_compensation": float(model.body_gravcomp[i]),
             "centre": model.body_ipos[i].tolist(),
             "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
-            "solids": self._solids(i),
-            "shapes": self.shapes.of_body(i),
         }
 
     def _solids(self, body: int) -> Table:
@@ -282,7 +279,7 @@ class _Reader:
                 tip = Tip(body=self.names.bodies[body], position=model.site_pos[i].tolist())
                 named = entry_name(model.site(i).name).removesuffix("_fingertip")
                 sites.setdefault(carrier, {named: tip})
-        loose = {self.names.bodies[model.jnt_bodyid[i]] for i in self.free.kept}
+        loose = {self.names.bodies[i] for i in (*self.free.labels, *self.led.labels)}
         ends = {name: {name: each} for name, each in tree.tips.items() if name not in loose or not self.kept_joints}
         tips = {name: tip for each in (ends | sites).values() for name, tip in each.items()}
         return description.updated(tree=tree.updated(tips=tips))
@@ -293,8 +290,3 @@ class _Reader:
         for i in range(1, self.model.nbody):
             bodies |= {i} if int(parents[i]) in bodies else set()
         return bodies
-
-    def _wraps(self) -> NDArray[np.bool_]:
-        """Return a mask of the pieces of tendons' paths that are wraps."""
-        wraps = self.mujoco.mjtWrap.mjWRAP_SPHERE, self.mujoco.mjtWrap.mjWRAP_CYLINDER
-        return np.isin(self.model.wrap_type, [int(each) for each in wraps])

@@ -86,6 +86,8 @@ class Mobility:
         """Evaluate the rigid body of a tree, and its tendons."""
         q = paths.references
         inverse = np.linalg.inv(body.mass_matrix(q))
+        # What a path moves gives way to nothing.
+        inverse *= ~np.isin([*tree.joints], [*tree.on_paths])
         arms = paths.arms(q) if tree.tendons else np.zeros((0, len(q)))
         along = np.einsum("ti,ij,tj->t", arms, inverse, arms)
         self.joints = dict(zip(tree.joints, np.diag(inverse).tolist(), strict=True))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+import pinocchio as pin
 from numpy.polynomial import Polynomial
 
 from finger_pin.description.finger import FingerDescription
@@ -15,6 +16,7 @@ from finger_pin.description.tree_parts import Coupling, Keyframe
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_compliance import Mobility, soft
 from finger_pin.mechanism.xml_numbers import numbers
+from finger_pin.typing import Array
 
 # The highest power of a coupling in MJCF.
 _POWERS = 4
@@ -121,8 +123,15 @@ def _law(entry: str, actuator: TreeActuator) -> tuple[str, dict[str, str]]:
     return "general", affine | _limits("act", actuator.state_range)
 
 
-def add_keyframes(root: ET.Element, description: FingerDescription, posture: Sequence[float] | None) -> None:
+def add_keyframes(
+    root: ET.Element,
+    description: FingerDescription,
+    posture: Sequence[float] | None,
+    place: Callable[[str, Array], pin.SE3],
+) -> None:
     """Add the keyframes, or one called start with a posture, shape (n,), rad, on top of the first.
+
+    The place of a body at a posture, shape (n,), is that of mocap bodies.
 
     Raises:
         InputError: If the posture has the wrong size.
@@ -145,10 +154,16 @@ def add_keyframes(root: ET.Element, description: FingerDescription, posture: Seq
                 free = objects[body.get("name", "")]
                 qpos += [*free.position, *np.roll(free.quaternion, 1).tolist()]
                 qvel += [*free.velocity, *free.angular_velocity]
+        q = np.array([keyframe.position.get(name, joint.reference) for name, joint in tree.joints.items()])
+        led = [place(body.get("name", ""), q) for body in bodies if body.get("mocap")]
         driven = root.findall("actuator/*")
         ctrl = list[float]()
         for element in driven:
             # The second control of pid is a speed.
             ctrl += [keyframe.inputs.get(element.get("name", ""), 0.0), *[0.0] * (element.tag == "pid")]
         states = {"qpos": numbers(*qpos), "qvel": numbers(*qvel)} | ({"ctrl": numbers(*ctrl)} if driven else {})
+        if led:
+            states["mpos"] = numbers(*np.concatenate([each.translation for each in led]))
+            turns = [np.roll(pin.Quaternion(each.rotation).coeffs(), 1) for each in led]
+            states["mquat"] = numbers(*np.concatenate(turns))
         ET.SubElement(table, "key", {"name": name, **states})

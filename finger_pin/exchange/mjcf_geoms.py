@@ -81,7 +81,7 @@ def add_objects(world: ET.Element, tree: Tree) -> dict[str, str]:
         place = {"pos": numbers(*each.position), "quat": quaternion(each.orientation)}
         body = ET.SubElement(world, "body", {"name": name, **place})
         ET.SubElement(body, "freejoint")
-        inertia = {"pos": "0 0 0", "mass": numbers(each.mass), "diaginertia": numbers(*each.inertia)}
+        inertia = {"pos": numbers(*each.centre), "mass": numbers(each.mass), "fullinertia": numbers(*each.moments)}
         ET.SubElement(body, "inertial", inertia)
         geoms[name] = f"{name}_geom"
         add_geom(body, geoms[name], each.shape, each.sizes, (0.0,) * 3, (0.0, 0.0, 0.0, 1.0), touches)

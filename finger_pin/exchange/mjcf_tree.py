@@ -12,6 +12,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 import numpy as np
+import pinocchio as pin
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.tree_parts import Body, TreeTendon
@@ -24,6 +25,7 @@ from finger_pin.exchange.mjcf_geoms import HIDDEN, IDLE, add_body_geoms, add_geo
 from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.mechanism.tree_mechanism import build_body
 from finger_pin.mechanism.xml_numbers import numbers
+from finger_pin.typing import Array
 
 # Steps of MuJoCo's are at most so long, s, and this part of the time 1 / omega of its stiffest spring.
 _LONGEST, _PART = 1e-3, 0.2
@@ -65,7 +67,7 @@ def tree_to_mjcf(
     option = {"timestep": numbers(step), "gravity": numbers(*description.gravity), "integrator": integrator}
     ET.SubElement(root, "option", option | {"cone": "elliptic", "impratio": "10"})
     writer.write(root, step)
-    add_keyframes(root, description, posture)
+    add_keyframes(root, description, posture, writer.place)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -73,6 +75,9 @@ def tree_to_mjcf(
 def _notes(description: FingerDescription) -> str:
     rest = [f"{line};" for line in description.tree.left_out]
     rest += ["servos, their spools and what stretches on the way;"] if description.actuators else []
+    rest += (
+        ["paths of joints, whose bodies are mocap bodies: lead them by mocap_pos;"] if description.tree.on_paths else []
+    )
     lines = "".join(f"\n  - {line}" for line in rest)
     return _NOTES.format(title=description.title or description.name, rest=lines).replace("--", "- -")
 
@@ -82,8 +87,8 @@ class _Writer:
 
     def __init__(self, description: FingerDescription, limits: bool, shapes: bool) -> None:
         self.description, self.tree, self.limits, self.shapes = description, description.tree, limits, shapes
-        body, self.paths = build_body(description)
-        self.mobility = Mobility(self.tree, body, self.paths)
+        self.rigid_body, self.paths = build_body(description)
+        self.mobility = Mobility(self.tree, self.rigid_body, self.paths)
         self.elements: dict[str | None, ET.Element] = {}
         self.names = {name for each in self.tree.bodies.values() for name in (*each.solids, *each.shapes)}
         self.placed: dict[tuple[str, Waypoint], dict[str, str]] = {}
@@ -131,6 +136,12 @@ class _Writer:
         add_equalities(root, self.description, self.elements, self.mobility)
         add_actuators(root, self.description, step)
 
+    def place(self, name: str, q: Array) -> pin.SE3:
+        """Return the place of a body at a posture, shape (n,)."""
+        data, placed = self.rigid_body.model.createData(), self.paths.placed[name]
+        pin.forwardKinematics(self.rigid_body.model, data, q)
+        return data.oMi[placed.joint] * placed.frame
+
     def _add_body(self, name: str, body: Body) -> None:
         parent = self.elements[body.parent]
         still = body.parent is None and not any(joint.body == name for joint in self.tree.joints.values())
@@ -140,24 +151,35 @@ class _Writer:
                 add_body_geoms(parent, body)
             return
         place = {"pos": numbers(*body.position), "quat": quaternion(body.orientation)}
-        lifted = {"gravcomp": numbers(body.gravity_compensation)} if body.gravity_compensation else {}
+        led = self._led(name, body)
+        lifted = {"mocap": "true"} if led else {}
+        lifted |= {"gravcomp": numbers(body.gravity_compensation)} if body.gravity_compensation else {}
         element = self.elements[name] = ET.SubElement(parent, "body", {"name": name, **place, **lifted})
         if body.mass or any(body.inertia):
             inertia = {"pos": numbers(*body.centre), "mass": numbers(body.mass), "fullinertia": numbers(*body.inertia)}
             ET.SubElement(element, "inertial", inertia)
-        elif not still:
+        elif not still and not led:
             least = {"pos": "0 0 0", "mass": numbers(_NO_INERTIA), "diaginertia": numbers(*[_NO_INERTIA] * 3)}
             ET.SubElement(element, "inertial", least)
         friction, size = self.description.joint_friction, len(self.tree.joints)
         loss = np.maximum(expand(friction.floor, size), expand(friction.drag, size))
         for k, (joint, moved) in enumerate(self.tree.joints.items()):
-            if moved.body == name:
+            if moved.body == name and not led:
                 about = {"name": joint, "type": moved.kind, "axis": numbers(*moved.axis), "pos": numbers(*moved.anchor)}
                 about |= {"ref": numbers(moved.reference), "armature": numbers(moved.armature)}
                 about["frictionloss"] = numbers(loss[k] if moved.bearing and loss[k] >= _LEAST_LOSS else 0.0)
                 ET.SubElement(element, "joint", about | self._joint(k, joint))
         if self.shapes:
             add_body_geoms(element, body)
+
+    def _led(self, name: str, body: Body) -> bool:
+        """Return whether a body is written as a mocap body, whose path the user gives by ``mocap_pos``."""
+        joints = [key for key, joint in self.tree.joints.items() if joint.body == name]
+        led = [key for key in joints if key in self.tree.on_paths]
+        if led and (body.parent is not None or led != joints):
+            allowed = "is not written: a mocap body of MuJoCo stands in the world, and all of its joints have paths"
+            raise InputError(f"finger.tree.joints.{led[0]}.path", allowed)
+        return bool(led)
 
     def _joint(self, k: int, name: str) -> dict[str, str]:
         """Return spring, damper and range of a joint."""

@@ -1,17 +1,17 @@
-"""Free bodies of a MuJoCo model: those that tendons pass as joints of the tree, others for objects."""
+"""Free bodies of a MuJoCo model: those that tendons pass as joints of the tree, others for objects; mocap bodies."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_equalities import linked_bodies
-from finger_pin.exchange.mujoco_names import Table
+from finger_pin.exchange.mujoco_names import Table, free_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
 
@@ -26,9 +26,10 @@ class FreeBodies:
     """Bodies with free joints.
 
     Attributes:
-        kept: Free joints of the bodies that tendons pass, that carry other joints, or that touch with several shapes,
-            where an object has one: they become slides and hinges.
+        kept: Free joints of the bodies that tendons pass, that carry other joints, or that touch with several shapes or
+            have parts, where an object has one shape: they become slides and hinges.
         loose: The other bodies with free joints.
+        labels: Names of the slides and hinges of bodies.
     """
 
     def __init__(self, read: ElementReader, passed: set[int]) -> None:
@@ -44,6 +45,8 @@ class FreeBodies:
         for i in self.kept:
             about = "its middle hinge of three must not come to a right angle"
             read.rest.add(f"free body {self.names.bodies[int(model.jnt_bodyid[i])]}: {about}", moves=False)
+        used = {*self.names.joints}
+        self.labels = {body: _labels(self.names.bodies[body], used) for body in map(int, model.jnt_bodyid[self.kept])}
         self.loose = [int(model.jnt_bodyid[i]) for i in joints if i not in self.kept]
         # Upwards is the axis of the first hinge: what hangs turns about it as often as it likes.
         gravity = model.opt.gravity
@@ -60,7 +63,8 @@ class FreeBodies:
         return bodies
 
     def _touches_with_several(self, carried: set[int]) -> bool:
-        return int(np.count_nonzero(np.isin(self.model.geom_bodyid[self._colliding], [*carried]))) > 1
+        touching = int(np.count_nonzero(np.isin(self.model.geom_bodyid[self._colliding], [*carried])))
+        return touching > (len(carried) == 1)
 
     def _of(self, joint: int) -> tuple[int, str, Array]:
         """Return the body of a joint, its name, and its rotation at the model's reference."""
@@ -72,37 +76,22 @@ class FreeBodies:
         model = self.model
         body, name, turned = self._of(joint)
         first = int(model.jnt_dofadr[joint])
-        centre = model.body_ipos[body].tolist()
-        for k, (coordinate, axis) in enumerate(zip(_names(name), (*np.eye(3), *self._axes.T[::-1]), strict=True)):
-            reach = _REACH if k < len(_SLIDES) else math.pi
-            damping, armature = float(model.dof_damping[first + k]), float(model.dof_armature[first + k])
-            spring = {"spring": {"stiffness": 0.0, "damping": damping}} if damping else {}
-            yield (
-                coordinate,
-                {"range": [-reach, reach], "limited": False, **spring},
-                {
-                    "body": name,
-                    "kind": "slide" if k < len(_SLIDES) else "hinge",
-                    "axis": (turned.T @ axis).tolist(),
-                    "anchor": centre,
-                    "armature": armature,
-                    "bearing": False,
-                },
-            )
+        numbers = [
+            (float(model.dof_damping[k]), {"armature": float(model.dof_armature[k])}) for k in range(first, first + 6)
+        ]
+        axes = turned.T @ np.column_stack([np.eye(3), self._axes[:, ::-1]])
+        yield from _slides_and_hinges(name, self.labels[body], axes, model.body_ipos[body].tolist(), numbers)
 
     def position(self, joint: int, qpos: Array) -> dict[str, float]:
         """Return the positions of a body's slides and hinges in a state of the model."""
         model = self.model
-        body, name, turned = self._of(joint)
+        body, _, turned = self._of(joint)
         at = int(model.jnt_qposadr[joint])
         now = _rotation(qpos[at + 3 : at + 7])
         centre = model.body_ipos[body]
         moved = qpos[at : at + 3] + now @ centre - model.body_pos[body] - turned @ centre
-        with warnings.catch_warnings():
-            # Where the first and the third hinge have one axis, any share of the turn will do.
-            warnings.filterwarnings("ignore", "Gimbal lock")
-            angles = Rotation.from_matrix(self._axes.T @ now @ turned.T @ self._axes).as_euler("ZYX")
-        return dict(zip(_names(name), [*moved.tolist(), *angles.tolist()], strict=True))
+        angles = _euler(self._axes.T @ now @ turned.T @ self._axes)
+        return dict(zip(self.labels[body], [*moved.tolist(), *angles.tolist()], strict=True))
 
     def velocity(self, joint: int, qpos: Array, qvel: Array) -> dict[str, float]:
         """Return the speeds of a body's slides and hinges in a state of the model.
@@ -122,7 +111,7 @@ class FreeBodies:
             allowed = "turns where the second of its three hinges is at a right angle, which has no speed for it"
             raise InputError(f"model: free body {name}", f"{allowed}; give another start")
         rates = np.zeros(3) if not turning.any() else np.linalg.solve(axes, self._axes.T @ now @ turning)
-        return dict(zip(_names(name), [*moved.tolist(), *rates.tolist()], strict=True))
+        return dict(zip(self.labels[body], [*moved.tolist(), *rates.tolist()], strict=True))
 
 
 def _rotation(real_first: Array) -> Array:
@@ -130,6 +119,86 @@ def _rotation(real_first: Array) -> Array:
     return np.asarray(Rotation.from_quat(np.roll(real_first, -1)).as_matrix())
 
 
-def _names(body: str) -> list[str]:
-    """Return the names of a body's slides and hinges."""
-    return [f"{body}_{what}" for what in (*_SLIDES, *_TURNS)]
+def _labels(body: str, used: set[str]) -> list[str]:
+    """Return unused names of a body's slides and hinges, which are used from now on."""
+    labels = [free_name(f"{body}_{what}", used, "of_body") for what in (*_SLIDES, *_TURNS)]
+    used.update(labels)
+    return labels
+
+
+def _slides_and_hinges(
+    body: str, labels: list[str], axes: Array, anchor: list[float], numbers: Sequence[tuple[float, Table]]
+) -> Iterator[tuple[str, Table, Table]]:
+    """Yield names, joints and their motion; axes have shape (3, 6), in the body's frame, numbers damping and more."""
+    for k, (label, axis, (damping, more)) in enumerate(zip(labels, axes.T, numbers, strict=True)):
+        slides = k < len(_SLIDES)
+        reach = _REACH if slides else math.pi
+        spring = {"spring": {"stiffness": 0.0, "damping": damping}} if damping else {}
+        yield (
+            label,
+            {"range": [-reach, reach], "limited": False, **spring},
+            {
+                "body": body,
+                "kind": "slide" if slides else "hinge",
+                "axis": axis.tolist(),
+                "anchor": anchor,
+                "bearing": False,
+                **more,
+            },
+        )
+
+
+class LedBodies:
+    """Mocap bodies: those that the model needs move along paths, by slides along and hinges about the base's axes.
+
+    Attributes:
+        bodies: The bodies that move along paths, at rest unless a scenario says otherwise.
+        still: Mocap bodies that stand still: what carries joints or planes, and what nothing touches or holds.
+        labels: Names of their slides and hinges.
+    """
+
+    def __init__(self, read: ElementReader, bodies: Collection[int], used: Collection[str]) -> None:
+        """Find the mocap bodies among the bodies of a tree, which has joints of some names."""
+        model, self._read, names, self.still = read.model, read, {*used}, list[int]()
+        planes = [i for i in read.colliding if model.geom_type[i] == read.mujoco.mjtGeom.mjGEOM_PLANE]
+        self.labels: dict[int, list[str]] = {}
+        for body in (int(each) for each in np.flatnonzero(model.body_mocapid >= 0)):
+            carried = model.body_rootid == body
+            reasons = {
+                "it carries joints": bool(np.any(model.body_jntnum[carried])),
+                "it has a plane": bool(np.any(carried[model.geom_bodyid[planes]])),
+                "nothing touches it or is held by it": body not in bodies,
+            }
+            if any(reasons.values()):
+                reason = next(text for text, there in reasons.items() if there)
+                read.rest.add(f"body {read.names.bodies[body]}: mocap, stands still, as {reason}", moves=False)
+                self.still.append(body)
+            else:
+                self.labels[body] = _labels(read.names.bodies[body], names)
+
+    def __contains__(self, body: int) -> bool:
+        """Return whether a body is led or carried by one that is."""
+        return int(self._read.model.body_rootid[body]) in self.labels
+
+    def joints(self, body: int) -> Iterator[tuple[str, Table, Table]]:
+        """Yield names, joints and their motion."""
+        axes = _rotation(self._read.model.body_quat[body]).T @ np.column_stack([np.eye(3), np.eye(3)[:, ::-1]])
+        label = self._read.names.bodies[body]
+        yield from _slides_and_hinges(label, self.labels[body], axes, [0.0] * 3, [(0.0, {"path": {}})] * 6)
+
+    def position(self, keyframe: int) -> dict[str, float]:
+        """Return the positions of slides and hinges at a keyframe."""
+        model, data, positions = self._read.model, self._read.start_data(keyframe), dict[str, float]()
+        for body, labels in self.labels.items():
+            turned = data.xmat[body].reshape(3, 3) @ _rotation(model.body_quat[body]).T
+            angles = _euler(turned)
+            moved = data.xpos[body] - model.body_pos[body]
+            positions |= dict(zip(labels, [*moved.tolist(), *angles.tolist()], strict=True))
+        return positions
+
+
+def _euler(turned: Array) -> Array:
+    """Return yaw, pitch and roll of a rotation; where yaw and roll have one axis, any share of the turn will do."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Gimbal lock")
+        return np.asarray(Rotation.from_matrix(turned).as_euler("ZYX"))

@@ -41,7 +41,7 @@ _EQUALITY: dict[Kind, str] = {"carried": "active solref solimp"}
 
 #: By element, below its parent where another has the same name, attributes by kind; children without entry are as it.
 #: Where one number of a carried or listed attribute alone is left out, the list says so: polynomials of stiffness and
-#: damping, forces on what several drive, moments of inertia of free bodies.
+#: damping, forces on what several drive.
 SCHEMA: dict[str, dict[Kind, str]] = {
     "mujoco": {"idle": "model"},
     # MuJoCo's compiler has resolved them.
@@ -68,7 +68,7 @@ SCHEMA: dict[str, dict[Kind, str]] = {
     "asset": {"idle": ALL},
     "deformable/skin": {"idle": ALL},
     "deformable": {"listed": ALL},
-    "body": {"carried": f"{_POSE} gravcomp fuse simple", "listed": "mocap", "idle": "sleep"},
+    "body": {"carried": f"{_POSE} gravcomp fuse mocap simple", "idle": "sleep"},
     "inertial": {"carried": f"{_POSE} mass diaginertia fullinertia"},
     "joint": {
         "carried": f"{_SOFT} {_LIMITED} armature axis damping frictionloss pos ref springdamper "

@@ -14,8 +14,8 @@ from finger_pin.mechanism.tendon_paths import rotation
 
 # How deep bodies may be in each other at the start, as contacts have it, m.
 _DEEPEST = 1e-3
-# Part of the largest moment of inertia by which a free body may differ from an even solid.
-_UNEVEN = 0.02
+# Part of the largest moment of inertia, and distance, m, by which a free body may differ from an even solid.
+_UNEVEN = 1e-9
 
 
 class Shapes:
@@ -115,12 +115,11 @@ class Shapes:
                 self.rest.add(f"free body {name}: an object is one sphere, capsule, cylinder or box")
             elif not self._dropped(geoms[0]):
                 (i,) = geoms
-                if np.linalg.norm(model.geom_pos[i] - model.body_ipos[body]) > 1e-3 * model.geom_rbound[i]:
-                    self.rest.add(f"free body {name}: its mass centre is not its shape's")
                 self._placed_at[i] = free_name(name, used | {*objects}, "object")
                 moving = {"mass": float(model.body_mass[body]), **self._velocity(data, i)}
                 objects[self._placed_at[i]] = self._shape(i) | self._placed(data, i) | moving
-                self._list_free(body, i, objects[self._placed_at[i]])
+                objects[self._placed_at[i]] |= self._inertia(body, i, objects[self._placed_at[i]])
+                self._list_free(body)
         return objects
 
     def object_states(self, keyframe: int) -> Table:
@@ -153,15 +152,21 @@ class Shapes:
         turned = data.geom_xmat[i].reshape(3, 3).T @ velocity[:3]
         return {"velocity": velocity[3:].tolist(), "angular_velocity": turned.tolist()} if velocity.any() else {}
 
-    def _list_free(self, body: int, i: int, described: Table) -> None:
+    def _inertia(self, body: int, i: int, described: Table) -> Table:
+        """Return mass centre and moments of inertia of a free body in a geom's frame, if no even solid has them."""
+        model, turned = self.model, rotation(quaternion(self.model.geom_quat[i])).T
+        centre = turned @ (model.body_ipos[body] - model.geom_pos[i])
+        axes = turned @ rotation(quaternion(model.body_iquat[body]))
+        moments = axes @ np.diag(model.body_inertia[body]) @ axes.T
+        even = Object.model_validate(described).even_moments
+        if np.abs(moments - np.diag(even)).max() < _UNEVEN * max(even) and np.allclose(centre, 0.0, 0.0, _UNEVEN):
+            return {}
+        products = moments[np.triu_indices(3, 1)].tolist()
+        return {"centre": centre.tolist(), "inertia": [*np.diag(moments).tolist(), *products]}
+
+    def _list_free(self, body: int) -> None:
         """List properties of a free body that objects lack."""
         model, name, first = self.model, self.names.bodies[body], int(self.model.body_dofadr[body])
-        turned = rotation(quaternion(model.geom_quat[i])).T @ rotation(quaternion(model.body_iquat[body]))
-        moments = turned @ np.diag(model.body_inertia[body]) @ turned.T
-        even = np.diag(Object.model_validate(described).inertia)
-        if np.abs(moments - even).max() > _UNEVEN * even.max():
-            numbers = " for ".join(" ".join(f"{each:.2g}" for each in np.diag(one)) for one in (even, moments))
-            self.rest.add(f"free body {name}: its moments of inertia, {numbers} kg m2")
         dofs, joint = slice(first, first + 6), int(model.body_jntadr[body])
         for what, values in (
             ("gravity compensation", model.body_gravcomp[body]),

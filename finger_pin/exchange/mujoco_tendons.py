@@ -11,6 +11,15 @@ from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
 
 
+def passed_bodies(read: ElementReader, sides: bool = False) -> set[int]:
+    """Return the bodies that tendons pass or whose geoms they wrap, and those that have side sites if asked for."""
+    model, types = read.model, read.mujoco.mjtWrap
+    wraps = np.isin(model.wrap_type, [int(each) for each in (types.mjWRAP_SPHERE, types.mjWRAP_CYLINDER)])
+    sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE].tolist()
+    sites += [int(site) for site in model.wrap_prm[wraps] if sides and site >= 0]
+    return {int(body) for body in (*model.site_bodyid[sites], *model.geom_bodyid[model.wrap_objid[wraps]])}
+
+
 def within_margin(ends: Array, margin: float) -> list[float]:
     """Return a range less its margin at both ends: no less than its middle, where both ends push."""
     low, high = (float(each) for each in ends)

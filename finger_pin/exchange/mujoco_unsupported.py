@@ -77,8 +77,6 @@ class Rest:
         ):
             if count:
                 self.add(f"{what}: {count}")
-        for i in np.flatnonzero(model.body_mocapid >= 0):
-            self.add(f"{self._name('body', i)}: mocap, which others lead, stands still", moves=False)
 
     def listed(self) -> list[str]:
         """Return the elements left out, a line each."""

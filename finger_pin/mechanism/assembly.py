@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
@@ -131,6 +132,7 @@ def assemble(
         # Also where a tendon's input goes nowhere: the second one of a spool has none.
         routing.actuated,
         moved=description.hand is not None and description.hand.palm.path is not None,
+        prescribed=_numbers_on_paths(description, width),
     )
     scene = Scene.from_mechanism(alone, args.objects, description, paths.placed)
     mechanism = alone if scene is None else scene.extend(alone)
@@ -138,6 +140,13 @@ def assemble(
     check_layout(layout, mechanism)
     extra_rows = (*of_tree.values(), *canals.tables, *further)
     return Assembly(mechanism, scene, layout, matrices, canals.wraps, extra_rows)
+
+
+def _numbers_on_paths(description: FingerDescription, width: int) -> NDArray[np.int64]:
+    """Return numbers for the coordinates of joints with paths, -1 for the others, shape (N,)."""
+    on_paths, numbers = description.tree.on_paths, np.full(width, -1)
+    numbers[[k for k, name in enumerate(description.joints) if name in on_paths]] = np.arange(len(on_paths))
+    return numbers
 
 
 def _state_layout(

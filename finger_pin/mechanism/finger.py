@@ -134,10 +134,12 @@ class Finger:
         """Return the same finger whose joints are moved along a motion, whatever effort that takes.
 
         Raises:
-            InputError: If its palm or objects around it are moved along paths as well.
+            InputError: If its palm, some of its joints or objects around it are moved along paths as well.
         """
         if self.mechanism.moved or np.any(self.mechanism.prescribed >= 0):
-            entry = "hand.palm.path" if self.mechanism.moved else "environment.objects"
+            joints_led = next(iter(self.description.tree.on_paths), None)
+            entry = f"finger.tree.joints.{joints_led}.path" if joints_led else "environment.objects"
+            entry = "hand.palm.path" if self.mechanism.moved else entry
             raise InputError(entry, "a path cannot stand beside a motion of the joints that is given: leave it out")
         finger = copy.copy(self)
         whole, joints = self.mechanism, len(self.routing.joints)

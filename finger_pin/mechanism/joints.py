@@ -126,7 +126,7 @@ class JointFriction:
             law=self.law,
             names=names,
             parameters=np.array([getattr(self, name) for name in self.law.parameters]),
-            arm=np.eye(size, width),
+            arm=np.eye(size, width) * self.bearing[:, None],
             loads=loads,
             pins=np.where(self.bearing, np.arange(size), -1),
             stored=Energy("joint_bristles", "joint bristles"),

@@ -160,12 +160,14 @@ class Scene:
         places = np.append(np.arange(joints), bodies + np.arange(lumps))
         width = bodies + lumps
         rows = [table.embed_coordinates(places, width) for table in mechanism.listed]
+        before = int(mechanism.prescribed.max(initial=-1)) + 1
         lumps_of = mechanism.lumps, mechanism.inertia
         prescribed = np.full(bodies + lumps, -1)
+        prescribed[places] = mechanism.prescribed
         prescribed[bodies - len(self.world) : bodies] = np.arange(len(self.world))
         on_paths = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
         for number, first in enumerate(on_paths):
-            prescribed[first : first + VELOCITY] = VELOCITY * number + np.arange(VELOCITY)
+            prescribed[first : first + VELOCITY] = before + VELOCITY * number + np.arange(VELOCITY)
         return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, prescribed)
 
     @property
@@ -207,13 +209,15 @@ class Scene:
             moved = base[..., None, :]
             speeds = speeds + moved[..., 3:6] + np.cross(moved[..., :3], places)
             # The base turns in its own axes, objects in theirs: R^T omega by the conjugate of the quaternion.
-            axis, scalar = -poses[..., 3:6], poses[..., 6:]
-            omega = np.broadcast_to(moved[..., :3], axis.shape)
-            across = 2.0 * np.cross(axis, omega)
-            turns = turns + omega + scalar * across + np.cross(axis, across)
+            turns = turns + _turned(moved[..., :3], -poses[..., 3:6], poses[..., 6:])
             gravity = moved[..., 12:15]
-        inertia = np.array([each.inertia for each in self.free.values()]).reshape(-1, 3)
-        kinetic = 0.5 * (np.sum(speeds**2, axis=-1) @ self.mass + np.sum(inertia * turns**2, (-2, -1)))
+        centres = np.array([each.centre for each in self.free.values()]).reshape(-1, 3)
+        moments = np.array([each.moments for each in self.free.values()]).reshape(-1, 6)
+        if np.any(centres):
+            speeds = speeds + _turned(np.cross(turns, centres), poses[..., 3:6], poses[..., 6:])
+            places = places + _turned(centres, poses[..., 3:6], poses[..., 6:])
+        kinetic = 0.5 * (np.sum(speeds**2, axis=-1) @ self.mass + np.sum(moments[:, :3] * turns**2, (-2, -1)))
+        kinetic += np.sum(moments[:, 3:] * turns[..., [0, 0, 1]] * turns[..., [1, 2, 2]], (-2, -1))
         return kinetic, -np.sum(places * gravity, axis=-1) @ self.mass
 
     def touching(self, state: State, force: Array) -> ContactPoints:
@@ -239,6 +243,13 @@ class Scene:
                 points.normal[m, c] = axes[:, 0]
                 points.point[m, c] = frame.act(out[4:7])
         return points
+
+
+def _turned(vector: Array, axis: Array, scalar: Array) -> Array:
+    """Return vectors turned by unit quaternions of a vector and a scalar part, shapes (..., 3), (..., 3), (..., 1)."""
+    vector = np.broadcast_to(vector, axis.shape)
+    across = 2.0 * np.cross(axis, vector)
+    return vector + scalar * across + np.cross(axis, across)
 
 
 def _placed(state: State) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.objects import Object
+from finger_pin.description.objects import Object, inertia_matrix
 from finger_pin.description.parameters import Link
 from finger_pin.description.placement import Palm
 from finger_pin.description.surface import Surface
@@ -131,7 +131,9 @@ def tree_solids(tree: Tree, placed: Mapping[str | None, Placed], body: RigidBody
         for key, shape in part.shapes.items():
             place = pin.SE3(rotation(shape.orientation), np.array(shape.position))
             solid = Solid(key, "tree", placed[name].joint, placed[name].frame * place, shape.shape, shape.sizes)
-            solids.append(replace(solid, surface=shape.surface).kept_near(body))
+            solid = replace(solid, surface=shape.surface).kept_near(body)
+            led = all(body.model.names[k] in tree.on_paths for k in body.model.supports[solid.joint] if k)
+            solids.append(replace(solid, prescribed=led))
     return solids
 
 
@@ -211,10 +213,10 @@ def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm 
 def _with_masses(extended: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
     """Return an extended body with the inertias of the body itself, and those of objects that move."""
     # Any inertia that is too little to count will do for what moves on a path.
-    slight, none = _inertia(_SLIGHT, np.full(3, _SLIGHT)), pin.Inertia.Zero()
+    slight, none = pin.Inertia(_SLIGHT, np.zeros(3), _SLIGHT * np.eye(3)), pin.Inertia.Zero()
     inertias = body.inertias
     for obj in moved:
-        inertias += [none, slight if obj.mass is None else _inertia(obj.mass, obj.inertia)]
+        inertias += [none, slight if obj.mass is None else _inertia(obj)]
     # Of the joints of the world the last one carries all.
     more = extended.model.njoints - 1 - len(inertias)
     inertias += [*[none] * (more - 1), slight][-more:] if more else []
@@ -238,5 +240,5 @@ def _extended(body: RigidBody, moved: Sequence[str], world: Sequence[float]) -> 
     return extended
 
 
-def _inertia(mass: float, moments: Iterable[float]) -> pin.Inertia:
-    return pin.Inertia(mass, np.zeros(3), np.diag([*moments]))
+def _inertia(free: Object) -> pin.Inertia:
+    return pin.Inertia(free.mass or 0.0, np.array(free.centre), inertia_matrix(free.moments))

@@ -40,6 +40,8 @@ ELASTIC = "elastic_cords"
 _HOLDS = 1e-4
 # How soon an actuator of limited rate follows its input, s.
 _LAG, _UNLIMITED = 1e-4, (-np.inf, np.inf)
+# Inertia of what moves along a path, which takes none, kg or kg m2.
+_ON_PATH = 1e-9
 # What rows of a tree store and exchange, by table.
 _STORED = {
     "tendon_spring": Energy("tendon_spring", "tendons' springs"),
@@ -97,7 +99,7 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
                 hinge = moved.kind == "hinge"
                 kind = pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned
                 joint = model.addJoint(joint, kind(np.array(moved.axis)), joint_placement(place, moved), joint_name)
-                model.armature[model.joints[joint].idx_v] = moved.armature
+                model.armature[model.joints[joint].idx_v] = moved.armature if moved.path is None else _ON_PATH
                 place = pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
         placed[name] = Placed(joint, place)
         xx, yy, zz, xy, xz, yz = body.inertia

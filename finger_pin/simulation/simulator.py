@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.input_queue import InputQueue, input_delays
 from finger_pin.control.named_inputs import Inputs, inputs_by_name
-from finger_pin.control.palm import PalmPath, PrescribedObjects, at_start, with_paths
+from finger_pin.control.palm import PalmPath, PrescribedPaths, at_start, with_paths
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import held_control
@@ -88,7 +88,7 @@ class Simulator:
         """Build the stepper of a finger; `_begin` gives it a state."""
         self.finger, mechanism = finger, finger.mechanism
         control = held_control(mechanism.channels, mechanism.coordinates)
-        self._guides = PrescribedObjects.from_finger(finger, 0.0, self._settings["rtol"])
+        self._guides = PrescribedPaths.from_finger(finger, 0.0, self._settings["rtol"])
         self._palm = PalmPath.from_hand(finger.description.hand, 0.0, finger, self._settings["rtol"])
         control = with_paths(control, self._palm, self._guides)
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))

@@ -27,7 +27,6 @@ def test_what_is_not_carried_over_is_listed():
     description = fp.from_mujoco(model)
     assert description.tree.left_out == (
         "contacts are disabled in the model: its geoms touch nothing",
-        "body hand: mocap, which others lead, stands still",
         "actuator actuator_1: it has dynamics of its own",
         "actuator actuator_2: it drives a body",
         "equality both: of tendons through space",

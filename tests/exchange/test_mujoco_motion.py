@@ -211,9 +211,9 @@ LED = """<mujoco><compiler angle="radian"/><option timestep="5e-4" cone="ellipti
 <key name="elsewhere" mpos="1 0 .01 .3 0 .1 0 0 .35"/></keyframe></mujoco>"""
 
 
-def test_mocap_bodies_stand_where_a_keyframe_has_them_and_lead_and_carry_what_is_there():
+def test_mocap_bodies_stay_where_a_keyframe_has_them_and_lead_and_carry_what_is_there():
     """A weld takes a palm to its leader's place and turn, a box and a plane catch balls."""
-    with pytest.warns(fp.exceptions.LeftOutWarning, match="keyframe elsewhere: places of mocap bodies"):
+    with pytest.warns(fp.exceptions.LeftOutWarning, match="keyframe elsewhere: place of mocap body table"):
         data, result = both(LED, 0.6)
     # Bodies that stand still do not touch each other.
     assert not tomllib.loads(result.attrs["scenario"])["finger"]["tree"].get("touching")
@@ -258,6 +258,40 @@ def test_a_free_body_of_several_geoms_flies_and_slides_as_in_mujoco(keyframe, se
     meant = Rotation.from_matrix(data.body("ell").xmat.reshape(3, 3))
     assert (Rotation.from_matrix(start.body("ell").xmat.reshape(3, 3)).inv() * meant).magnitude() > 0.3
     assert (meant.inv() * Rotation.from_matrix(start.body("ell").xmat.reshape(3, 3)) * turned).magnitude() < 2e-3
+
+
+HAMMER = """<mujoco><option timestep="2e-4" cone="elliptic"/><default><geom condim="1"/></default><worldbody>
+<geom type="plane" size="1 1 .1"/><body name="hammer" euler="20 10 30"><freejoint/>
+ <geom type="box" size=".03 .008 .008" pos=".02 .003 0" euler="0 0 15" mass=".03"/>
+ <geom type="box" size=".01 .03 .01" pos="-.02 0 .01" mass=".06" contype="0" conaffinity="0"/></body>
+<body pos="1 0 1"><joint name="j"/><geom size=".01" mass=".2" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j"/></actuator>
+<keyframe><key name="thrown" qpos="0 0 .5 .96 .2 .1 .15 0" qvel=".3 .1 0 6 9 -12 0"/>
+<key name="dropped" qpos="0 0 .06 .8 .1 0 .6 0" qvel=".1 0 -.3 0 1 2 0"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize("keyframe, seconds, near", [("thrown", 0.3, 2e-3), ("dropped", 0.06, 2e-3)])
+def test_a_free_body_whose_mass_lies_beside_what_touches_is_an_object_with_it(keyframe, seconds, near):
+    """It tumbles by more than half a turn about no principal axis, or is dropped on a corner; its energy is kept."""
+    data, result = both(HAMMER, seconds, keyframe)
+    assert not fp.from_mujoco(data.model).tree.left_out
+    geom = data.geom(1)
+    np.testing.assert_allclose(result.object_position.values[-1, 0], geom.xpos, atol=near)
+    turned = Rotation.from_quat(result.object_orientation.values[-1, 0])
+    assert (turned.inv() * Rotation.from_matrix(geom.xmat.reshape(3, 3))).magnitude() < 20.0 * near
+    assert abs(float(result.energy_residual[-1])) < 1e-6
+    # A free body without joints or tendons has no friction at all, and what has a bearing stands still.
+    assert float(result.energy_exchanged_joint_coulomb[-1]) == 0.0
+
+
+def test_what_is_written_of_an_object_keeps_its_mass_centre_and_inertia():
+    model = mujoco.MjModel.from_xml_string(HAMMER)
+    written = mujoco.MjModel.from_xml_string(fp.to_mjcf(fp.from_mujoco(model)))
+    at = [np.flatnonzero(each.body_dofnum == 6)[0] for each in (model, written)]
+    np.testing.assert_allclose(*(each.body_inertia[k] for each, k in zip((model, written), at, strict=True)), rtol=1e-6)
+    again, first = (fp.from_mujoco(each).tree.objects["hammer"] for each in (written, model))
+    np.testing.assert_allclose(again.centre, first.centre, atol=1e-9)
+    np.testing.assert_allclose(again.moments, first.moments, atol=1e-12)
 
 
 def test_a_free_body_that_turns_where_its_hinges_cannot_is_refused_by_name():
