@@ -272,9 +272,17 @@ class PerItem(dict[str, dict[str, Array]]):
     __hash__ = None
 
 
+def _are_names(value: object) -> bool:
+    return isinstance(value, tuple) and any(isinstance(item, str) for item in value)
+
+
 def per_item(table: Description, size: int) -> dict[str, Array]:
     """Return the numbers of a table by entry, read-only, shape (size,); NaN where a hand's finger has none."""
-    numbers = {entry: expand(value, size) for entry, value in table if isinstance(value, int | float | tuple)}
+    numbers = {
+        entry: expand(value, size)
+        for entry, value in table
+        if isinstance(value, int | float | tuple) and not _are_names(value)
+    }
     for array in numbers.values():
         array.flags.writeable = False
     return numbers
