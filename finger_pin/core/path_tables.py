@@ -17,12 +17,12 @@ from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 
 
 class PieceBodies(NamedTuple):
-    """Columns of the bodies of a piece: those of its two points, of its frame, and of its side point."""
+    """Columns of the bodies of a piece: those of its two points, of its frame, and of its third point."""
 
     first: int
     second: int
     frame: int
-    side: int
+    third: int
 
 
 class LookColumns(NamedTuple):
@@ -49,9 +49,10 @@ class Paths(NamedTuple):
 
     Attributes:
         bodies: Columns `PIECE`, -1 for the base, shape (E, 4).
-        points: Both points, and the side point, in the frames of their bodies, shape (E, 9), m.
+        points: Both points, and a third one, in the frames of their bodies, shape (E, 9), m.
         rotation: Of the piece's frame in its body's, shape (E, 3, 3).
         origin: Of the piece's frame in its body's, shape (E, 3), m.
+        thirds: One where a piece has a third point, shape (E,).
         value, slopes: Addresses of the shape of each, shape (E,).
         columns: Number of wrenches of each that rows use, shape (E,).
         parameters: Shape (E, most parameters).
@@ -79,6 +80,7 @@ class Paths(NamedTuple):
     points: Annotated[Matrix, along("piece", "x")]
     rotation: Annotated[Layers, along("piece", "x", "y")]
     origin: Annotated[Matrix, along("piece", "x")]
+    thirds: Annotated[Indices, along("piece")]
     value: Annotated[Indices, along("piece")]
     slopes: Annotated[Indices, along("piece")]
     columns: Annotated[Indices, along("piece")]
@@ -129,7 +131,7 @@ class PathWork(NamedTuple):
         looks: Moments of a step, and what was seen there of a gap, columns `LOOK`, shape (LOOKS, columns).
         frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
         origin: Its origin, shape (E, 3), m.
-        ends: Both points and the side point, base frame, shape (E, 9), m.
+        ends: Both points and the third one, base frame, shape (E, 9), m.
         wrench: Unit wrenches on the first and on the second body, shape (E, most wrenches, WRENCH).
         push: Force of a contact on the first body, shape (E, 3), N.
         length: Of every row, shape (K,).
@@ -178,7 +180,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
     first_row = {leg.piece: k for k, each in reversed(list(enumerate(paths))) for leg in each}
     legs = [leg for each in paths for leg in each]
     ends = [(*p.ends, Place(0, np.zeros(3)))[:3] for p in pieces]
-    carried = [(a.joint, b.joint, p.joint, side.joint) for p, (a, b, side) in zip(pieces, ends, strict=True)]
+    carried = [(a.joint, b.joint, p.joint, third.joint) for p, (a, b, third) in zip(pieces, ends, strict=True)]
     bodies = np.array([[last[joint] for joint in row] for row in carried], dtype=np.int64).reshape(-1, len(PIECE))
     entries = [_movers(row, parents) for row in bodies]
     parameters = np.zeros((len(pieces), max((len(p.shape.parameters) for p in pieces), default=0)))
@@ -199,6 +201,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         points=np.array(points).reshape(-1, 9),
         rotation=np.array([turns[p.joint].T @ p.frame.rotation for p in pieces]).reshape(-1, 3, 3),
         origin=np.array([turns[p.joint].T @ p.frame.translation for p in pieces]).reshape(-1, 3),
+        thirds=np.array([len(p.ends) == 3 for p in pieces], dtype=np.int64),
         value=np.array([shape_address(p.shape.value) for p in pieces], dtype=np.int64),
         slopes=np.array([shape_address(p.shape.slopes) for p in pieces], dtype=np.int64),
         columns=np.array([columns[p] for p in pieces], dtype=np.int64),
@@ -242,7 +245,7 @@ def _movers(bodies: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDAr
             moves[at, which] = 1
             at = int(parents[at])
     moved = np.flatnonzero(moves.any(axis=1))
-    return moved, np.ascontiguousarray(moves[moved, : PIECE.side])
+    return moved, np.ascontiguousarray(moves[moved, : PIECE.third])
 
 
 def build_path_work(paths: Paths, count: int, width: int) -> PathWork:

@@ -136,11 +136,17 @@ OF_FINGER = (
         'is for kind = "cylinder" or "sphere"',
     ),
     Rule("tree.bodies.*.solids.*", ("sides",), lambda _, solid: solid.kind == "box", 'is for kind = "box"'),
+    Rule(
+        "tree.bodies.*.solids.*",
+        ("semi_axes",),
+        lambda _, solid: solid.kind == "ellipsoid",
+        'is for kind = "ellipsoid"',
+    ),
     Rule("tree.bodies.*.solids.*", ("mesh",), lambda _, solid: solid.kind == "mesh", 'is for kind = "mesh"'),
     Rule(
         "tree.bodies.*.solids.*",
         ("radius",),
-        lambda _, solid: solid.kind not in ("box", "mesh"),
+        lambda _, solid: solid.kind not in ("box", "mesh", "ellipsoid"),
         'is for kind = "sphere", "capsule" or "cylinder"',
     ),
     Rule(

@@ -153,6 +153,9 @@ class Object(ObjectState, Shaped):
         if self.sides is not None:
             x, y, z = (side * side for side in self.sides)
             return mass * (y + z) / 12.0, mass * (z + x) / 12.0, mass * (x + y) / 12.0
+        if self.semi_axes is not None:
+            x, y, z = (mass * axis * axis / 5.0 for axis in self.semi_axes)
+            return y + z, z + x, x + y
         radius, length = self.radius or 0.0, self.length or 0.0
         if self.shape == "cylinder":
             across = mass * (3.0 * radius**2 + length**2) / 12.0

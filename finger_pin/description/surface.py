@@ -15,6 +15,7 @@ SIZES: dict[str, tuple[str, ...]] = {
     "box": ("sides",),
     "cylinder": ("radius", "length"),
     "capsule": ("radius", "length"),
+    "ellipsoid": ("semi_axes",),
 }
 MILLIMETRES = " m (is it in millimetres?)"
 
@@ -72,8 +73,8 @@ class Surface(Description):
 class Shaped(Description):
     """A convex solid, or a half-space, with a surface."""
 
-    shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
-        ..., unit="1", source="design", doc="One of half_space, sphere, box, cylinder, capsule."
+    shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*SIZES)] = (
+        quantity(..., unit="1", source="design", doc="One of half_space, sphere, box, cylinder, capsule, ellipsoid.")
     )
     radius: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
         None, unit="m", source="design", doc="Of a sphere, cylinder or capsule."
@@ -84,11 +85,14 @@ class Shaped(Description):
     sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
         None, unit="m", source="design", doc="Of a box, along x, y and z."
     )
+    semi_axes: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
+        None, unit="m", source="design", doc="Of an ellipsoid, along x, y and z."
+    )
     surface: Surface | None = Field(None, description="Its contact; by default that of the other surface.")
 
     @model_validator(mode="after")
     def _sized(self) -> Self:
-        for entry in ("radius", "length", "sides"):
+        for entry in ("radius", "length", "sides", "semi_axes"):
             size, needed = getattr(self, entry), entry in SIZES[self.shape]
             if size is None and needed:
                 raise problem(entry, f'is missing: shape = "{self.shape}" needs {", ".join(SIZES[self.shape])}')
@@ -100,16 +104,16 @@ class Shaped(Description):
     @property
     def sizes(self) -> tuple[float, ...]:
         """The numbers of `SIZES`, m."""
-        if self.sides is not None:
-            return self.sides
+        if self.sides or self.semi_axes:
+            return self.sides or self.semi_axes or ()
         return tuple(getattr(self, name) for name in SIZES[self.shape])
 
 
 class BodyShape(Shaped):
     """A shape with which a body of a tree touches."""
 
-    shape: Annotated[Literal["sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
-        ..., unit="1", source="design", doc="One of sphere, box, cylinder, capsule."
+    shape: Annotated[Literal["sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*SIZES)] = quantity(
+        ..., unit="1", source="design", doc="One of sphere, box, cylinder, capsule, ellipsoid."
     )
     position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."

@@ -202,7 +202,7 @@ class Tree(Description):
         mesh = getattr(solid, "mesh", None)
         if mesh is not None:
             return self.meshes[mesh].unpacked()[0]
-        half = np.array(solid.sides or (0.0, 0.0, 0.0)) / 2.0
+        half = np.array(solid.sides or (0.0, 0.0, 0.0)) / 2.0 + np.array(solid.semi_axes or (0.0, 0.0, 0.0))
         half[2] += (solid.length or 0.0) / 2.0
         return np.concatenate([np.diag(half), -np.diag(half)])
 

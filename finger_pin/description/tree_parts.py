@@ -35,17 +35,21 @@ class TreeSolid(Description):
     """A solid of a body, for pictures."""
 
     kind: Annotated[
-        Literal["sphere", "capsule", "cylinder", "box", "mesh"], choice("sphere", "capsule", "cylinder", "box", "mesh")
-    ] = quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder, box or mesh.")
+        Literal["sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh"],
+        choice("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh"),
+    ] = quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder, box, ellipsoid or mesh.")
     mesh: Name | None = Field(None, description="Of a mesh, which one of the tree's.")
     radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
-        0.0, unit="m", source="design", doc="Of all but a box and a mesh."
+        0.0, unit="m", source="design", doc="Of a sphere, a capsule and a cylinder."
     )
     length: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
         0.0, unit="m", source="design", doc="Of a cylinder, or of a capsule without its round ends, along z."
     )
     sides: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box, along x, y and z."
+    )
+    semi_axes: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of an ellipsoid, along x, y and z."
     )
     position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, or a mesh's origin, in the body's frame."

@@ -217,7 +217,9 @@ class _Reader:
             elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
                 name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
                 solids[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
-            elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
+            elif kind == kinds.mjGEOM_ELLIPSOID:
+                solids[self.names.geoms[i]] = {"kind": "ellipsoid", "semi_axes": size.tolist(), **place}
+            elif kind == kinds.mjGEOM_BOX:
                 solids[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
             elif kind == kinds.mjGEOM_MESH and model.body_weldid[body]:
                 # A forearm that stands still would be in the way.

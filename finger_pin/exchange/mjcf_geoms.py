@@ -38,7 +38,7 @@ def add_body_geoms(element: ET.Element, body: Body) -> None:
             drawn = {"name": key, "type": "mesh", "mesh": str(solid.mesh), "mass": "0"}
             ET.SubElement(element, "geom", drawn | place | IDLE)
         elif key not in body.shapes:
-            sizes = solid.sides if solid.kind == "box" else (solid.radius, solid.length)
+            sizes = {"box": solid.sides, "ellipsoid": solid.semi_axes}.get(solid.kind, (solid.radius, solid.length))
             add_geom(element, key, solid.kind, sizes, solid.position, solid.orientation, IDLE)
     for key, shape in body.shapes.items():
         touches = _TOUCHED | _friction(shape.surface) | ({} if key in body.solids else {"group": HIDDEN})
@@ -56,6 +56,8 @@ def add_geom(
 ) -> None:
     """Add a geom of a kind of this package, with its sizes, m, and its place in a body."""
     size = [0.5 * each for each in sizes] if kind == "box" else [*sizes[:1], *(0.5 * each for each in sizes[1:])]
+    if kind == "ellipsoid":
+        size = [*sizes]
     shape = {"type": kind, "size": numbers(*size)}
     if kind == "half_space":
         shape = {"type": "plane", "size": "1 1 0.1"}

@@ -19,7 +19,7 @@ _UNEVEN = 1e-9
 
 
 class Shapes:
-    """Colliding spheres, capsules, boxes and cylinders; other colliding geoms are listed by name."""
+    """Colliding spheres, capsules, boxes, cylinders and ellipsoids; other colliding geoms are listed by name."""
 
     def __init__(self, read: ElementReader) -> None:
         """Read the geoms of a model."""
@@ -32,6 +32,7 @@ class Shapes:
             int(kinds.mjGEOM_CAPSULE): "capsule",
             int(kinds.mjGEOM_CYLINDER): "cylinder",
             int(kinds.mjGEOM_BOX): "box",
+            int(kinds.mjGEOM_ELLIPSOID): "ellipsoid",
         }
         touching = "contact" not in disabled(mujoco, model)
         self._colliding = read.colliding
@@ -41,7 +42,7 @@ class Shapes:
                 moves = bool(self._moves[i])
                 self.rest.add(f"geom {self._name(i)}: {_with_article(kind)} touches nothing here", moves)
         pairs, self._placed_at = Pairs(*vars(read).values()), dict[int, str]()
-        # Ellipsoids, meshes and planes that move were listed.
+        # Meshes and planes that move were listed.
         carried = [i for i in self._colliding if self._solid(i) or self._is_plane(i)]
         self._met = pairs.met(carried) if touching else {}
         self._surfaces = pairs.surfaces(self._met)
@@ -91,6 +92,8 @@ class Shapes:
         sizes: Table = {} if shape == "half_space" else {"radius": float(size[0])}
         if shape == "box":
             sizes = {"sides": (2.0 * size).tolist()}
+        elif shape == "ellipsoid":
+            sizes = {"semi_axes": size.tolist()}
         elif shape in ("capsule", "cylinder"):
             sizes["length"] = 2.0 * float(size[1])
         alone = {"friction": float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0}
@@ -112,7 +115,7 @@ class Shapes:
         for body in loose:
             name, geoms = self.names.bodies[body], [i for i in self._colliding if model.geom_bodyid[i] == body]
             if len(geoms) != 1 or not self._solid(geoms[0]) or any(model.body_parentid == body):
-                self.rest.add(f"free body {name}: an object is one sphere, capsule, cylinder or box")
+                self.rest.add(f"free body {name}: an object is one sphere, capsule, cylinder, box or ellipsoid")
             elif not self._dropped(geoms[0]):
                 (i,) = geoms
                 self._placed_at[i] = free_name(name, used | {*objects}, "object")

@@ -1,14 +1,14 @@
 """Contacts of two bodies: the parts of one that meet the whole other one, either way round.
 
-A part is a convex piece of a body (a corner, an edge, a rim), and its contact is its distance from the other body: a
-distance of two convex bodies. So it depends smoothly on how both are placed and changes by no more than the material
-moves; its force does no work of its own, and its bristles stay with the material. Face on face, what meets are the
-corners of either body on the other and the edges of both; edge on edge, the pair of edges that is nearest; of a rolling
-cylinder, the lowest points of its rims.
+A part is a convex piece of a body (a corner, an edge, a rim, a whole ellipsoid), and its contact is its distance from
+the other body: a distance of two convex bodies. So it depends smoothly on how both are placed and changes by no more
+than the material moves; its force does no work of its own, and its bristles stay with the material. Face on face, what
+meets are the corners of either body on the other and the edges of both; edge on edge, the pair of edges that is
+nearest; of a rolling cylinder, the lowest points of its rims.
 
-Corners and edges of boxes and rims of cylinders are rounded by `fillet` where they meet boxes and cylinders; against
-all else they are sharp. So there is one way out of a contact even where two edges lie on each other. `gaps.distance`
-says how roundings grow with the depth.
+Corners and edges of boxes and rims of cylinders are rounded by `fillet` where they meet boxes, cylinders and
+ellipsoids; against all else they are sharp. So there is one way out of a contact even where two edges lie on each
+other. `gaps.distance` says how roundings grow with the depth.
 """
 
 from __future__ import annotations
@@ -31,19 +31,29 @@ _STUD = 2.0 / 3.0
 
 @dataclass(frozen=True, eq=False)
 class ContactPart:
-    """A part of a body: a segment or a point, widened by a disc across it, and rounded.
+    """A part of a body: a segment or a point, widened by a disc across it, and rounded; or an ellipsoid.
 
     Attributes:
-        ends: P_0 and P_1 in the body's frame, shape (2, 3), m.
+        ends: P_0 and P_1 in the body's frame, shape (2, 3), m; of an ellipsoid its centre and the ends of two of its
+            semi-axes, shape (3, 3).
         radius: Of its rounding, m.
         disc: Radius of the disc across P_1 - P_0, m; zero for none.
         along: 1 if it goes from P_0 to P_1, 0 if it is at P_0 alone.
+        third: Third semi-axis of an ellipsoid, m.
     """
 
     ends: Array
     radius: float
     disc: float = 0.0
     along: float = 1.0
+    third: float = 0.0
+
+    @property
+    def breadth(self) -> float:
+        """Half width across P_1 - P_0, m; of an ellipsoid its longest semi-axis."""
+        return (
+            max(self.disc, *np.linalg.norm(self.ends - self.ends[0], axis=1), self.third) if self.third else self.disc
+        )
 
 
 def fillet(solid: Solid) -> float:
@@ -57,12 +67,17 @@ def fillet(solid: Solid) -> float:
 def contacts_of(one: Solid, other: Solid) -> Iterator[tuple[Solid, ContactPart, Solid, tuple[float, ...]]]:
     """Yield all contacts of two solids: the body whose part touches, the part, the other body and its prism.
 
-    A sphere or a capsule, the first one if both are, touches with its axis.
+    An ellipsoid, the first one if both are, touches as a whole; of two the other one has no prism. A
+    sphere or a capsule, likewise, touches with its axis.
     """
     for a, w in ((one, other), (other, one)):
         if w.shape == "half_space":
             prism = prism_parameters(w.shape, ())
             yield from ((a, part, w, prism) for part in _on_plane(a))
+            return
+    for a, w in ((one, other), (other, one)):
+        if a.shape == "ellipsoid":
+            yield a, _ellipsoid(a), w, () if w.shape == a.shape else prism_parameters(w.shape, w.sizes, fillet(w))
             return
     for a, w in ((one, other), (other, one)):
         if a.shape in ("sphere", "capsule"):
@@ -83,6 +98,8 @@ def _on_plane(solid: Solid) -> list[ContactPart]:
         return _corners(solid, 0.0)
     if solid.shape == "cylinder":
         return _rims(solid, 0.0)
+    if solid.shape == "ellipsoid":
+        return [_ellipsoid(solid)]
     ends = _axis(solid)[1 if solid.shape == "sphere" or solid.joined else 0 :]
     return [ContactPart(np.stack([end, end]), solid.sizes[0]) for end in ends]
 
@@ -126,6 +143,11 @@ def _rims(solid: Solid, rounding: float) -> list[ContactPart]:
             stud = np.array([_STUD * radius * np.cos(turn), _STUD * radius * np.sin(turn), side])
             parts.append(ContactPart(np.stack([stud, stud]), rounding))
     return parts
+
+
+def _ellipsoid(solid: Solid) -> ContactPart:
+    x, y, z = solid.sizes
+    return ContactPart(np.array([[0.0, 0.0, 0.0], [x, 0.0, 0.0], [0.0, y, 0.0]]), 0.0, 0.0, 0.0, z)
 
 
 def _whole(solid: Solid, rounding: float) -> ContactPart:

@@ -11,7 +11,7 @@ from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact_law import CONTACT, TORSIONAL_CONTACT
 from finger_pin.mechanism.contact_features import ContactPart, contacts_of
-from finger_pin.mechanism.gaps import PRISM
+from finger_pin.mechanism.gaps import ELLIPSOIDS, PRISM
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
@@ -65,17 +65,20 @@ def contact_rows(
 
 def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> PathElement:
     """Return the gap between a part of one solid and the whole of another."""
-    first, second = (a.place.act(end) for end in part.ends)
-    half = 0.5 * float(np.linalg.norm(second - first))
+    # Of a sphere, too, the way out of an ellipsoid is known however deep.
+    curved = bool(part.third) and w.shape in ("sphere", "ellipsoid")
+    half = 0.5 * float(np.linalg.norm(part.ends[1] - part.ends[0]))
     return PathElement(
-        PRISM,
-        np.array([part.radius, part.disc, part.along, *prism]),
-        (Place(a.joint, first), Place(a.joint, second)),
+        ELLIPSOIDS if curved else PRISM,
+        np.array(
+            [part.third, *(3 * w.sizes)[:3]] if curved else [part.radius, part.disc, part.along, part.third, *prism]
+        ),
+        tuple(Place(a.joint, a.place.act(end)) for end in part.ends),
         w.joint,
         w.place,
-        half + part.disc + part.radius + w.reach,
-        part.disc,
-        w.reach - prism[-1],
+        half + part.breadth + part.radius + w.reach,
+        part.breadth,
+        w.reach - (0.0 if w.shape == "ellipsoid" else prism[-1]),
     )
 
 

@@ -15,7 +15,6 @@ from finger_pin.description.parameters import Link
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.contact_rows import check_start, contact_rows
 from finger_pin.mechanism.evaluation import ContactPoints
-from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.rows import Rows
@@ -237,7 +236,7 @@ class Scene:
                 piece = pieces[c]
                 frame = data.oMi[piece.joint] * piece.frame
                 y = np.concatenate([frame.actInv(data.oMi[end.joint].act(end.point)) for end in piece.ends])
-                PRISM.value(y, piece.parameters, out)
+                piece.shape.value(y, piece.parameters, out)
                 axes = frame.rotation @ out[[1, 2, 3, 7, 8, 9, 10, 11, 12]].reshape(3, 3).T
                 points.force[m, c] = -axes @ along[m, c]
                 points.normal[m, c] = axes[:, 0]

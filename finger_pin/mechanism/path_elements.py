@@ -25,7 +25,7 @@ class PathShape(Protocol):
 
     Attributes:
         parameters: Names of its numbers.
-        value: (y, p, out) fills what the points y give, six numbers, and three of a side point; see `spans`, `gaps`.
+        value: (y, p, out) fills what the points y give, six numbers, and three of a third point; see `spans`, `gaps`.
         slopes: (y, p, out) fills its derivatives by y.
         columns: Count of its wrenches: one along a span; of a gap normal, two tangents, and a moment about the normal.
     """
@@ -62,7 +62,8 @@ class PathElement:
     Attributes:
         shape: The function.
         parameters: Its numbers.
-        ends: The two points, and the side point of a wrap that another body carries than the wrap's.
+        ends: The two points, and the side point of a wrap that another body carries than the wrap's, or a third point
+            of the body of both.
         joint: Of the body that carries the frame, 0 for the base.
         frame: Placement of the frame in that joint's.
         reach: Distance of both points' middle from the frame's origin beyond which a gap is open and not asked, m.

@@ -44,8 +44,8 @@ class Solid:
         group: Solids of one group never touch, such as the links of a finger.
         joint: Index of the joint of the Pinocchio model that carries it, 0 for the base.
         place: Of its shape in the frame of that joint.
-        shape: ``half_space``, ``sphere``, ``box``, ``cylinder`` or ``capsule``.
-        sizes: As `prism_parameters` takes them, m.
+        shape: ``half_space``, ``sphere``, ``box``, ``cylinder``, ``capsule`` or ``ellipsoid``.
+        sizes: As `prism_parameters` takes them, m; of an ellipsoid its semi-axes.
         home: Centre of a ball, base frame, shape (3,), m, that it never leaves.
         range: Radius of that ball, m; infinite for what is free.
         joined: Whether it is a capsule whose near end lies in another one, which stands for it on a plane.
@@ -72,6 +72,8 @@ class Solid:
             return np.inf
         if self.shape == "box":
             return 0.5 * float(np.linalg.norm(self.sizes))
+        if self.shape == "ellipsoid":
+            return max(self.sizes)
         radius, length = (*self.sizes, 0.0)[:2]
         return float(np.hypot(radius, 0.5 * length)) if self.shape == "cylinder" else radius + 0.5 * length
 

@@ -22,7 +22,7 @@ _NOTES = """
 
   Written from a tree of bodies. A body with several joints has a link for each, of which the last has its mass.
   Left out, because a URDF has no place for it: tendons, actuators, loops, springs, the inertia of rotors;
-  couplings by more than a ratio and an offset, meshes, objects.{rest}
+  couplings by more than a ratio and an offset, meshes, ellipsoids, objects.{rest}
 """
 
 

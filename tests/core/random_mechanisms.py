@@ -8,7 +8,7 @@ from law_cases import every_law, random_parameters
 
 from finger_pin.laws.contact_law import CONTACT, TORSIONAL_CONTACT
 from finger_pin.laws.law import Law
-from finger_pin.mechanism.gaps import PRISM, prism_parameters
+from finger_pin.mechanism.gaps import ELLIPSOIDS, PRISM, prism_parameters
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -89,16 +89,30 @@ def random_path(rng, joints):
 
 
 def random_contacts(rng, joints, width):
-    """Three or four contacts of capsules with balls so large that most are inside; they slide or stick, or spin too."""
+    """Contacts of capsules and ellipsoids with bodies so large that most are inside; they slide or stick, or spin too.
+
+    Three or four of capsules with balls, one of an ellipsoid with a capsule, and one of two ellipsoids.
+    """
     law = TORSIONAL_CONTACT if joints % 2 else CONTACT
     count = int(rng.integers(3, 5))
     paths = []
     for _ in range(count):
         holder, frame = int(rng.integers(0, joints + 1)), int(rng.integers(0, joints + 1))
         ends = Place(holder, rng.normal(size=3)), Place(holder, rng.normal(size=3))
-        numbers = np.array([0.3, 0.0, 1.0, *prism_parameters("sphere", [rng.uniform(2.0, 6.0)])])
+        numbers = np.array([0.3, 0.0, 1.0, 0.0, *prism_parameters("sphere", [rng.uniform(2.0, 6.0)])])
         piece = PathElement(PRISM, numbers, ends, frame, random_placement(rng))
         paths += [(PathTerm(piece, column),) for column in range(law.arms)]
+    for shape in (PRISM, ELLIPSOIDS):
+        holder, frame, centre = int(rng.integers(0, joints + 1)), int(rng.integers(0, joints + 1)), rng.normal(size=3)
+        axes = np.diag(rng.uniform(0.2, 0.5, 3)) @ random_placement(rng).rotation
+        ends = tuple(Place(holder, point) for point in (centre, centre + axes[0], centre + axes[1]))
+        sizes, third = rng.uniform(2.0, 6.0, 3), float(np.linalg.norm(axes[2]))
+        numbers = [third, *sizes]
+        if shape is PRISM:
+            numbers = [0.0, 0.0, 0.0, third, *prism_parameters("capsule", sizes[:2])]
+        piece = PathElement(shape, np.array(numbers), ends, frame, random_placement(rng))
+        paths += [(PathTerm(piece, column),) for column in range(law.arms)]
+    count += 2
     # Stiffness, damping, exponent; static and kinetic friction; stiffness and lag of bristles, Stribeck speed, floor;
     # radius of torsion.
     least = [1.0, 0.0, 1.0, 0.8, 0.3, 1.0, 0.1, 0.5, 0.1, 0.2]

@@ -5,46 +5,71 @@ import numba
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.mechanism.gaps import PRISM, prism_parameters
+from finger_pin.mechanism.gaps import ELLIPSOIDS, PRISM, prism_parameters
 
-_value, _slopes = inlined(PRISM.value), inlined(PRISM.slopes)
 #: Kinds of parts: whether they have a disc, and a length.
-PARTS = {"point": (0.0, 0.0), "segment": (0.0, 1.0), "disc": (1.0, 0.0), "cylinder": (1.0, 1.0)}
+PARTS = {"point": (0.0, 0.0), "segment": (0.0, 1.0), "disc": (1.0, 0.0), "cylinder": (1.0, 1.0), "ellipsoid": None}
 #: Distances of what lies along a face are too low by this much of a part's length and of its disc's diameter.
 EPSILON = 1e-5 / 4.0
 
 
-@numba.njit
-def fill(y, p, found, slopes):
-    """Fill the gap of many pairs, shape (m, 13), and its slopes, shape (m, 78)."""
-    for k in range(y.shape[0]):
-        _value(y[k], p[k], found[k])
-        _slopes(y[k], p[k], slopes[k])
+def filler(shape):
+    """Return a function that fills the gap of many pairs, shape (m, 13), and its slopes, shape (m, 78)."""
+    value_of, slopes_of = inlined(shape.value), inlined(shape.slopes)
+
+    @numba.njit
+    def fill(y, p, found, slopes):
+        for k in range(y.shape[0]):
+            value_of(y[k], p[k], found[k])
+            slopes_of(y[k], p[k], slopes[k])
+
+    return fill
+
+
+#: By the count of their parameters.
+FILL = {len(shape.parameters): filler(shape) for shape in (PRISM, ELLIPSOIDS)}
 
 
 def gaps(y, p):
     """Return distances and the rest, (m, 13), slopes of the rest, (m, 12, 6), and of the distance, (m, 6)."""
     found, slopes = np.empty((len(y), 13)), np.empty((len(y), 78))
-    fill(y, p, found, slopes)
+    FILL[p.shape[1]](y, p, found, slopes)
     return found, slopes[:, :72].reshape(-1, 12, 6), slopes[:, 72:]
 
 
 def random_pairs(rng, shape, part, count, fillet=0.0):
     """Return y, p and sizes of a shape at the origin for parts around it; most near, some touching."""
-    sizes = rng.uniform(0.005, 0.04, (count, {"half_space": 0, "sphere": 1, "box": 3}.get(shape, 2)))
+    numbers_of = {"half_space": 0, "sphere": 1, "box": 3, "ellipsoid": 3}
+    sizes = rng.uniform(0.005, 0.04, (count, numbers_of.get(shape, 2)))
     centre, axis = 0.04 * rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
     half = rng.uniform(0.002, 0.03, (count, 1)) * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    if part == "ellipsoid":
+        across = np.cross(half, rng.normal(size=(count, 3)))
+        across *= rng.uniform(0.002, 0.03, (count, 1)) / np.linalg.norm(across, axis=1, keepdims=True)
+        third = rng.uniform(0.002, 0.03, count)
+        p = np.column_stack([third, sizes])
+        if shape != "ellipsoid":
+            p = np.array(
+                [
+                    [0.0, 0.0, 0.0, c, *prism_parameters(shape, each, fillet)]
+                    for c, each in zip(third, sizes, strict=True)
+                ]
+            )
+        return np.hstack([centre, centre + half, centre + across]), p, sizes
     disc, along = PARTS[part]
     numbers = np.column_stack([rng.uniform(0.002, 0.01, count), disc * rng.uniform(0.003, 0.03, count)])
-    p = np.array([[*n, along, *prism_parameters(shape, each, fillet)] for n, each in zip(numbers, sizes, strict=True)])
+    p = np.array(
+        [[*n, along, 0.0, *prism_parameters(shape, each, fillet)] for n, each in zip(numbers, sizes, strict=True)]
+    )
     ends = (centre, centre) if part == "point" else (centre - half, centre + half)
     return np.hstack(ends), p, sizes
 
 
 def twists(rng, y):
-    """Return rates of y by random motions of the part, of about 1 m/s and 50 rad/s."""
+    """Return random motions of the part, about 1 m/s and 50 rad/s: rates of y, what slopes are by, turn and speed."""
     turn, speed = 50.0 * rng.normal(size=(len(y), 3)), rng.normal(size=(len(y), 3))
-    return np.hstack([speed + np.cross(turn, y[:, :3]), speed + np.cross(turn, y[:, 3:])])
+    rate = np.hstack([speed + np.cross(turn, point) for point in np.split(y, y.shape[1] // 3, axis=1)])
+    return rate, (rate if y.shape[1] == 6 else np.hstack([rate[:, :3], turn])), turn, speed
 
 
 def coal_shape(shape, sizes, fillet=0.0):
@@ -55,22 +80,29 @@ def coal_shape(shape, sizes, fillet=0.0):
         return coal.Box(*(sizes - 2.0 * fillet))
     if shape == "cylinder":
         return coal.Cylinder(sizes[0] - fillet, sizes[1] - 2.0 * fillet)
-    return {"sphere": coal.Sphere, "capsule": coal.Capsule}[shape](*sizes)
+    return {"sphere": coal.Sphere, "capsule": coal.Capsule, "ellipsoid": coal.Ellipsoid}[shape](*sizes)
 
 
 def coal_distance(shape, sizes, y, p, placement, fillet=0.0):
     """Return coal's signed distance of a pair, with everything moved by a placement."""
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request.gjk_tolerance = 1e-10
+    other = coal_shape(shape, sizes, fillet)
+    if len(y) == 9:
+        one, two, third = y[3:6] - y[:3], y[6:] - y[:3], p[0 if len(p) == 4 else 3]
+        axes = np.column_stack([one / np.linalg.norm(one), two / np.linalg.norm(two), np.zeros(3)])
+        axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+        body = coal.Ellipsoid(np.linalg.norm(one), np.linalg.norm(two), third)
+        pose = coal.Transform3s(axes, y[:3])
+        return coal.distance(body, placement * pose, other, placement, request, result) - fillet
     radius, disc, far = p[0], p[1], np.linalg.norm(y[3:] - y[:3])
     along = (y[3:] - y[:3]) / far if far else np.array([0.0, 0.0, 1.0])
     helper = np.eye(3)[np.argmin(np.abs(along))]
     first = np.cross(helper, along) / np.linalg.norm(np.cross(helper, along))
     length, centre = (far, 0.5 * (y[:3] + y[3:])) if p[2] else (0.0, y[:3])
     pose = coal.Transform3s(np.column_stack([first, np.cross(along, first), along]), centre)
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    request.gjk_tolerance = 1e-10
     # A disc is a cylinder of no height; its rounding is taken off.
     body = coal.Cylinder(disc, max(length, 1e-9)) if disc else coal.Capsule(radius, length)
     if not disc and not length:
         body = coal.Sphere(radius)
-    other = coal_shape(shape, sizes, fillet)
     return coal.distance(body, placement * pose, other, placement, request, result) - fillet - (radius if disc else 0.0)

@@ -56,6 +56,11 @@ def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
         for p in range(2):
             weight = 1.0 * (moves[p] - moves[PIECE.frame])
             _seen_from(axis, rotation, ends[3 * p : 3 * p + 3], weight, dy[3 * p : 3 * p + 3])
+        if columns > 1 and paths.thirds[e]:
+            # The slopes of a gap of three points are by the angular velocity.
+            for c in range(3):
+                turning = rotation[0, c] * axis[0] + rotation[1, c] * axis[1] + rotation[2, c] * axis[2]
+                dy[3 + c] = (moves[0] - moves[PIECE.frame]) * turning
         for m in range(columns):
             wrench, out = pieces.wrench[e, m], pieces.wrench_slope[s, m]
             for i in range(WRENCH):

@@ -48,9 +48,8 @@ def _frame(paths: Paths, e: int, work: Work) -> None:
                 rotation[r, c] = 0.0
                 for i in range(3):
                     rotation[r, c] += above[r, i] * paths.rotation[e, i, c]
-    # Of a gap there is no side point.
-    for p in range(3 if paths.columns[e] == 1 else 2):
-        body = paths.bodies[e, PIECE.side if p == 2 else p]
+    for p in range(2 + paths.thirds[e]):
+        body = paths.bodies[e, PIECE.third if p == 2 else p]
         for r in range(3):
             ends[3 * p + r] = paths.points[e, 3 * p + r]
         if body >= 0:

@@ -1,7 +1,8 @@
 """Gaps: signed distances of two bodies' surfaces, with normals, contact points, and all slopes in closed form."""
 
 from finger_pin.mechanism.gaps.distance import PRISM
+from finger_pin.mechanism.gaps.ellipsoids import ELLIPSOIDS
 from finger_pin.mechanism.gaps.nearest import SignedDistance
 from finger_pin.mechanism.gaps.prism import prism_parameters
 
-__all__ = ["PRISM", "SignedDistance", "prism_parameters"]
+__all__ = ["ELLIPSOIDS", "PRISM", "SignedDistance", "prism_parameters"]

@@ -24,14 +24,16 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.mechanism.gaps.ellipsoid import sliding
 from finger_pin.mechanism.gaps.nearest import EPSILON, INSIDE, SignedDistance, lowered, nearest
 from finger_pin.mechanism.gaps.prism import GAP, GapParameters, deepest, offset, surface
+from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_of, turned
 
 # Tangents are turned from those of one direction, (2, 3, 6) / 7, to those of the normal, the short way. They jump only
 # for its opposite, which is no normal of a face and lies on no plane of symmetry of a shape.
 _POLE_X, _POLE_Y, _POLE_Z = 2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0
-_FIRST_X, _FIRST_Y, _FIRST_Z = 3.0 / 7.0, -6.0 / 7.0, 2.0 / 7.0
-_SECOND_X, _SECOND_Y, _SECOND_Z = 6.0 / 7.0, 2.0 / 7.0, -3.0 / 7.0
+#: Tangents of that direction.
+FIRST, SECOND = (3.0 / 7.0, -6.0 / 7.0, 2.0 / 7.0), (6.0 / 7.0, 2.0 / 7.0, -3.0 / 7.0)
 _LEAST = 1e-12
 # The level is iterated to this, m, in so many steps at most.
 _CLOSE, _MOST_STEPS = 1e-15, 40
@@ -103,16 +105,18 @@ def _level(y: Any, p: Any) -> Any:
     return start - u, 1.0 / (1.0 + (spread - 1.0) * rate), sunk, rate, bend, 0.0, s, x, y_, z
 
 
-def _tangent(u: float, v: float, w: float, a: float, b: float, c: float, out: Any, at: int) -> None:
-    """Write (a, b, c), a tangent of the pole, turned to the normal (u, v, w)."""
+def tangent(u: float, v: float, w: float, of_pole: Any, out: Any, at: int) -> None:
+    """Write a tangent of the pole, turned to the normal (u, v, w)."""
+    a, b, c = of_pole
     share = (a * u + b * v + c * w) / max(1.0 + _POLE_X * u + _POLE_Y * v + _POLE_Z * w, _LEAST)
     out[at] = a - share * (u + _POLE_X)
     out[at + 1] = b - share * (v + _POLE_Y)
     out[at + 2] = c - share * (w + _POLE_Z)
 
 
-def _tangent_slope(n: Any, moved: Any, growing: float, a: float, b: float, c: float, out: Any, at: int) -> None:
+def tangent_slope(n: Any, moved: Any, growing: float, of_pole: Any, out: Any, at: int) -> None:
     """Write the derivative of a tangent by a motion of the normal n into a column of ``out``."""
+    a, b, c = of_pole
     whole = max(1.0 + _POLE_X * n[0] + _POLE_Y * n[1] + _POLE_Z * n[2], _LEAST)
     share = (a * n[0] + b * n[1] + c * n[2]) / whole
     change = (a * moved[0] + b * moved[1] + c * moved[2]) / whole + growing * share
@@ -127,29 +131,13 @@ def _value(y: Any, p: Any, out: Any) -> None:
     x_, y_, z_ = y[0] + s * (y[3] - y[0]) + r_x, y[1] + s * (y[4] - y[1]) + r_y, y[2] + s * (y[5] - y[2]) + r_z
     _, u, v, w, _, _, _, _, _, _ = surface(x_, y_, z_, p, sunk)
     out[0] = level - p[GAP.rounding] - p[GAP.radius]
-    _tangent(u, v, w, _FIRST_X, _FIRST_Y, _FIRST_Z, out, 7)
-    _tangent(u, v, w, _SECOND_X, _SECOND_Y, _SECOND_Z, out, 10)
+    tangent(u, v, w, FIRST, out, 7)
+    tangent(u, v, w, SECOND, out, 10)
     for i in range(7, 13):
         out[i] *= size
     out[1], out[2], out[3] = size * u, size * v, size * w
     back = p[GAP.radius] + 0.5 * out[0]
     out[4], out[5], out[6] = x_ - back * out[1], y_ - back * out[2], z_ - back * out[3]
-
-
-def _turned(h: Any, x: float, y: float, z: float) -> Any:
-    """Return the product of a Hessian, as xx, xy, xz, yy, yz, zz, and a vector."""
-    return h[0] * x + h[1] * y + h[2] * z, h[1] * x + h[3] * y + h[4] * z, h[2] * x + h[4] * y + h[5] * z
-
-
-def _dot(a: Any, b: Any) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _inverse(a: float, b: float, c: float, d: float, e: float, f: float) -> Any:
-    """Return the inverse of a symmetric matrix, both as xx, xy, xz, yy, yz, zz."""
-    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
-    whole = 1.0 / (a * aa + b * ab + c * ac)
-    return aa * whole, ab * whole, ac * whole, (a * f - c * c) * whole, (b * c - a * e) * whole, (a * d - b * b) * whole
 
 
 def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
@@ -158,7 +146,7 @@ def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
     The directions are e, a unit vector along r, and one across; those that are not free are zero.
     """
     e = (y[3] - y[0], y[4] - y[1], y[5] - y[2])
-    length, size = np.sqrt(_dot(e, e)), np.sqrt(_dot(r, r))
+    length, size = np.sqrt(dot(e, e)), np.sqrt(dot(r, r))
     zero = (0.0, 0.0, 0.0)
     pull_s, pull_r = 2.0 * EPSILON * length, EPSILON * p[GAP.disc]
     out, across, on_rim = zero, zero, False
@@ -177,23 +165,23 @@ def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
         )
     # In units of r and s: the disc's pull is kappa_r / R^2 per m; on its rim the circle's curvature stands for that.
     stiff = pull_r / (p[GAP.disc] * p[GAP.disc]) if p[GAP.disc] > 0.0 else 1.0
-    bent = -_dot(out, n) / p[GAP.disc] if on_rim else stiff
+    bent = -dot(out, n) / p[GAP.disc] if on_rim else stiff
     free_s = p[GAP.along] > 0.0 and 0.0 < s < p[GAP.along] and length > 0.0
     if on_rim:
         out = zero
     along = e if free_s else zero
     h_out, h_across, h_along = (
-        _turned(h, out[0], out[1], out[2]),
-        _turned(h, across[0], across[1], across[2]),
-        _turned(h, along[0], along[1], along[2]),
+        turned(h, out[0], out[1], out[2]),
+        turned(h, across[0], across[1], across[2]),
+        turned(h, along[0], along[1], along[2]),
     )
-    inverse = _inverse(
-        _dot(out, h_out) + (1.0 if on_rim else stiff),
-        _dot(out, h_across),
-        _dot(out, h_along),
-        _dot(across, h_across) + bent,
-        _dot(across, h_along),
-        _dot(along, h_along) + (pull_s if free_s else 1.0),
+    inverse = inverse_of(
+        dot(out, h_out) + (1.0 if on_rim else stiff),
+        dot(out, h_across),
+        dot(out, h_along),
+        dot(across, h_across) + bent,
+        dot(across, h_along),
+        dot(along, h_along) + (pull_s if free_s else 1.0),
     )
     return along, out, across, inverse
 
@@ -210,10 +198,11 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         n, h = (flat * u_, flat * v_, flat * w_), (flat * xx, flat * xy, 0.0, flat * yy, 0.0, flat * zz)
     back = p[GAP.radius] + 0.5 * (level - p[GAP.rounding] - p[GAP.radius])
     length = np.sqrt(a * a + b * b + c * c)
-    shorter = 1.0 / length if length > 0.0 else 0.0
+    whole = p[GAP.third] > 0.0
+    shorter = 1.0 / length if length > 0.0 and not whole else 0.0
     axis = (a * shorter, b * shorter, c * shorter)
-    along, radial, across, inverse = _moving(y, p, s, r, n, h)
-    leaning = _dot(axis, n) * shorter
+    along, radial, across, inverse = sliding(y, p[GAP.third], r, n, h) if whole else _moving(y, p, s, r, n, h)
+    leaning = dot(axis, n) * shorter
     # The motion of the normal at one place, by c.
     sinking, turning, spread = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
     if rate > 0.0:
@@ -221,33 +210,37 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         sinking, turning = (f, g, k), ((f - spread * u) / far, (g - spread * v) / far, (k - spread * w) / far)
     for j in range(6):
         k, share, sign = (j, 1.0 - s, -1.0) if j < 3 else (j - 3, s, 1.0)
-        # By the one component that moves, at constant s, and r turned with the axis.
+        # By the one component that moves, at constant s, and r turned with the axis. An ellipsoid moves as a whole.
         tilt = -sign * r[k] * shorter
         dx = share * (k == 0) + tilt * axis[0]
         dy = share * (k == 1) + tilt * axis[1]
         dz = share * (k == 2) + tilt * axis[2]
         # The distance changes as the nearest point does at constant s and r: they minimise it.
-        change = share * n[k] - sign * r[k] * leaning
+        change, swung = share * n[k] - sign * r[k] * leaning, (0.0, 0.0, 0.0)
+        if whole and j > 2:
+            swing = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
+            (dx, dy, dz), swung = cross(swing, r), cross(swing, n)
+            change = dot(n, (dx, dy, dz))
         shrinks = -rate * size * change
-        d = _turned(h, dx, dy, dz)
+        d = turned(h, dx, dy, dz)
         d = (d[0] + shrinks * turning[0], d[1] + shrinks * turning[1], d[2] + shrinks * turning[2])
-        of_along = -_dot(along, d) - (sign * n[k] if along[0] != 0.0 or along[1] != 0.0 or along[2] != 0.0 else 0.0)
-        of_radial = -_dot(radial, d) + sign * leaning * radial[k]
-        of_across = -_dot(across, d) + sign * leaning * across[k]
+        of_along = -dot(along, d) - (sign * n[k] if along[0] != 0.0 or along[1] != 0.0 or along[2] != 0.0 else 0.0)
+        of_radial = dot(radial, swung) - dot(radial, d) + sign * leaning * radial[k]
+        of_across = dot(across, swung) - dot(across, d) + sign * leaning * across[k]
         by_radial = inverse[0] * of_radial + inverse[1] * of_across + inverse[2] * of_along
         by_across = inverse[1] * of_radial + inverse[3] * of_across + inverse[4] * of_along
         by_along = inverse[2] * of_radial + inverse[4] * of_across + inverse[5] * of_along
         dx += by_radial * radial[0] + by_across * across[0] + by_along * along[0]
         dy += by_radial * radial[1] + by_across * across[1] + by_along * along[1]
         dz += by_radial * radial[2] + by_across * across[2] + by_along * along[2]
-        du, dv, dw = _turned(h, dx, dy, dz)
+        du, dv, dw = turned(h, dx, dy, dz)
         moved = (du + shrinks * turning[0], dv + shrinks * turning[1], dw + shrinks * turning[2])
         if flat > 0.0:
-            slope, growing = change, _dot(unit, moved)
+            slope, growing = change, dot(unit, moved)
             moved = (moved[0] - growing * u, moved[1] - growing * v, moved[2] - growing * w)
         else:
             slope = size * change
-            growing = size * size * ((spread - 1.0) * bend * slope - rate * _dot(sinking, moved))
+            growing = size * size * ((spread - 1.0) * bend * slope - rate * dot(sinking, moved))
             moved = (size * moved[0], size * moved[1], size * moved[2])
         du, dv, dw = moved[0] + growing * u, moved[1] + growing * v, moved[2] + growing * w
         out[72 + j] = slope
@@ -255,8 +248,8 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         out[18 + j] = dx - back * du - 0.5 * slope * size * u
         out[24 + j] = dy - back * dv - 0.5 * slope * size * v
         out[30 + j] = dz - back * dw - 0.5 * slope * size * w
-        _tangent_slope(unit, moved, growing, _FIRST_X, _FIRST_Y, _FIRST_Z, out, 36 + j)
-        _tangent_slope(unit, moved, growing, _SECOND_X, _SECOND_Y, _SECOND_Z, out, 54 + j)
+        tangent_slope(unit, moved, growing, FIRST, out, 36 + j)
+        tangent_slope(unit, moved, growing, SECOND, out, 54 + j)
 
 
 #: The gap between a part of a body and a rounded prism; sizes of the latter from `prism_parameters`.

@@ -1,16 +1,17 @@
 """The point of a body's part that is nearest to a prism's core.
 
 A part is x = P_0 + s e + r, with s in [0, along], e = P_1 - P_0 and r in the plane across e, |r| <= R: a point, a
-segment, a disc, or a cylinder. The nearest point minimises a convex function,
+segment, a disc, or a cylinder. Or it is an ellipsoid, P_0 + M u with |u| <= 1, of semi-axes P_1 - P_0, P_2 - P_0, and
+one of length c across them. The nearest point minimises a convex function,
 
     F = |w(x)| + kappa_s (s - 1/2)^2 / 2 + kappa_r |r / R|^2 / 2,      kappa_s = 2 epsilon |e|,  kappa_r = epsilon R.
 
 The last two terms matter only where a part lies along a face to within epsilon rad: they draw the point to its middle,
 so that it moves smoothly from end to end while the part tilts. What they add at most is taken off the distance: it is
-exact at the ends and on the rim, and at most epsilon (|e| / 4 + R / 2) too low between them.
+exact at the ends and on the rim, and at most epsilon (|e| / 4 + R / 2) too low between them. An ellipsoid needs none.
 
 F is iterated: |w| <= (|w|^2 / |w_0| + |w_0|) / 2, and |w|^2 is a quadratic function as long as the nearest face, edge
-or corner stays the same. Its minimum over a disc times an interval has a closed form but for one root.
+or corner stays the same. Its minimum over a disc times an interval, or over a ball, has a closed form but for one root.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from finger_pin.mechanism.gaps.ellipsoid import on_ball, semi_axes
 from finger_pin.mechanism.gaps.prism import GAP, offset
+from finger_pin.mechanism.gaps.vectors import across
 
 # Radians within which a part lies along a face.
 EPSILON = 1e-5
@@ -201,22 +204,41 @@ def _along(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, st
     return share
 
 
+def _of_ellipsoid(y: Any, p: Any, sunk: float, blunt: float) -> Any:
+    """Return 0 and r of the point of an ellipsoid that is nearest to the shrunk core."""
+    frame = semi_axes(y, p[GAP.third])
+    none, u, v, s, size = (0.0, 0.0), 0.0, 0.0, 0.0, 1.0
+    for _ in range(_MOST_STEPS):
+        x, y_, z = _place(y, frame, u, v, s)
+        w = offset(x, y_, z, p, sunk)
+        # In the core there is nothing nearer.
+        if w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < _ROUNDING * _ROUNDING * blunt * blunt:
+            break
+        d_u, d_v, d_s = on_ball(_expanded(y, p, sunk, blunt, frame, none, u, v, s), (u, v, s))
+        d_u, d_v, d_s = d_u - u, d_v - v, d_s - s
+        before, size = size, abs(d_u) + abs(d_v) + abs(d_s)
+        if size < 1e-14 or (size < _ROUNDING and size > 0.5 * before):
+            break
+        share = _along(y, p, sunk, blunt, frame, none, (u, v, s), (d_u, d_v, d_s))
+        u, v, s = u + share * d_u, v + share * d_v, s + share * d_s
+    r_x, r_y, r_z = _place((0.0, 0.0, 0.0), frame, u, v, s)
+    return 0.0, r_x, r_y, r_z
+
+
 def nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
     """Return s and r of the point nearest to the shrunk core of a part whose ends P_0 and P_1 are y, shape (6,).
 
     Up to a distance ``blunt``, m, |w| counts as (|w|^2 / blunt + blunt) / 2, so that the point is unique inside too.
     """
+    if p[GAP.third] > 0.0:
+        return _of_ellipsoid(y, p, sunk, blunt)
     if p[GAP.disc] == 0.0:
         return _on_segment(y, p, sunk, blunt), 0.0, 0.0, 0.0
     e = (y[3] - y[0], y[4] - y[1], y[5] - y[2])
     length = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
     a, b, c = e[0] / length, e[1] / length, e[2] / length
-    # Two unit vectors across the axis (Duff et al., J. Computer Graphics Techniques 6(1), 2017), times R.
-    sign = 1.0 if c >= 0.0 else -1.0
-    k = -1.0 / (sign + c)
-    big = p[GAP.disc]
-    f = (big * (1.0 + sign * a * a * k), big * sign * a * b * k, -big * sign * a)
-    g = (big * a * b * k, big * (sign + b * b * k), -big * b)
+    big, (f, g) = p[GAP.disc], across(a, b, c)
+    f, g = (big * f[0], big * f[1], big * f[2]), (big * g[0], big * g[1], big * g[2])
     along, pulls = p[GAP.along], (2.0 * EPSILON * length, EPSILON * big)
     u, v, s, size = 0.0, 0.0, 0.5 * along, 1.0
     for _ in range(_MOST_STEPS):
@@ -243,12 +265,14 @@ class SignedDistance:
     Attributes:
         name: For messages.
         parameters: Names of its numbers; ``p`` holds them in this order.
-        value: (y, p, out). y has both points of A's part, such as the ends of a capsule's axis, twice the same for a
-            sphere, shape (6,), m. Fills out[0] with the signed distance, negative for penetration, m; out[1:4] with the
-            normal from W towards A, a unit vector but deep in an edge; out[4:7] with the contact point, midway between
-            the surfaces, m; out[7:10] and out[10:13] with two tangents as long, right-handed with the normal.
+        value: (y, p, out). y has the points of A's part, such as the ends of a capsule's axis, twice the same for a
+            sphere, or three of an ellipsoid, shape (6,) or (9,), m. Fills out[0] with the signed distance, negative for
+            penetration, m; out[1:4] with the normal from W towards A, a unit vector but deep in an edge; out[4:7] with
+            the contact point, midway between the surfaces, m; out[7:10] and out[10:13] with two tangents as long,
+            right-handed with the normal.
         slopes: (y, p, out). Fills out[:72] with d(out[1:13])/dy, 12 x 6 row by row, and out[72:78] with
-            d(distance)/dy, for motions that keep the points' distance.
+            d(distance)/dy, for motions that keep the points' distance. Of three points, by the velocity of the first
+            and the angular velocity of A instead of y.
     """
 
     name: str

@@ -17,11 +17,12 @@ DEEP = 1.0
 
 
 class GapParameters(NamedTuple):
-    """Places of the parameters of a gap: of a part its rounding, R and the largest s, 0 or 1, then of a prism."""
+    """Places of the parameters of a gap: of a part its rounding, R, the largest s, 0 or 1, and c, then of a prism."""
 
     radius: int
     disc: int
     along: int
+    third: int
     half_x: int
     half_y: int
     rim: int

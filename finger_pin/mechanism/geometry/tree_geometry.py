@@ -139,13 +139,15 @@ def _surface(mesh: Mesh) -> coal.BVHModelBase:
 def _visuals(
     name: str, joint: int, frame: pin.SE3, solid: TreeSolid, surface: coal.BVHModelBase | None
 ) -> list[Visual]:
-    """Return a solid as boxes, cylinders, spheres and its surface, if it is a mesh."""
+    """Return a solid as boxes, cylinders, spheres, an ellipsoid, or its surface, if it is a mesh."""
     place = frame * pin.SE3(rotation(solid.orientation), np.array(solid.position))
     colour = MATERIALS["shell"]
     if surface is not None:
         return [Visual(name, joint, surface, place, colour, framed=True)]
     if solid.kind == "box":
         return [Visual(name, joint, coal.Box(*solid.sides), place, colour, framed=True)]
+    if solid.kind == "ellipsoid":
+        return [Visual(name, joint, coal.Ellipsoid(*solid.semi_axes), place, colour, framed=True)]
     if solid.kind == "sphere":
         return [Visual(name, joint, coal.Sphere(solid.radius), place, colour, framed=True)]
     barrel = Visual(name, joint, coal.Cylinder(solid.radius, solid.length), place, colour, framed=True)

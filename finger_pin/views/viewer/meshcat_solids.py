@@ -43,7 +43,7 @@ def solid_commands(
         colour: Of all solids, red, green and blue; by default each has its own.
 
     Raises:
-        InputError: If a visual is no box, cylinder, sphere or mesh.
+        InputError: If a visual is no box, cylinder, sphere, ellipsoid or mesh.
     """
     links = link_names(geometry)
     for visual in geometry.visuals:
@@ -66,21 +66,23 @@ def root_command(rotation: Array) -> Command:
 
 
 def primitive(name: str, shape: Any) -> tuple[Command, Array]:
-    """Return meshcat's geometry for one of Pinocchio, and the rotation between them.
+    """Return meshcat's geometry for one of Pinocchio, and the rotation between them; of an ellipsoid a stretch, too.
 
     Raises:
-        InputError: If it is no box, cylinder, sphere or mesh.
+        InputError: If it is no box, cylinder, sphere, ellipsoid or mesh.
     """
     kind = type(shape).__name__
     if kind == "Cylinder":
         return cylinder(shape.radius, 2.0 * shape.halfLength), Y_TO_Z
     if kind == "Sphere":
         return ball(shape.radius), np.eye(3)
+    if kind == "Ellipsoid":
+        return ball(1.0), np.diag(shape.radii)
     if is_mesh(shape):
         return _mesh_geometry(shape), np.eye(3)
     if kind == "Box":
         return box(*(2.0 * float(half) for half in shape.halfSide)), np.eye(3)
-    raise InputError(f"visual {name}", "must be a box, a cylinder, a sphere or a mesh", kind)
+    raise InputError(f"visual {name}", "must be a box, a cylinder, a sphere, an ellipsoid or a mesh", kind)
 
 
 def is_mesh(shape: Any) -> bool:

@@ -170,7 +170,7 @@ class SceneObjects:
         return {"type": "set_transform", "path": f"{ROOT}/object_{name}", "matrix": placed(rotation, pose[:3])}
 
     def parts(self, name: str) -> Iterator[tuple[Command, Array, Array, tuple[float, float, float]]]:
-        """Yield the solids of an object: meshcat's geometry, its rotation and place in the object, and its colour."""
+        """Yield the solids of an object: meshcat's geometry, its rotation or stretch, its place there, its colour."""
         scene_object = self.by_name[name]
         sizes, colour = scene_object.sizes, _FIXED if scene_object.mass is None else _FREE
         rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
@@ -182,6 +182,8 @@ class SceneObjects:
             parts = [(box(side, side, thick), np.eye(3), below)]
         elif scene_object.shape == "box":
             parts = [(box(*sizes), np.eye(3), np.zeros(3))]
+        elif scene_object.shape == "ellipsoid":
+            parts = [(ball(1.0), np.diag(sizes), np.zeros(3))]
         elif scene_object.shape == "sphere":
             parts = [(ball(sizes[0]), np.eye(3), np.zeros(3))]
         else:
@@ -196,6 +198,10 @@ def _corners(scene_object: Object) -> Array:
     """Return the corners of the box around a fixed object, shape (8, 3), m."""
     radius = scene_object.radius or 0.0
     round_ends = 0.0 if scene_object.shape == "cylinder" else 2.0 * radius
-    sides = scene_object.sides or (2.0 * radius, 2.0 * radius, (scene_object.length or 0.0) + round_ends)
+    sides = (
+        tuple(2.0 * axis for axis in scene_object.semi_axes or ())
+        or scene_object.sides
+        or (2.0 * radius, 2.0 * radius, (scene_object.length or 0.0) + round_ends)
+    )
     rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
     return np.asarray(0.5 * np.array(list(product((-1.0, 1.0), repeat=3))) * sides @ rotation.T + scene_object.position)
