@@ -19,15 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.interface import ControlSignals, LoopController
+from finger_pin.control.motor_signals import sampled, voltage_signals, wound_spools
 from finger_pin.core.drives import Drives, sample
 from finger_pin.description.actuators import Actuator
-from finger_pin.description.scenario import Scenario
-from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
+
+__all__ = ["DriveSignals", "GivenVoltages", "LoopMemory", "PositionDrives", "SteppedDrives"]
+__all__ += ["build_drives", "loop_period", "spool_goals", "voltage_signals", "wound_spools"]
 
 
 class DriveSignals(Protocol):
@@ -105,6 +107,7 @@ class PositionDrives:
         start_time: float = 0.0,
         wound: Mapping[int, tuple[Signal, float]] = {},
         voltages: Mapping[int, Signal] = {},
+        supplies: Mapping[int, Signal] = {},
         memory: LoopMemory | None = None,
     ) -> None:
         """Work out the goals of a motion.
@@ -115,8 +118,9 @@ class PositionDrives:
             reference: The desired motion.
             duration: Of the motion, s.
             start_time: Of the motion, s.
-            wound: From `wound_spools`.
-            voltages: From `given_voltages`.
+            wound: From `motor_signals.wound_spools`.
+            voltages: From `voltage_signals`, in place of the loops.
+            supplies: From `voltage_signals`, in place of the motors' own.
             memory: Of the sample that was taken last, where a run goes on.
 
         Raises:
@@ -131,17 +135,18 @@ class PositionDrives:
         first = 0.0 if memory is None else -memory.age
         times: Array = first + period * np.arange(math.ceil((duration - first) / period) + 1.0)
         goals = spool_goals(finger, controller, times, reference.at(times), wound, start_time)
-        goals[:, list(voltages)], volts = 0.0, np.full_like(goals, np.nan)
-        for motor, signal in voltages.items():
-            volts[:, motor] = signal.later(start_time).at(times)[0][:, 0]
-        goals, volts = goals[:, actuators.holds], np.ascontiguousarray(volts[:, actuators.holds])
+        goals[:, list(voltages)] = 0.0
+        nominal = np.array([each.motor.voltage for each in finger.description.actuators.values()])
+        volts = sampled(voltages, times, start_time, np.full(len(nominal), np.nan))
+        supply = sampled(supplies, times, start_time, nominal)
+        goals, volts, supply = (np.ascontiguousarray(each[:, actuators.holds]) for each in (goals, volts, supply))
         for (name, actuator), goal in zip(_positioned(finger), goals.T, strict=True):
             encoder = actuator.motor.encoder
             least, most = float(goal.min()), float(goal.max())
             if encoder is not None and not encoder.range[0] <= least <= most <= encoder.range[1]:
                 allowed = f"the motion takes the spool from {least:.4g} to {most:.4g} rad"
                 raise InputError(f"finger.actuators.{name}.motor.encoder.range", allowed, list(encoder.range))
-        self.compiled = build_drives(finger, goals, start_time, volts, memory)
+        self.compiled = build_drives(finger, goals, start_time, volts, memory, supply)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return the commands with the tensions of the goals in place of those of the errors."""
@@ -197,48 +202,27 @@ class SteppedDrives:
 
     def __init__(self, finger: Finger) -> None:
         """Read the motors of a finger in position drive, m of them."""
-        self._drives = build_drives(finger, np.zeros((1, int(finger.actuators.holds.sum()))))
+        self._holds, self._nominal = (
+            finger.actuators.holds,
+            np.array([each.motor.voltage for each in finger.description.actuators.values()]),
+        )
+        self._drives = build_drives(finger, np.zeros((1, int(self._holds.sum()))))
         self.period, self._tension = self._drives.period, np.zeros(finger.mechanism.channels)
 
     def reset(self) -> None:
         """Forget all samples."""
         self._drives.sample_count[:], self._drives.integral[:] = 0, 0.0
 
-    def voltages(self, time: float, x: Array, goals: Array) -> Array:
+    def voltages(self, time: float, x: Array, goals: Array, supplies: Mapping[int, Signal] = {}) -> Array:
         """Return the voltages of a sample, shape (m,), V, at a packed state, for goals of spools, shape (m,), rad."""
         self._drives.goals[0] = goals
+        self._drives.supply[0] = sampled(supplies, np.array([time]), 0.0, self._nominal)[0, self._holds]
         sample(self._drives, time, x, self._tension)
         return np.array(self._drives.voltages[0])
 
 
 def _positioned(finger: Finger) -> list[tuple[str, Actuator]]:
     return [each for each in finger.description.actuators.items() if each[1].drive == "position"]
-
-
-def wound_spools(scenario: Scenario, finger: Finger) -> dict[int, tuple[Signal, float]]:
-    """Return the windings of motors in position drive, by their number: rad, or m and the radius of the spool."""
-    actuators, windings = finger.actuators, dict[int, tuple[SignalSettings, float]]()
-    cords = [finger.routing.tendons[k] for k in actuators.tendons]
-    for part in scenario.parts().values():
-        for name, settings in (part.controller.spool_angle or {}).items():
-            windings[actuators.names.index(name)] = settings, 1.0
-        for name, length in (part.controller.tendon_winding or {}).items():
-            if name in cords:
-                radii = actuators.spools[cords.index(name)]
-                motor = int(np.argmax(radii != 0.0))
-                windings[motor] = length, float(radii[motor])
-    tolerance = scenario.simulation.rtol
-    return {motor: (Signal.from_settings([each], tolerance), radius) for motor, (each, radius) in windings.items()}
-
-
-def given_voltages(scenario: Scenario, finger: Finger) -> dict[int, Signal]:
-    """Return the voltages of motors that are given in place of their loops, by their number, V."""
-    tolerance, names = scenario.simulation.rtol, finger.actuators.names
-    return {
-        names.index(name): Signal.from_settings([each], tolerance)
-        for part in scenario.parts().values()
-        for name, each in (part.controller.motor_voltage or {}).items()
-    }
 
 
 def loop_period(finger: Finger) -> float:
@@ -262,6 +246,7 @@ def build_drives(
     start_time: float = 0.0,
     voltages: Array | None = None,
     memory: LoopMemory | None = None,
+    supply: Array | None = None,
 ) -> Drives:
     """Return the loops of all motors of a finger in position drive, m of them.
 
@@ -271,6 +256,7 @@ def build_drives(
         start_time: What the clock shows at the start, s.
         voltages: Voltages in place of the loops, shape (k, m), V; not numbers where these run.
         memory: Of the sample that was taken last, where a run goes on.
+        supply: V in place of the motors' own, shape (k, m), V.
     """
     chosen = [actuator for _, actuator in _positioned(finger)]
     loops, encoders = [each.position_loop for each in chosen], [each.motor.encoder for each in chosen]
@@ -286,7 +272,7 @@ def build_drives(
         resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
         gains=np.ascontiguousarray(np.array([[e.proportional, e.derivative, e.integral] for e in loops]).T),
         torque_off=np.array([np.inf if each.torque_off is None else each.torque_off for each in loops]) - start_time,
-        supply=np.array([each.motor.voltage for each in chosen]),
+        supply=np.tile([each.motor.voltage for each in chosen], (len(goals), 1)) if supply is None else supply,
         sample_count=np.zeros(1, dtype=np.int64),
         integral=np.zeros(len(chosen)),
         last=np.zeros(len(chosen)),

@@ -22,7 +22,7 @@ from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import Series
 from finger_pin.description.validation import choices
-from finger_pin.description.winding import WINDINGS, command_place
+from finger_pin.description.winding import command_place
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals, SignalReference
@@ -232,7 +232,7 @@ def with_columns(
             raise InputError(f"controller.{name}", f"no such tendon or actuator; there are {choices(name, known)}")
         samples = {"kind": "samples", "times": Series(_numbers(times)), "values": Series(_numbers(values))}
         overrides[f"controller.{table}.{label}"] = samples
-        if table not in WINDINGS:
+        if table in ("tensions", "inputs"):
             overrides["controller.kind"] = "tensions"
     return load_scenario(scenario, overrides), None
 

@@ -35,7 +35,7 @@ class Drives(NamedTuple):
         prescribed_voltages: Voltages at the same times in place of a loop's, shape (k, m), V; NaN where the loop runs.
         resolution: Step of the measured angles, 0 for none, shape (m,), rad.
         gains: k_p, k_d, k_i, shape (3, m).
-        supply: V, shape (m,), V.
+        supply: V at the same times, shape (k, m), V.
         torque_off: Times from which on no current flows, shape (m,), s.
         sample_count: Memory, the number of samples so far, shape (1,).
         integral: Memory, int e, shape (m,).
@@ -54,7 +54,7 @@ class Drives(NamedTuple):
     prescribed_voltages: Matrix
     resolution: Vector
     gains: Matrix
-    supply: Vector
+    supply: Matrix
     torque_off: Vector
     sample_count: Indices
     integral: Vector
@@ -109,7 +109,7 @@ def sample(drives: Drives, time: float, x: Vector, tension: Vector) -> None:
         if abs(duty) < 1.0:
             # The integral stands still while the supply is at its limit.
             drives.integral[j] = summed
-        voltage = drives.supply[j] * min(max(duty, -1.0), 1.0)
+        voltage = drives.supply[k, j] * min(max(duty, -1.0), 1.0)
         if not np.isnan(drives.prescribed_voltages[k, j]):
             voltage = drives.prescribed_voltages[k, j]
         if time * (1.0 + 1e-12) >= drives.torque_off[j]:

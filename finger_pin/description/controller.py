@@ -24,7 +24,7 @@ from finger_pin.description.validation import (
     reals,
     suggestion,
 )
-from finger_pin.description.winding import BY_SOURCE, check_winding
+from finger_pin.description.winding import BY_NAME, check_supplies, check_winding
 
 Share = Annotated[float, real(0.0, 2.0)]
 
@@ -108,7 +108,7 @@ class ControllerSettings(Description):
     are given, a tree has actuators, or tensions cannot hold the finger at every posture, but its joints have springs.
     In a file, ``file`` then names a CSV file: its columns are ``time``, actuated tendons, N, and actuators of a tree,
     and become samples of ``tensions`` and ``inputs``; those called ``spool_angle.NAME``, ``tendon_winding.NAME`` and
-    ``motor_voltage.NAME`` are samples of these. Entries of these tables stand on top.
+    ``motor_voltage.NAME`` are samples of these, as is ``supply_voltage.NAME``. Entries of these tables stand on top.
 
     In a hand it is the controller of every finger, with what the finger's table in ``fingers`` has on top; only
     ``sampling`` is the same for all.
@@ -133,6 +133,9 @@ class ControllerSettings(Description):
     )
     motor_voltage: dict[FullName, VoltageSignal] | None = Field(
         None, description="By motor in position drive: what its loop would ask for, held from sample to sample."
+    )
+    supply_voltage: dict[FullName, VoltageSignal] | None = Field(
+        None, description="By motor in position drive: what its loop takes a part of, in place of the motor's voltage."
     )
     inputs: dict[Name, InputSignal] | None = Field(
         None, description="By actuator of a tree; one without a signal has zero input."
@@ -168,8 +171,8 @@ class ControllerSettings(Description):
 
     fingers: dict[Name, ControllerSettings] | None = Field(None, description="By finger, entries that differ there.")
 
-    _flat = field_validator(*BY_SOURCE, mode="before")(flatten)
-    _nested = field_serializer(*BY_SOURCE, mode="wrap")(unflatten)
+    _flat = field_validator(*BY_NAME, mode="before")(flatten)
+    _nested = field_serializer(*BY_NAME, mode="wrap")(unflatten)
     _sparse = field_serializer("fingers")(dump_set_fields)
 
     @property
@@ -195,6 +198,7 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
     check_winding(
         finger, settings.spool_angle or (), settings.tendon_winding or (), settings.motor_voltage or {}, settings.kind
     )
+    check_supplies(finger, settings.supply_voltage or {}, settings.motor_voltage or ())
     joints, tendons = tuple(finger.joints), tuple(finger.tendons)
     of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")
     sizes: list[tuple[str, Numbers | None, tuple[tuple[str, ...], str]]] = [

@@ -21,7 +21,7 @@ from finger_pin.description.tables import error_of_hand, settings_of_finger
 from finger_pin.description.tautness import Tautness, check_currents
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.description.validation import Description, Name, expand, problem, suggestion
-from finger_pin.description.winding import BY_SOURCE, check_sources, hand_with_winches, with_winches
+from finger_pin.description.winding import BY_NAME, BY_SOURCE, check_sources, hand_with_winches, with_winches
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
@@ -177,7 +177,7 @@ class Scenario(Description):
             return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
 
         controller, settings = settings_of_finger(self.controller, name), (self.controller.fingers or {}).get(name)
-        for table in BY_SOURCE:
+        for table in BY_NAME:
             if getattr(controller, table) is not None:
                 # In a finger's own table its name may be left out.
                 signals = (getattr(settings, table) if settings else None) or {}
@@ -225,7 +225,7 @@ class Scenario(Description):
                     "finger",
                     fingers,
                 )
-                for table in BY_SOURCE
+                for table in BY_NAME
             },
             "environment.fingers": (self.environment.fingers or (), "finger", fingers),
         }

@@ -113,6 +113,11 @@ class SignalSettings(Description):
         return abs(self.offset) + abs(self.amplitude) + float(added)
 
     @property
+    def highest(self) -> float:
+        """A value that the signal never exceeds: the greatest of the sinusoid and of the rest together."""
+        return self.offset + abs(self.amplitude) + float(np.max(self.values or (0.0, self.height or 0.0)))
+
+    @property
     def lowest(self) -> float:
         """A value that the signal is never below: the least of the sinusoid and of the rest together."""
         return self.offset - abs(self.amplitude) + float(np.min(self.values or (0.0, self.height or 0.0)))

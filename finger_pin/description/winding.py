@@ -12,8 +12,10 @@ from finger_pin.description.validation import problem, suggestion
 #: Tables of a controller by motor or tendon beside tensions, and their units; all of them stand for open loop.
 WINDINGS = {"spool_angle": "rad", "tendon_winding": "m", "motor_voltage": "V"}
 BY_SOURCE = ("tensions", *WINDINGS)
+#: Those with what is beside a command: the supply of a loop.
+BY_NAME = (*BY_SOURCE, "supply_voltage")
 #: The units of all commands, by their table; inputs of a tree's actuators have one of their own.
-COMMANDS = {"tensions": "N", **WINDINGS, "inputs": ""}
+COMMANDS = {"tensions": "N", **WINDINGS, "supply_voltage": "V", "inputs": ""}
 
 
 def command_place(name: str, inputs: Collection[str]) -> tuple[str, str]:
@@ -103,6 +105,22 @@ def check_winding(
     if winched and kind == "proportional":
         allowed = f'must be "tensions": ideal winches wind {", ".join(winched)} in open loop'
         raise problem("controller.kind", allowed, kind)
+
+
+def check_supplies(
+    finger: FingerDescription, supplies: Mapping[str, SignalSettings], voltages: Collection[str]
+) -> None:
+    """Raise the error of a supply over time that no loop has, or that its motor cannot bear."""
+    for name, signal in supplies.items():
+        entry, motors = f"controller.supply_voltage.{name}", finger.actuators
+        _check_name(entry, name, "motor", tuple(motors), "")
+        _check_drive(entry, name, finger)
+        if name in voltages:
+            raise problem(entry, f"has no effect: controller.motor_voltage.{name} is in place of the loop")
+        low, high, most = signal.lowest, signal.highest, motors[name].motor.voltage
+        if low < 0.0 or high > most:
+            reach = f"reaches from {low:.4g} to {high:.4g} V"
+            raise problem(entry, f"{reach}, beyond 0 V to finger.actuators.{name}.motor.voltage", most)
 
 
 def check_sources(finger: FingerDescription, tensions: Iterable[str]) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,14 @@ from finger_pin.identification.imposed_motions import ImposedMotion
 from finger_pin.identification.motions import RecordedMotion
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording, RecordingModel, check_angles, unit_of
-from finger_pin.identification.scenario_parameters import with_recorded_values
+from finger_pin.identification.scenario_parameters import (
+    acts_on,
+    bare,
+    column_of,
+    entry_of,
+    key_in,
+    with_recorded_values,
+)
 from finger_pin.identification.steady_data import SteadyReadings
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
@@ -35,7 +43,26 @@ def build_problem(
     count = sum(len(signal.measured) for signal in signals)
     if count <= len(low):
         raise InputError("identify.recordings", f"have {count} readings for {len(low)} parameters: more are needed")
-    return Problem(scenario, tuple(bounds), low, high, models, signals, {})
+    problem = Problem(scenario, tuple(bounds), low, high, models, signals, {})
+    for model in models:
+        _check_corrections(model, bounds)
+    return problem
+
+
+def _check_corrections(model: RecordingModel, bounds: Mapping[str, tuple[float, float]]) -> None:
+    """Refuse bounds of an input's offset, scale and delay with which a recording cannot be computed."""
+    name = model.recording.name
+    for column in model.recording.inputs:
+        keys = [key for key in bounds if acts_on(key, name) and column_of(key, [f"{name}.{column}"])]
+        for ends in itertools.product(*(bounds[key] for key in keys)) if keys else ():
+            corrected = dict(zip(keys, ends, strict=True))
+            try:
+                model.check({key_in(key, name): value for key, value in corrected.items()})
+            except InputError as error:
+                where = " and ".join(f"{bare(key)} = {value:g}" for key, value in corrected.items())
+                raise InputError(
+                    entry_of(keys[0]), f"with {where} {error.entry} {error.allowed}", error.value
+                ) from None
 
 
 def held_out_rows(recording: Recording) -> NDArray[np.bool_]:

@@ -100,6 +100,13 @@ class RecordedMotion:
             self.recording, starts, dict(zip(loop.finger.routing.joints, position, strict=True)), self.scenario
         )
 
+    def check(self, nuisance: Mapping[str, float]) -> None:
+        """Raise the error of offsets and scales of inputs with which the motion cannot be computed."""
+        moved = self._with_nuisance(self.scenario, nuisance)
+        # Searches move checked scenarios without another check.
+        read_scenario(moved.model_dump(mode="python", exclude_unset=True, exclude_none=True))
+        self._setup(self.scenario, nuisance)
+
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
         return self._made(scenario, nuisance, self._factor)[0]

@@ -10,7 +10,7 @@ import numpy as np
 from finger_pin.description.recordings.bench import IMPOSED
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import Series
-from finger_pin.description.winding import WINDINGS
+from finger_pin.description.winding import BY_NAME, WINDINGS
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import Recording, check_pulling
 from finger_pin.identification.scenario_parameters import nuisance_value
@@ -21,6 +21,7 @@ _INPUTS = {
     "spool_angle": ("controller", "spool_angle"),
     "tendon_winding": ("controller", "tendon_winding"),
     "motor_voltage": ("controller", "motor_voltage"),
+    "supply_voltage": ("controller", "supply_voltage"),
     "actuator_input": ("controller", "inputs"),
     "joint_reference": ("reference", "joints"),
     "fingertip_force": ("environment", "fingertip_force_signal"),
@@ -49,7 +50,7 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
         section, group = _INPUTS[variable]
         entries = table.setdefault(section, {})
         if variable == "tendon_command" and entries.get("kind") != "tensions":
-            kept = {key: entries[key] for key in ("minimum_tension", "inputs", *WINDINGS) if key in entries}
+            kept = {key: entries[key] for key in ("minimum_tension", "inputs", *BY_NAME[1:]) if key in entries}
             entries = table[section] = {"kind": "tensions", **kept}
         if variable == "tendon_command":
             check_pulling(f"{entry}.inputs.{name}", values)

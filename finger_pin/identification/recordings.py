@@ -40,6 +40,7 @@ VARIABLES = {
     "motor_velocity": "rad/s",
     "motor_current": "A",
     "motor_voltage": "V",
+    "supply_voltage": "V",
     "motor_torque": "N m",
     "spool_angle": "rad",
     "tendon_winding": "m",
@@ -137,6 +138,9 @@ class RecordingModel(Protocol):
 
     def doubt(self, sought: Collection[str]) -> str:
         """Return a warning about a recording for the parameters to be found; empty if there is none."""
+
+    def check(self, nuisance: Mapping[str, float]) -> None:
+        """Raise the error of offsets and scales of inputs with which the recording cannot be computed."""
 
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""

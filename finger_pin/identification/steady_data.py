@@ -134,6 +134,9 @@ class SteadyReadings:
         """Return an empty text: readings have no start."""
         return ""
 
+    def check(self, nuisance: Mapping[str, float]) -> None:
+        """Do nothing: readings are computed with any offsets and scales."""
+
     def tune(self, factor: float) -> None:
         """Do nothing: a closed form has no errors."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled_control
 from finger_pin.control.interface import LoopController
-from finger_pin.control.position_drive import PositionDrives, given_voltages, wound_spools
+from finger_pin.control.position_drive import PositionDrives, voltage_signals, wound_spools
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.collision.interpolants import meetings
 from finger_pin.core.inputs import InputTable
@@ -102,8 +102,9 @@ class Setup:
         if positioned:
             duration, start = scenario.simulation.duration, scenario.simulation.start_time
             wound = wound_spools(scenario, loop.finger)
-            voltages = given_voltages(scenario, loop.finger)
-            planned = loop.finger, loop.controller, loop.reference, duration, start, wound, voltages
+            voltages = voltage_signals(scenario, loop.finger, "motor_voltage")
+            supplies = voltage_signals(scenario, loop.finger, "supply_voltage")
+            planned = loop.finger, loop.controller, loop.reference, duration, start, wound, voltages, supplies
             drives = PositionDrives(*planned, loop.last_samples)
             loop = replace(loop, drives=drives)
         if sampled is not None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from intervals import COULOMB, DRAG, MOTION, STEADY, TURN, motion, readings
+from scipy.integrate import solve_ivp
 
 import finger_pin as fp
 from finger_pin.description.recordings.bench import RecordingSettings
@@ -77,6 +78,62 @@ def test_a_joint_that_nothing_damps_is_said_as_its_runs_take_long():
         for overrides in (bare, {**bare, "finger.joint_friction.viscous": 2e-3})
     ]
     assert "Nothing damps drum" in said[0] and "Nothing damps" not in said[1]
+
+
+def test_a_motor_is_found_under_a_supply_that_sags_beside_its_goal():
+    """J w' = K (V(t) - K w) / R - b w of a motor that unwinds a slack cord at the limit of its loop, by scipy."""
+    time, motor = np.arange(0.0, 0.4, 0.005), "finger.actuators.servo.motor."
+    supply = 7.0 - 6.0 * time
+
+    def rates(t, x):
+        return x[1], (-0.5 * (7.0 - 6.0 * t + 0.5 * x[1]) / 5.0 - 0.01 * x[1]) / 2e-3
+
+    angle = solve_ivp(rates, (0.0, 0.4), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12).y[0]
+    overrides = {
+        "finger.actuators.servo.motor": {
+            **{"voltage": 7.0, "torque_constant": 0.4, "resistance": 5.0, "maximum_current": 3.0, "inertia": 2e-3},
+            **{"friction": {"coulomb": 0.0, "viscous": 0.01}, "encoder": {"range": [-60.0, 9.0]}},
+        },
+        "finger.actuators.servo.position_loop": {"proportional": 3.0, "period": 0.001},
+    }
+    found = []
+    for inputs in ({"spool_angle.servo": "goal"}, {"spool_angle.servo": "goal", "supply_voltage.servo": "volts"}):
+        told = {"time": "t", "inputs": inputs, "outputs": {"motor_position.servo": "angle"}}
+        data = {"t": time, "goal": np.full_like(time, -50.0), "volts": supply, "angle": angle}
+        result = fp.identify(
+            "wound",
+            parameters={motor + "torque_constant": (0.2, 0.9)},
+            recordings={"free": told},
+            data={"free": data},
+            overrides=overrides,
+            starts=1,
+            profiles=False,
+        )
+        found.append(float(result.estimate[0]))
+    assert found[1] == pytest.approx(0.5, rel=5e-3) and abs(found[0] - 0.5) > 0.05, found
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "what", "bounds", "said"),
+    [
+        ("supply_voltage", 4.5, "scale", (0.9, 1.2), r"scale = 1\.2 .*supply_voltage\.servo reaches .* beyond 0 V to"),
+        ("supply_voltage", 0.3, "offset", (-0.5, 0.5), r"offset = -0\.5 .*supply_voltage\.servo reaches from -0\.2"),
+        ("motor_voltage", 4.5, "scale", (0.9, 1.2), r"scale = 1\.2 controller\.motor_voltage\.servo reaches 5\.4 V"),
+        ("spool_angle", 2.0, "scale", (0.9, 1e5), r"scale = 100000 finger.*encoder\.range the motion takes the spool"),
+    ],
+)
+def test_bounds_of_a_column_that_its_motor_cannot_follow_are_refused_before_the_search(
+    column, values, what, bounds, said
+):
+    time = np.arange(0.0, 1.0, 0.1)
+    inputs = {f"{column}.servo": "in"} | ({"spool_angle.servo": "goal"} if column == "supply_voltage" else {})
+    told = {"time": "t", "inputs": inputs, "outputs": {"motor_position.servo": "angle"}}
+    data = {"one": {"t": time, "goal": time, "in": np.full_like(time, values), "angle": time}}
+    parameters = {f"recordings.one.{column}.servo.{what}": bounds}
+    with pytest.raises(
+        fp.InputError, match=rf"^identify\.recordings\.one\.parameters\.{column}\.servo\..*with .*{said}"
+    ):
+        fp.identify("wound", parameters=parameters, recordings={"one": told}, data=data)
 
 
 PWM = {

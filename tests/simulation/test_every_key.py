@@ -9,7 +9,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.position_drive import PositionDrives, given_voltages, loop_period, spool_goals, wound_spools
+from finger_pin.control.position_drive import PositionDrives, loop_period, spool_goals, voltage_signals, wound_spools
 from finger_pin.description.loading import read_scenario, to_toml
 from finger_pin.description.tables import list_scenarios
 from finger_pin.exceptions import InputError
@@ -48,6 +48,7 @@ HAND = """
 
 _SINE = ("amplitude", "frequency", "phase")
 _WAVE = {"offset": 0.05, "amplitude": 0.2, "frequency": 20.0, "phase": 0.3}
+_LOOP = {f"controller.{name}.servo.{key}": 0.3 for name in ("spool_angle", "supply_voltage") for key in _SINE}
 
 
 def imported():
@@ -64,7 +65,7 @@ def imported():
 # `pour` is `hand` with more of the objects of `grasp`, and takes as long as all others together.
 SCENARIOS = {name: partial(fp.load_scenario, name) for name in list_scenarios() if name != "pour"} | {
     "imported": imported,
-    "wound": partial(fp.load_scenario, "wound", {f"controller.spool_angle.servo.{key}": 0.3 for key in _SINE}),
+    "wound": partial(fp.load_scenario, "wound", _LOOP | {"controller.supply_voltage.servo.offset": 4.0}),
 }
 
 
@@ -151,12 +152,14 @@ class Acts:
     def drives(self, scenario, loop):
         """Yield goals and voltages that are given at the instants, and the loops as they are compiled."""
         start, times = scenario.simulation.start_time, self.times
-        wound, given = (each(scenario, loop.finger) for each in (wound_spools, given_voltages))
+        wound = wound_spools(scenario, loop.finger)
+        given, supplies = (voltage_signals(scenario, loop.finger, f"{name}_voltage") for name in ("motor", "supply"))
         yield spool_goals(loop.finger, loop.controller, times, loop.reference.at(times), wound, start)
         yield from (signal.later(start).at(times)[0] for signal in given.values())
         # The first samples alone, as the paths of a tree take long for thousands of goals.
         short = FEW * loop_period(loop.finger)
-        made = PositionDrives(loop.finger, loop.controller, loop.reference, short, start, wound, given).compiled
+        planned = loop.finger, loop.controller, loop.reference, short, start, wound, given, supplies
+        made = PositionDrives(*planned).compiled
         names = ("goals", "prescribed_voltages", "gains", "period", "resolution", "supply")
         yield from (np.asarray(getattr(made, name)) for name in names)
 

@@ -234,7 +234,25 @@ def test_the_voltages_that_a_loop_asked_for_make_the_same_motion_when_they_are_g
     )
 
 
+def test_a_loop_at_its_limit_turns_a_free_motor_in_proportion_to_its_supply():
+    """Free speed V K_t / (K_t^2 + b R), while the cord is slack; V sags from 5 V to 3 V."""
+    motor = {"voltage": 5.0, "torque_constant": 0.4, "resistance": 3.2, "maximum_current": 1.5, "inertia": 2e-4}
+    motor |= {"friction": {"coulomb": 0.0, "viscous": 0.02}, "encoder": {"range": [-60.0, 9.0]}}
+    sag = {"kind": "ramp", "time": 0.3, "duration": 0.1, "offset": 5.0, "height": -2.0}
+    given = {"spool_angle": {"servo": {"offset": -50.0}}, "supply_voltage": {"servo": sag}}
+    overrides = {"simulation.duration": 0.6, "simulation.sample_rate": 1000.0}
+    result = fp.simulate(scenario(given, {**SERVO, "motor": motor}, overrides))
+    free = -0.4 / (0.4**2 + 0.02 * 3.2)
+    np.testing.assert_allclose(result.motor_velocity.values[[299, 599], 0], [5.0 * free, 3.0 * free], rtol=1e-6)
+    np.testing.assert_allclose(result.motor_voltage.values[[299, 350, 599], 0], [-5.0, -4.0, -3.0], atol=1e-9)
+
+
+SUPPLY = {"supply_voltage": {"servo": {"offset": 4.0}}}
 WRONG = {
+    "a supply beyond the motor's": ({"supply_voltage": {"servo": {"offset": 6.0}}}, r"beyond 0 V to .*motor\.voltage"),
+    "a supply below zero": ({"supply_voltage": {"servo": {"offset": -0.1}}}, r"from -0\.1 to -0\.1 V, beyond 0 V"),
+    "a supply beside a voltage": ({**SUPPLY, "motor_voltage": {"servo": {}}}, "no effect: .* in place of the loop"),
+    "a supply of a cord": ({"supply_voltage": {"flexor": {}}}, r"supply_voltage\.flexor: no such motor"),
     "a voltage beyond the supply": ({"motor_voltage": {"servo": {"offset": 6.0}}}, r"reaches 6 V, beyond the supply"),
     "an angle and a voltage": (
         {"motor_voltage": {"servo": {}}, "spool_angle": {"servo": TURN}},
@@ -278,3 +296,5 @@ def test_a_winch_is_refused_beside_a_motor_a_closed_loop_and_tensions():
     servo.pop("position_loop")
     with pytest.raises(InputError, match='must have drive = "position"'):
         scenario({"spool_angle": {"servo": TURN}}, servo)
+    with pytest.raises(InputError, match=r'supply_voltage\.servo: .* must have drive = "position"'):
+        scenario(SUPPLY, servo)

@@ -11,7 +11,7 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.input_ranges import input_ranges, spool_ranges
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.position_drive import SteppedDrives, given_voltages, spool_goals, wound_spools
+from finger_pin.control.position_drive import SteppedDrives, spool_goals, voltage_signals, wound_spools
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
@@ -87,7 +87,8 @@ class Inputs:
         self._scenario, self._loop = scenario, loop
         self._coupling = scenario.coupling(loop.finger.routing)
         self._wound = wound_spools(scenario, loop.finger)
-        self._voltages = given_voltages(scenario, loop.finger)
+        self._voltages = voltage_signals(scenario, loop.finger, "motor_voltage")
+        self._supplies = voltage_signals(scenario, loop.finger, "supply_voltage")
         parts = scenario.parts().values()
         self._damping = np.concatenate([expand(each.controller.damping, len(each.finger.joints)) for each in parts])
 
@@ -170,7 +171,7 @@ class Inputs:
         else:
             command, self._goals = self._planned(time, x, desired)
         if self._drives is not None:
-            command[finger.actuators.voltages] = self._drives.voltages(time, x, self._goals)
+            command[finger.actuators.voltages] = self._drives.voltages(time, x, self._goals, self._supplies)
         for motor, signal in self._voltages.items() if self.kind == SCENARIO else ():
             command[finger.actuators.channels[motor]] = signal.at(time)[0][0]
         self._last = command
