@@ -173,30 +173,41 @@ def spinning_capsule(rng: np.random.Generator) -> Flight:
     )
 
 
-def tumbling_box(rng: np.random.Generator) -> Flight:
-    """Throw a tumbling box up from a floor: its corners reach it at some time."""
+def tumbling(rng: np.random.Generator, shape: str) -> Flight:
+    """Throw a tumbling body up from a floor: it reaches it at some time."""
     sides, spin, surface = 10 ** rng.uniform(-2.3, -1, 3), float(rng.normal() * 10 ** rng.uniform(-1, 2)), _surface(rng)
     velocity = _velocity(rng)
     start = np.array([0.0, 0.0, 0.51 * np.linalg.norm(sides) + 10 ** rng.uniform(-6, 0)])
     up = max(velocity[2], 0.0)
     duration = 1.2 * (up + np.sqrt(up**2 + 2.0 * G * start[2])) / G
-    box = Object(
-        shape="box",
-        sides=tuple(sides),
+    body = Object(
+        shape=shape,
+        **({"sides": tuple(sides)} if shape == "box" else {"semi_axes": tuple(0.5 * sides)}),
         mass=_mass(0.1, np.prod(sides)),
         position=tuple(start),
         velocity=tuple(velocity),
         angular_velocity=(0.0, spin, 0.0),
         surface=surface,
     )
-    corners = 0.5 * sides * np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    floor = Object(shape="half_space", surface=surface)
 
     def gap(q: Array) -> Array:
-        return np.asarray(q[:, 2] + np.min([turned(q[:, 3:7], corner)[:, 2] for corner in corners], axis=0))
+        # How far each half axis goes down; of a box their sum, of an ellipsoid the square root of their squares' sum.
+        down = np.stack([turned(q[:, 3:7], axis)[:, 2] for axis in np.diag(0.5 * sides)])
+        return np.asarray(q[:, 2] - np.linalg.norm(down, ord=1 if shape == "box" else 2, axis=0))
 
-    floor = Object(shape="half_space", surface=surface)
     exact = lambda t: pose(thrown(t, start, velocity, G), spin * t)  # noqa: E731
-    return Flight({"floor": floor, "box": box}, duration, gap, exact, G)
+    return Flight({"floor": floor, "body": body}, duration, gap, exact, G)
+
+
+def tumbling_box(rng: np.random.Generator) -> Flight:
+    """Throw a tumbling box up from a floor."""
+    return tumbling(rng, "box")
+
+
+def tumbling_ellipsoid(rng: np.random.Generator) -> Flight:
+    """Throw a tumbling ellipsoid up from a floor."""
+    return tumbling(rng, "ellipsoid")
 
 
 def paddle(rng: np.random.Generator) -> Flight:
@@ -240,12 +251,15 @@ def sweeping_link(rng: np.random.Generator) -> Flight:
 
 
 _THIN, _TABLE, _GROUND = 5e-3, 0.2, Object(shape="half_space")
-FALLING, FALLEN_ON = ("sphere", "box", "cylinder", "capsule"), ("half_space", "sphere", "box", "cylinder", "capsule")
+FALLING = ("sphere", "box", "cylinder", "capsule", "ellipsoid")
+FALLEN_ON = ("half_space", *FALLING)
 
 
 def _sizes(rng: np.random.Generator, shape: str) -> dict[str, object]:
     if shape == "box":
         return {"sides": tuple(rng.uniform(0.015, 0.05, 3))}
+    if shape == "ellipsoid":
+        return {"semi_axes": tuple(rng.uniform(0.008, 0.025, 3))}
     length = {"length": rng.uniform(0.01, 0.06)} if shape in ("cylinder", "capsule") else {}
     return {"radius": rng.uniform(0.006, 0.02), **length} if shape != "half_space" else {}
 
@@ -283,4 +297,4 @@ def _reach(body: Object) -> float:
 
 
 #: Each makes a flight of a generator of random numbers.
-FAMILIES = (ball_and_plate, two_balls, spinning_capsule, tumbling_box, paddle, sweeping_link)
+FAMILIES = (ball_and_plate, two_balls, spinning_capsule, tumbling_box, tumbling_ellipsoid, paddle, sweeping_link)

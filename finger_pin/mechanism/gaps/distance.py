@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.mechanism.gaps.ellipsoid import sliding
+from finger_pin.mechanism.gaps.ellipsoid import is_inside, sliding
 from finger_pin.mechanism.gaps.nearest import EPSILON, INSIDE, SignedDistance, lowered, nearest
 from finger_pin.mechanism.gaps.prism import GAP, GapParameters, deepest, offset, surface
 from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_of, turned
@@ -56,6 +56,8 @@ def _nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
     square = (x * x + y_ * y_ + z * z) / (p[GAP.disc] * p[GAP.disc]) if p[GAP.disc] > 0.0 else 1.0
     far = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     size, far = (1.0, far) if far >= blunt else (far / blunt, 0.5 * (far * far / blunt + blunt))
+    if p[GAP.third] > 0.0 and is_inside(y, p[GAP.third], (x, y_, z)):
+        size, far = 0.0, 0.5 * blunt
     return far + lowered(y, p, s, square), size, _sinking(w, p)[3], s, x, y_, z
 
 
@@ -195,13 +197,14 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
     if flat > 0.0:
         # What the point minimises goes as |w|^2.
         u_, v_, w_, xx, xy, yy, zz = offset(x_, y_, z_, p, sunk)
+        flat = flat if size > 0.0 else 0.0
         n, h = (flat * u_, flat * v_, flat * w_), (flat * xx, flat * xy, 0.0, flat * yy, 0.0, flat * zz)
     back = p[GAP.radius] + 0.5 * (level - p[GAP.rounding] - p[GAP.radius])
     length = np.sqrt(a * a + b * b + c * c)
     whole = p[GAP.third] > 0.0
     shorter = 1.0 / length if length > 0.0 and not whole else 0.0
     axis = (a * shorter, b * shorter, c * shorter)
-    along, radial, across, inverse = sliding(y, p[GAP.third], r, n, h) if whole else _moving(y, p, s, r, n, h)
+    along, radial, across, inverse = sliding(y, p[GAP.third], n, h) if whole else _moving(y, p, s, r, n, h)
     leaning = dot(axis, n) * shorter
     # The motion of the normal at one place, by c.
     sinking, turning, spread = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0

@@ -42,24 +42,24 @@ def on_ball(h: Any, start: Any) -> Any:
     return shorter * u[0], shorter * u[1], shorter * u[2]
 
 
-def sliding(y: Any, third: float, r: Any, n: Any, h: Any) -> Any:
-    """Return the directions in which the nearest point, r from P_0, slides on an ellipsoid, and its stiffness inverted.
+def is_inside(y: Any, third: float, r: Any) -> Any:
+    """Return whether a point r from P_0 lies inside: there the bodies have more than a point in common."""
+    f, g, e = semi_axes(y, third)
+    return size((dot(r, f) / dot(f, f), dot(r, g) / dot(g, g), dot(r, e) / dot(e, e))) < 1.0 - _ON_SURFACE
+
+
+def sliding(y: Any, third: float, n: Any, h: Any) -> Any:
+    """Return the directions in which the nearest point slides on an ellipsoid, and its stiffness inverted.
 
     With the slope n and the Hessian H of what it minimises, |M^T n| u = -M^T n there. So it slides along M t for both t
-    across u, against t^T M^T H M t + |M^T n|; the third direction is zero. A point inside is free to go anywhere.
+    across u, against t^T M^T H M t + |M^T n|. The third direction is zero; so are all where there is no slope.
     """
     f, g, e = semi_axes(y, third)
     zero = (0.0, 0.0, 0.0)
-    inside = size((dot(r, f) / dot(f, f), dot(r, g) / dot(g, g), dot(r, e) / dot(e, e)))
     push = (dot(f, n), dot(g, n), dot(e, n))
     held = size(push)
-    if inside < 1.0 - _ON_SURFACE or held == 0.0:
-        by_f, by_g, by_e = turned(h, f[0], f[1], f[2]), turned(h, g[0], g[1], g[2]), turned(h, e[0], e[1], e[2])
-        ff, gg, ee = dot(f, by_f), dot(g, by_g), dot(e, by_e)
-        k = _LEAST * (ff + gg + ee)
-        if k == 0.0:
-            return zero, zero, zero, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-        return e, f, g, inverse_of(ff + k, dot(f, by_g), dot(f, by_e), gg + k, dot(g, by_e), ee + k)
+    if held == 0.0:
+        return zero, zero, zero, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     s, t = across(-push[0] / held, -push[1] / held, -push[2] / held)
     one, two = drawn(f, g, e, s), drawn(f, g, e, t)
     by_one, by_two = turned(h, one[0], one[1], one[2]), turned(h, two[0], two[1], two[2])
