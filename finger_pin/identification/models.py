@@ -60,9 +60,7 @@ def _check_corrections(model: RecordingModel, bounds: Mapping[str, tuple[float, 
                 model.check({key_in(key, name): value for key, value in corrected.items()})
             except InputError as error:
                 where = " and ".join(f"{bare(key)} = {value:g}" for key, value in corrected.items())
-                raise InputError(
-                    entry_of(keys[0]), f"with {where} {error.entry} {error.allowed}", error.value
-                ) from None
+                raise InputError(entry_of(keys[0]), f"with {where}: {error}") from None
 
 
 def held_out_rows(recording: Recording) -> NDArray[np.bool_]:

@@ -1,12 +1,15 @@
-"""Settled postures: equilibria of a finger under given tensions."""
+"""Settled postures: equilibria of a finger under tensions, lengths that are wound in, or goals of its servos."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
 from finger_pin.analysis import equilibrium, steady_state
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.parameters import Winch
+from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import as_inputs
 from finger_pin.mechanism.finger import Finger
@@ -20,14 +23,55 @@ _LONGEST = 0.3
 _OF_MASSES = 1e-3
 
 
+def resting_finger(finger: FingerDescription, wound: Collection[str]) -> FingerDescription:
+    """Return a finger with ideal sources and winches in place of its motors, as they are at rest without friction.
+
+    A position drive holds by its error e: its torque K_t V k_p e / R makes it a spring in series with its cord, T / K +
+    r^2 T / (K_t V k_p / R). With an integral it stands at its goal. No motor holds more than K_t min(V / R, I_max).
+
+    Args:
+        finger: Whose motors wind one cord each where they are given goals.
+        wound: Names of the tendons that these pull; of all others the tension is known.
+    """
+    tendons = dict(finger.tendons)
+    for key, actuator in finger.actuators.items():
+        name, motor, radius = actuator.tendons[0], actuator.motor, float(actuator.radii[0])
+        constant, resistance, _ = motor.constants
+        most = constant * min(motor.voltage / resistance, motor.maximum_current) / radius
+        if name in wound:
+            stiffness, loop = _cord(finger, key)[0], actuator.position_loop
+            by_error = constant * motor.voltage / resistance * loop.proportional
+            if not loop.integral:
+                stiffness *= by_error / (by_error + stiffness * radius**2)
+            tendons[name] = tendons[name].updated(winch=Winch().updated(stiffness=stiffness), maximum_tension=most)
+        elif actuator.drive == "tension":
+            tendons[name] = tendons[name].updated(maximum_tension=most)
+    return finger.updated(actuators={}, tendons=tendons)
+
+
+def wound_length(finger: FingerDescription, motor: str, goal: Array, angle: bool) -> Array:
+    """Return what the winch in place of a motor winds in, m, for goals of its spool, rad, or of its cord, m."""
+    stiffness, pretension = _cord(finger, motor)
+    return np.asarray((finger.actuators[motor].radii[0] if angle else 1.0) * goal + pretension / stiffness)
+
+
+def _cord(finger: FingerDescription, motor: str) -> tuple[float, float]:
+    """Return the stiffness, N/m, and the pretension, N, of a motor's only cord."""
+    actuator = finger.actuators[motor]
+    rigidity, length, pretension = (
+        float(expand(each, 1)[0]) for each in (actuator.tendon_rigidity, actuator.tendon_length, actuator.pretension)
+    )
+    return rigidity / length, pretension
+
+
 def settled_posture(finger: Finger, load: Array, speed: float | None, near: Array, force: Array) -> Array:
     """Return the stable posture at rest near another, shape (n,), rad; nan if there is none.
 
     Newton's method is tried first; the descent of `equilibrium` is some five times slower, and finds it from anywhere.
 
     Args:
-        finger: With ideal sources of tension.
-        load: Tensions at the entrances of the canals, shape (a,), N.
+        finger: With ideal sources of tension and winches.
+        load: Tensions at the entrances of the canals, N, or what winches wind in, m, shape (a,).
         speed: Of the tendons as they came to rest, m/s, positive as they were drawn in: their friction has its sign.
             None: there is no friction any more.
         near: Shape (n,), rad.

@@ -7,19 +7,20 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from finger_pin.analysis import steady_state
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import At, Recording, check_pulling
 from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
-from finger_pin.identification.settled import settled_posture
+from finger_pin.identification.settled import resting_finger, settled_posture, wound_length
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
 # Change of a number that slopes are taken by, of its size or its range.
 _CHANGE = 1e-5
-_POSTURE, _WINDING = "joint_position", "tendon_winding"
+_POSTURE, _TENSIONS, _GOALS = "joint_position", ("tendon_command", "spool_tension"), ("spool_angle", "tendon_winding")
 _OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current", _POSTURE)
 
 
@@ -28,8 +29,8 @@ class SteadyReadings:
 
     Attributes:
         recording: The recording.
-        load: The pull at the entrance of the canals, N, or of wound tendons the length, m, shape (m, a).
-        wound: Names of the tendons that a winch winds.
+        load: The pull at the entrance of the canals, N, or of wound tendons the angle or length, shape (m, a).
+        wound: Tendons that a winch or a motor winds, by input.
         scenario: Whose states they are.
         nuisance_parameters: Nothing is to be found for them alone.
     """
@@ -41,12 +42,13 @@ class SteadyReadings:
             InputError: If one names nothing that the scenario has, if the tension of a tendon is missing, if all of
                 one are negative, or if no one direction of sliding tells where joints come to rest.
         """
-        self.wound = tuple(name.partition(".")[2] for name in recording.inputs if name.startswith(f"{_WINDING}."))
-        scenario = _with_windings(scenario, self.wound)
-        self.recording, self.scenario, finger = recording, scenario, scenario.finger
-        self._replacing = replacing
+        self.recording, self._entry = recording, f"identify.recordings.{recording.name}"
+        goals = [name for name in recording.inputs if name.partition(".")[0] in _GOALS]
+        self._motor = {tendon: motor for motor, each in scenario.finger.actuators.items() for tendon in each.tendons}
+        self.wound = {name: self._wound_tendon(scenario.finger, name) for name in goals}
+        self.scenario = _with_windings(scenario, [each for each in self.wound.values() if each not in self._motor])
+        finger, self._replacing = self.scenario.finger, replacing
         self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
-        self._entry = f"identify.recordings.{recording.name}"
         rows = len(recording.speed)
         joints, tendons = list(finger.joints), list(finger.actuated_names)
         self._inputs: list[tuple[str, Array, int]] = []
@@ -54,21 +56,7 @@ class SteadyReadings:
         if scenario.simulation.initial is not None:
             for joint, angle in scenario.simulation.initial.position.items():
                 self._position[:, joints.index(joint)] = angle
-        for name, values in recording.inputs.items():
-            variable, _, label = name.partition(".")
-            if variable in ("tendon_command", "spool_tension", _WINDING):
-                if variable != _WINDING:
-                    check_pulling(f"{self._entry}.inputs.{name}", values)
-                place = self._place(f"inputs.{name}", label, tendons)
-                self.load[:, place] = values
-                self._inputs.append((name, self.load, place))
-            elif variable == "joint_position":
-                place = self._place(f"inputs.{name}", label, joints)
-                self._position[:, place] = values
-                self._inputs.append((name, self._position, place))
-            else:
-                allowed = "a steady state is given tendon_command, spool_tension, tendon_winding and joint_position"
-                raise InputError(f"{self._entry}.inputs.{name}", allowed)
+        self._read_inputs(joints, tendons)
         places = {"motor_current": list(finger.actuators), _POSTURE: joints}
         self._outputs = []
         for name in recording.outputs:
@@ -82,10 +70,33 @@ class SteadyReadings:
                 self._position[:, place] = np.where(np.isfinite(recorded), recorded, self._position[:, place])
         if self.wound and (recording.settings.speed is not None or {each for each, _ in self._outputs} != {_POSTURE}):
             allowed = "tells postures without friction: joint_position is compared, without a speed"
-            raise InputError(f"{self._entry}.inputs.{_WINDING}.{self.wound[0]}", allowed)
+            raise InputError(f"{self._entry}.inputs.{goals[0]}", allowed)
         self._settles = any(variable == _POSTURE for variable, _ in self._outputs)
         if self._settles:
             self._check_direction()
+            self._check_drives()
+            self.check({})
+
+    def _read_inputs(self, joints: Sequence[str], tendons: Sequence[str]) -> None:
+        """Put every input in its column of loads or angles."""
+        for name, values in self.recording.inputs.items():
+            variable, _, label = name.partition(".")
+            if variable in (*_TENSIONS, *_GOALS):
+                if variable in _TENSIONS:
+                    check_pulling(f"{self._entry}.inputs.{name}", values)
+                place = self._place(f"inputs.{name}", self.wound.get(name, label), tendons)
+                other = next((each for each, group, k in self._inputs if group is self.load and k == place), None)
+                if other is not None:
+                    raise InputError(f"{self._entry}.inputs.{name}", f"is of the same cord as {other}: leave one out")
+                self.load[:, place] = values
+                self._inputs.append((name, self.load, place))
+            elif variable == "joint_position":
+                place = self._place(f"inputs.{name}", label, joints)
+                self._position[:, place] = values
+                self._inputs.append((name, self._position, place))
+            else:
+                allowed = f"a steady state is given {', '.join([*_TENSIONS, *_GOALS])} and {_POSTURE}"
+                raise InputError(f"{self._entry}.inputs.{name}", allowed)
 
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
@@ -135,7 +146,18 @@ class SteadyReadings:
         return ""
 
     def check(self, nuisance: Mapping[str, float]) -> None:
-        """Do nothing: readings are computed with any offsets and scales."""
+        """Raise the error of goals that a motor's encoder cannot be told."""
+        load, _ = self._corrected(nuisance)
+        for name, tendon in self.wound.items():
+            if tendon not in self._motor:
+                continue
+            motor, place = self._motor[tendon], self.scenario.finger.actuated_names.index(tendon)
+            actuator = self.scenario.finger.actuators[motor]
+            angle, encoder = load[:, place], actuator.motor.encoder
+            angle = angle if name.startswith("spool_angle.") else angle / actuator.radii[0]
+            if encoder is not None and not encoder.range[0] <= angle.min() <= angle.max() <= encoder.range[1]:
+                allowed = f"{self._entry}.inputs.{name} takes the spool from {angle.min():.4g} to {angle.max():.4g} rad"
+                raise InputError(f"finger.actuators.{motor}.motor.encoder.range", allowed, list(encoder.range))
 
     def tune(self, factor: float) -> None:
         """Do nothing: a closed form has no errors."""
@@ -146,7 +168,7 @@ class SteadyReadings:
         for name, group, place in self._inputs:
             scale = nuisance_value(nuisance, self.recording.name, name, "scale", 1.0)
             values = scale * group[:, place] + nuisance_value(nuisance, self.recording.name, name, "offset")
-            if group is self.load and not name.startswith(f"{_WINDING}."):
+            if group is self.load and name not in self.wound:
                 # A tendon only pulls: what a wrong zero takes below it is a slack one.
                 load[:, place] = np.maximum(values, 0.0)
             else:
@@ -154,14 +176,22 @@ class SteadyReadings:
         return load, position
 
     def _finger(self, scenario: Scenario) -> Finger:
+        """Return the finger at rest, with sources and winches in place of motors."""
+        finger, objects = scenario.finger, scenario.environment.objects
+        resting = resting_finger(finger, self.wound.values()) if finger.actuators else finger
         if self._replacing is not None:
-            return with_parameters_of(self._replacing, self.scenario, scenario)
-        return Finger(scenario.finger, objects=scenario.environment.objects)
+            replacing = with_parameters_of(self._replacing, self.scenario, scenario)
+            return replacing.changed(resting, objects) if finger.actuators else replacing
+        return Finger(resting, objects=objects)
 
     def _settled(self, scenario: Scenario, load: Array) -> Array:
         """Return the posture at rest of every row nearest to the recorded one, shape (m, n), rad."""
         finger, forces = self._finger(scenario), [each.fingertip_force for each in scenario.environments().values()]
-        force = np.array(forces if len(forces) > 1 else forces[0])
+        force, load = np.array(forces if len(forces) > 1 else forces[0]), load.copy()
+        for name, tendon in self.wound.items():
+            if tendon in self._motor:
+                place, angle = scenario.finger.actuated_names.index(tendon), name.startswith("spool_angle.")
+                load[:, place] = wound_length(scenario.finger, self._motor[tendon], load[:, place], angle)
         speeds = [None] * len(load) if self.recording.settings.speed is None else self.recording.speed.tolist()
         rows = zip(load, speeds, self._position, strict=True)
         return np.array([settled_posture(finger, each, speed, near, force) for each, speed, near in rows])
@@ -186,6 +216,40 @@ class SteadyReadings:
                 f"friction (shaken, or the mean of drawn in and let out), or set that friction to 0"
             )
             raise InputError(f"{self._entry}.speed", allowed)
+
+    def _check_drives(self) -> None:
+        """Refuse motors in position drive that are given neither a goal nor the tension of their cord."""
+        tensions = {each.partition(".")[2] for each in self.recording.inputs if each.startswith("spool_tension.")}
+        for motor, actuator in self.scenario.finger.actuators.items():
+            tendon = actuator.tendons[0]
+            if actuator.drive == "position" and not {*actuator.tendons} <= {*self.wound.values()} | tensions:
+                allowed = (
+                    f"lack what {motor} in position drive rests at: spool_angle.{motor}, or spool_tension.{tendon}"
+                )
+                raise InputError(f"{self._entry}.inputs", allowed)
+
+    def _wound_tendon(self, finger: FingerDescription, name: str) -> str:
+        """Return the tendon that an input winds; refuse a motor whose goal does not tell where it rests."""
+        variable, _, label = name.partition(".")
+        if variable == "spool_angle":
+            self._place(f"inputs.{name}", label, list(finger.actuators))
+        motor = label if variable == "spool_angle" else self._motor.get(label)
+        if motor is None:
+            return label
+        actuator = finger.actuators[motor]
+        reasons = {
+            f'drive = "{actuator.drive}"': actuator.drive != "position",
+            "several cords": len(actuator.tendons) > 1,
+            "motor.friction.backlash": actuator.motor.friction.backlash > 0.0,
+            "position_loop.torque_off": actuator.position_loop.torque_off is not None,
+        }
+        unsupported = " and ".join(what for what, there in reasons.items() if there)
+        if unsupported:
+            allowed = (
+                f'tells no rest: finger.actuators.{motor} must have drive = "position", one cord, gears without play'
+            )
+            raise InputError(f"{self._entry}.inputs.{name}", f"{allowed}, and no torque_off; it has {unsupported}")
+        return actuator.tendons[0]
 
     def _place(self, where: str, label: str, names: Sequence[str]) -> int:
         if label not in names:

@@ -116,10 +116,22 @@ def test_a_motor_is_found_under_a_supply_that_sags_beside_its_goal():
 @pytest.mark.parametrize(
     ("column", "values", "what", "bounds", "said"),
     [
-        ("supply_voltage", 4.5, "scale", (0.9, 1.2), r"scale = 1\.2 .*supply_voltage\.servo reaches .* beyond 0 V to"),
-        ("supply_voltage", 0.3, "offset", (-0.5, 0.5), r"offset = -0\.5 .*supply_voltage\.servo reaches from -0\.2"),
-        ("motor_voltage", 4.5, "scale", (0.9, 1.2), r"scale = 1\.2 controller\.motor_voltage\.servo reaches 5\.4 V"),
-        ("spool_angle", 2.0, "scale", (0.9, 1e5), r"scale = 100000 finger.*encoder\.range the motion takes the spool"),
+        (
+            "supply_voltage",
+            4.5,
+            "scale",
+            (0.9, 1.2),
+            r"scale = 1\.2: .*supply_voltage\.servo.* reaches .* beyond 0 V to",
+        ),
+        ("supply_voltage", 0.3, "offset", (-0.5, 0.5), r"offset = -0\.5: .*supply_voltage\.servo.* reaches from -0\.2"),
+        ("motor_voltage", 4.5, "scale", (0.9, 1.2), r"scale = 1\.2: controller\.motor_voltage\.servo.* reaches 5\.4 V"),
+        (
+            "spool_angle",
+            2.0,
+            "scale",
+            (0.9, 1e5),
+            r"scale = 100000: finger.*encoder\.range.* the motion takes the spool",
+        ),
     ],
 )
 def test_bounds_of_a_column_that_its_motor_cannot_follow_are_refused_before_the_search(

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.description.recordings.bench import RecordingSettings
+from finger_pin.description.validation import validate
+from finger_pin.identification.recordings import read_recording
 from finger_pin.identification.settled import settled_posture
+from finger_pin.identification.steady_data import SteadyReadings
 
 THREE = """
 [finger]
@@ -123,3 +127,95 @@ def test_springs_come_from_what_a_winch_winds_as_its_cord_shares_it(tmp_path):
     for change in ({"speed": 0.1}, {"outputs": {"tendon_tension.flexor": "w"}, "speed": 0.1}):
         with pytest.raises(fp.InputError, match="tells postures without friction"):
             fp.identify(bench, recordings={"settled": recording | change}, **given)
+
+
+MOTOR = {
+    **{"voltage": 5.0, "torque_constant": 0.4, "resistance": 3.2, "maximum_current": 1.5, "inertia": 2e-4},
+    **{"friction": {"coulomb": 0.0, "viscous": 2e-3}, "encoder": {"range": [-3.0, 3.0]}},
+}
+SERVO = {
+    **{"motor": MOTOR, "tendons": ["flexor"], "spool_radius": 0.008, "drive": "position", "pretension": 2.0},
+    **{"tendon_rigidity": 1200.0, "tendon_length": 0.3, "position_loop": {"proportional": 2.3}},
+}
+FREE = {
+    **{f"finger.joints.{name}.spring": {"stiffness": SPRING[name], "damping": 0.01} for name in RADIUS},
+    **{"finger.joint_friction": {"coulomb": 0.0, "stiction": 0.0}, "finger.tendon_friction.coulomb": 0.0},
+    "finger.tendon_friction.viscous": 0.0,
+}
+POSTURE = {f"joint_position.{name}": {"column": name, "unit": "rad"} for name in RADIUS}
+
+
+def readings(path, servo, inputs, values=(0.5, 1.0), speed=None, **change):
+    """A servo on the cord of three joints, and settled postures of it."""
+    path.write_text(THREE.replace("minimum_tension = 0.0", ""))
+    made = {key: value for key, value in (SERVO | servo).items() if value is not None}
+    scenario = fp.load_scenario(str(path), {"finger.actuators": {"servo": made}} | FREE)
+    told = {"kind": "steady", "inputs": {name: {"column": "in"} | change for name in inputs}, "outputs": POSTURE}
+    data = {"in": values, **{name: np.full(len(values), 0.1) for name in RADIUS}}
+    settings = validate(RecordingSettings, told | {"speed": speed}, ("identify", "recordings", "one"))
+    return SteadyReadings(read_recording("one", settings, data), scenario), scenario
+
+
+@pytest.mark.parametrize(
+    ("loop", "compliance", "current"),
+    [
+        ({"proportional": 2.3, "derivative": 0.01}, 0.008**2 / (0.4 * 5.0 / 3.2 * 2.3), 1.5),
+        ({"proportional": 0.3}, 0.008**2 / (0.4 * 5.0 / 3.2 * 0.3), 1.5),
+        ({"proportional": 2.3, "integral": 20.0}, 0.0, 1.5),
+        ({"proportional": 2.3, "integral": 20.0}, 0.0, 0.1),
+    ],
+)
+def test_goals_of_a_servo_tell_the_posture_at_which_its_loop_comes_to_rest(tmp_path, loop, compliance, current):
+    """T (1 / K + r^2 R / (K_t V k_p) + sum r_j^2 / k_j) = r goal + f0 / K, up to K_t I_max / r; and as a run ends."""
+    servo, goal = {"position_loop": loop, "motor": MOTOR | {"maximum_current": current}}, np.array([0.5, 1.0])
+    give = compliance + 1.0 / 4000.0 + sum(RADIUS[name] ** 2 / SPRING[name] for name in RADIUS)
+    tension = np.minimum((0.008 * goal + 2.0 / 4000.0) / give, 0.4 * current / 0.008)
+    expected = [RADIUS[name] * tension / SPRING[name] for name in RADIUS]
+    by_angle, scenario = readings(tmp_path / "three.toml", servo, ["spool_angle.servo"])
+    np.testing.assert_allclose(by_angle.compute(scenario, {}), expected, rtol=1e-6)
+    by_length, _ = readings(tmp_path / "three.toml", {}, ["tendon_winding.flexor"], 0.008 * goal)
+    np.testing.assert_allclose(by_length.compute(scenario, {}), expected, rtol=1e-6)
+    run = {"controller.spool_angle.servo.offset": 1.0, "simulation.duration": 3.0}
+    end = fp.simulate(fp.load_scenario(scenario, run)).joint_position.values[-1]
+    np.testing.assert_allclose(end, np.array(expected)[:, 1], rtol=1e-3)
+
+
+def test_a_motor_in_tension_drive_settles_the_finger_up_to_its_stall_torque(tmp_path):
+    servo = {"drive": "tension", "motor": MOTOR | {"maximum_current": 0.1}, "position_loop": None}
+    made, scenario = readings(tmp_path / "three.toml", servo, ["tendon_command.flexor"], (3.0, 8.0))
+    expected = [RADIUS[name] * np.array([3.0, 0.4 * 0.1 / 0.008]) / SPRING[name] for name in RADIUS]
+    np.testing.assert_allclose(made.compute(scenario, {}), expected, rtol=1e-6)
+
+
+PLAY, OFF = MOTOR | {"friction": {"coulomb": 0.0, "backlash": 0.01}}, {"proportional": 2.3, "torque_off": 1.0}
+GOAL = ["spool_angle.servo"]
+
+
+@pytest.mark.parametrize(
+    ("servo", "inputs", "change", "said"),
+    [
+        (
+            {"drive": "tension", "position_loop": None},
+            GOAL,
+            {},
+            r'servo must have drive = "position".*it has drive = "ten',
+        ),
+        ({"motor": PLAY}, GOAL, {}, "it has motor.friction.backlash"),
+        ({"position_loop": OFF}, GOAL, {}, "it has position_loop.torque_off"),
+        (
+            {},
+            ["tendon_command.flexor"],
+            {},
+            "one.inputs: lack what servo in position drive rests at: spool_angle.servo",
+        ),
+        ({}, [*GOAL, "tendon_winding.flexor"], {}, "is of the same cord as spool_angle.servo: leave one out"),
+        ({}, ["spool_angle.motor"], {}, "there is no motor; there are servo"),
+        ({}, ["motor_voltage.servo"], {}, "is given tendon_command, spool_tension, spool_angle, tendon_winding and"),
+        ({}, GOAL, {"speed": 0.1}, "spool_angle.servo: tells postures without friction"),
+        ({}, GOAL, {"scale": 9.0}, "encoder.range.* takes the spool from 4.5 to 9"),
+    ],
+)
+def test_goals_that_tell_no_rest_are_refused_in_one_line(tmp_path, servo, inputs, change, said):
+    with pytest.raises(fp.InputError, match=said) as refused:
+        readings(tmp_path / "three.toml", servo, inputs, **change)
+    assert "\n" not in str(refused.value)
