@@ -133,7 +133,7 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
     if alone:
         for case in locking:
             ways = sliding[np.all(np.hstack([signs, mattering]) == case, axis=1)]
-            needed = weight + case[:size] * pins.static_drag
+            needed = weight + case[:size] * pins.break_away_drag(case[:size])
             command = loop.greatest_command(positions, case[:size] * static, ways, minimum, needed)
             tension = np.maximum(tension, command)
     else:
@@ -144,7 +144,7 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
                 break
             cases = np.broadcast_to(case[size:], (len(left), len(routing.tendons)))
             weights = np.broadcast_to(case[:size] * static, (len(left), size))
-            needed = weight[left] + case[:size] * pins.static_drag
+            needed = weight[left] + case[:size] * pins.break_away_drag(case[:size])
             command = loop.command_to_move(positions[left], weights, cases, minimum, needed)
             tension[left] = np.maximum(tension[left], command[:, : routing.actuated].max(axis=1))
     return coefficient, tension

@@ -136,7 +136,7 @@ def _within_reach(
     minimum = expand(scenario.controller.minimum_tension, len(finger.routing.tendons))
     weight, drag = (
         np.array([finger.static_torque(each) for each in position]),
-        signs * finger.joint_friction.static_drag,
+        signs * finger.joint_friction.break_away_drag(signs),
     )
 
     def fits(scale: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:

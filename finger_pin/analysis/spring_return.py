@@ -6,8 +6,8 @@ At a posture a joint needs the torque n of springs and weight, along the way in 
     in from   f (r - M^c l) = n + h + d on,   f = f^a exp(-mu_e phi)
     out from  f (r + M^c l) = n - h - d on,   f = f^a exp(mu_e phi)
 
-with the drag d of the joint, and that of the tendon as in `Tendons.in_sliding`. In between it stays. Where r <= M^c l
-no tension moves it in; where n <= h + d it does not come back, however slack the cord.
+with the drag d of the joint in that direction, and that of the tendon as in `Tendons.in_sliding`. In between it stays.
+Where r <= M^c l no tension moves it in; where n <= h + d it does not come back, however slack the cord.
 """
 
 from __future__ import annotations
@@ -99,20 +99,22 @@ def spring_return(finger: FingerLike, cord: str | None = None) -> SpringReturn:
     needed = way * np.array([finger.static_torque(each) for each in positions])[:, crossed]
     pins, springs = finger.joint_friction, finger.springs
     hysteresis = springs.hysteresis * np.abs(springs.torque(positions, np.zeros_like(positions)))
-    dry = (hysteresis + pins.static_drag)[:, crossed]
+    dry, resisting = (
+        (hysteresis + pins.break_away_drag(side * np.sign(routing.coupling[index])))[:, crossed] for side in (1.0, -1.0)
+    )
     loaded = (pins.static * pins.loads[:, index])[crossed]
     inward, outward = (_cord(finger, positions, index, crossed, side) for side in (1.0, -1.0))
     with np.errstate(divide="ignore"):
         delivered = np.where(arms > loaded, np.maximum(needed + dry, 0.0) / np.maximum(arms - loaded, 0.0), np.inf)
         # What the cord's drag leaves when nothing pulls.
-        resisting = dry - outward[1] * (arms + loaded)
-        margins = np.where(resisting > 0.0, needed / resisting, np.where(needed > 0.0, np.inf, 0.0))
+        held = resisting - outward[1] * (arms + loaded)
+        margins = np.where(held > 0.0, needed / held, np.where(needed > 0.0, np.inf, 0.0))
     return SpringReturn(
         cord=routing.tendons[index],
         joints=names,
         positions=positions,
         winding_in=(delivered + inward[1]) / inward[0],
-        letting_out=((needed - dry) / (arms + loaded) + outward[1]) / outward[0],
+        letting_out=((needed - resisting) / (arms + loaded) + outward[1]) / outward[0],
         margins=margins,
     )
 

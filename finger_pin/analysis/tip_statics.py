@@ -179,6 +179,7 @@ class TipStatics:
         ends, pins = np.vstack([command, strand]), finger.joint_friction
         near, far = ends[segments.near], ends[segments.far]
         reaction = pins.kinetic[:, None] * (segments.loads @ strand) + pins.drag[:, None] * one
+        more = (pins.drag * pins.drag_asymmetry)[:, None] * one
         below: list[Array] = []
         if friction is Friction.NONE:
             equal = [far - near, joint]
@@ -187,12 +188,13 @@ class TipStatics:
             ahead, idle = slip.tendons[segments.friction_of][:, None] > 0.0, slip.idle[segments.friction_of][:, None]
             source, target = np.where(ahead, near, far), np.where(ahead, far, near)
             arriving = loss * source - drag * one
-            equal = [np.where(idle, target, target - arriving), joint - slip.joints[:, None] * reaction]
+            sides = slip.joints[:, None]
+            equal = [np.where(idle, target, target - arriving), joint - sides * (reaction + sides * more)]
             below = [arriving[idle[:, 0]]]
         else:
             equal = []
             below = [loss * near - far - drag * one, loss * far - near - drag * one]
-            below += [joint - reaction, -joint - reaction]
+            below += [joint - more - reaction, more - joint - reaction]
         width = a + s + n
         return cls(
             jacobian=finger.rigid_body.jacobian(theta),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.routing import Routing
-from finger_pin.laws.bristle import friction_coefficient
+from finger_pin.laws.bristle import directed_drag, friction_coefficient
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.joints import JointFriction
 from finger_pin.mechanism.tendons import Tendons
@@ -121,6 +121,7 @@ class JointCompensation:
     def unloaded_torque(self, desired_velocity: Array) -> Array:
         """Return the torque without a load, the drag and b v, shape (..., n), N m."""
         drag = self._signed(desired_velocity, self.friction.drag, self.friction.static_drag)
+        drag = directed_drag(drag, self.friction.drag_asymmetry, direction(desired_velocity, self.reversal_speed))
         return self.share * (drag + self.friction.viscous * desired_velocity)
 
     def _signed(self, velocity: Array, kinetic: Array, static: Array) -> Array:

@@ -78,6 +78,12 @@ OF_FINGER = (
         'is for law = "coulomb", or one of your own',
     ),
     Rule(
+        "joint_friction",
+        ("drag_asymmetry",),
+        lambda _, friction: "drag" in friction.model_fields_set,
+        "has no effect without drag",
+    ),
+    Rule(
         "stroke_limiter",
         (),
         lambda finger, _: any(each.limited for each in finger.joints.values()),

@@ -91,6 +91,12 @@ class JointFrictionSettings(Description):
         source="the paper has none",
         doc="Dry friction without load, of seals and bushings; adds to R M^d, and lets go at M^c / M^d times as much.",
     )
+    drag_asymmetry: Annotated[Numbers, reals(-1.0, 1.0)] = quantity(
+        0.0,
+        unit="1",
+        source="the paper has none",
+        doc="a: drag (1 + a) hinders motion to greater angles, drag (1 - a) to smaller ones.",
+    )
     stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] | None = quantity(
         None,
         unit="N m/rad",

@@ -75,6 +75,8 @@ def tree_to_mjcf(
 def _notes(description: FingerDescription) -> str:
     rest = [f"{line};" for line in description.tree.left_out]
     rest += ["servos, their spools and what stretches on the way;"] if description.actuators else []
+    if np.any(description.joint_friction.drag_asymmetry):
+        rest += ["by how much the drag of joints differs by direction (drag_asymmetry): frictionloss is the mean;"]
     rest += (
         ["paths of joints, whose bodies are mocap bodies: lead them by mocap_pos;"] if description.tree.on_paths else []
     )

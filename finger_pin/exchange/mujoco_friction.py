@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from finger_pin.description.finger import FingerDescription
 from finger_pin.exceptions import InputError
 
@@ -30,7 +32,7 @@ TENDON, PIN, MASS, LINK, BRANCH = range(5)
 
 
 def check_friction(description: FingerDescription, at_bends: bool) -> None:
-    """Refuse friction that no step of MuJoCo computes: joints under another law than (9), tendons that rub at bends.
+    """Refuse friction that no step of MuJoCo computes: of joints not by (9) or by direction, of tendons at bends.
 
     Raises:
         InputError: Naming the entry.
@@ -39,6 +41,10 @@ def check_friction(description: FingerDescription, at_bends: bool) -> None:
     if law != "lugre" and any(description.bearings):
         allowed = 'must be "lugre", law (9), the only one that is computed in the step of MuJoCo; or leave out friction'
         raise InputError("finger.joint_friction.law", allowed, law)
+    asymmetry = description.joint_friction.drag_asymmetry
+    if np.any(asymmetry):
+        allowed = "must be 0: friction in the step of MuJoCo is alike in both directions; or leave out friction"
+        raise InputError("finger.joint_friction.drag_asymmetry", allowed, asymmetry)
     if at_bends:
         allowed = 'must be "canal": a tendon of MuJoCo has one tension; or leave out friction'
         raise InputError("finger.tendon_friction.place", allowed, description.tendon_friction.place)

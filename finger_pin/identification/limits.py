@@ -55,7 +55,8 @@ class Limits:
                     at[k] = bound
                     refusals = {self.refusal(each) for each in (at, *self._corners(at, free))}
                     # What is wrong with it alone is the same beside any others.
-                    between = len(refusals) > 1 or any(each and each[0] in keys and each[0] != key for each in refusals)
+                    others = (each[0] in keys and each[0] != key for each in refusals if each)
+                    between = None in refusals or len(refusals) > 1 or any(others)
                     if not (between and anywhere):
                         allowed = error.allowed if error.entry == key else f"with it {error.entry} {error.allowed}"
                         raise InputError(entry_of(parameters[k]), allowed, float(bound)) from None

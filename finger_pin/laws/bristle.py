@@ -13,6 +13,10 @@ as a load falls, energy F^s^2 / (2 sigma_0) would come from nowhere. Of the stat
 passivity under any load demands V' sigma_0 = F^s for stretching and for letting go, so that the stiffness may depend on
 F^s, and on nothing else.
 
+A drag that differs by direction makes the level jump where the speed changes sign, as gears do: there the rate (9a),
+sigma_0 (v - F^s |v| / level), does not depend on the level. F^s slides on at drag (1 + a) one way and -drag (1 - a)
+the other way. Sliding takes F^s^2 |v| / level at any level, so that this too is passive.
+
 Without micro-damping the law is passive whatever happens. With it, while |F^s| <= F^n M^c and F^n is constant, it is
 if b >= sigma_1 (M^c - M^d) / M^d (Barabanov and Ortega, IEEE Trans. Automatic Control 45(4), 2000), and in any case
 as long as |v| <= 4 F^n M (1 + b / sigma_1) / sigma_1, which covers sticking.
@@ -80,6 +84,11 @@ def friction_level(normal: Number, coefficient: Number, floor: Number, drag: Num
     The floor keeps (9a) finite for an unloaded contact.
     """
     return np.maximum(normal * coefficient + drag, floor)
+
+
+def directed_drag(drag: Numeric, asymmetry: Numeric, way: Numeric) -> Numeric:
+    """Return the drag in a direction of motion, 1 or -1: drag (1 + a) or drag (1 - a)."""
+    return drag * (1.0 + asymmetry * way)
 
 
 def bristle_stiffness(stiction: Number, stiffness: Number, hardening: Number) -> Number:
@@ -167,10 +176,11 @@ def steady_force(velocity: Number, normal: Number, coefficient: Number, viscous:
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
-    kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag = p
+    kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag, asymmetry = p
     share = friction_coefficient(row.speed, 0.0, 1.0, stribeck, exponent, row.side)
     coefficient = kinetic + (static - kinetic) * share
-    level = friction_level(row.load, coefficient, floor, drag + (static_drag - drag) * share)
+    unloaded = directed_drag(drag + (static_drag - drag) * share, asymmetry, direction(row.speed, row.side))
+    level = friction_level(row.load, coefficient, floor, unloaded)
     stiffness = bristle_stiffness(row.state, soft, hardening)
     rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
@@ -178,12 +188,14 @@ def _value(row: Row, p: Parameters) -> Numbers:
 
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag = p
+    kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag, asymmetry = p
     _, _, coefficient, level = signals
     stiffness = bristle_stiffness(row.state, soft, hardening)
     by_stiction, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
     by_level = by_level * (level > floor)
-    by_share = row.load * (static - kinetic) + static_drag - drag
+    way = direction(row.speed, row.side)
+    by_share = row.load * (static - kinetic)
+    by_share = by_share + directed_drag(static_drag, asymmetry, way) - directed_drag(drag, asymmetry, way)
     by_speed = by_speed + by_level * by_share * friction_coefficient_slope(
         row.speed, 0.0, 1.0, stribeck, exponent, row.side
     )
@@ -236,7 +248,7 @@ def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numb
 #: Friction between two parts that a load presses together, such as the pin of a joint (17), or a seal without one.
 PIN_FRICTION = Law(
     name="pin friction (9)",
-    parameters=("kinetic", "static", *BRISTLE._fields, "static_drag"),
+    parameters=("kinetic", "static", *BRISTLE._fields, "static_drag", "drag_asymmetry"),
     value=_value,
     slopes=_slopes,
     account=_account,

@@ -12,6 +12,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.parameters import Spring
 from finger_pin.exceptions import InputError
+from finger_pin.laws.bristle import directed_drag
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.spring import HYSTERESIS, JOINT_SPRING, STIFFER, spring_torque
@@ -53,7 +54,8 @@ class JointFriction:
         stribeck_exponent: 1 or 2, shape (n,).
         lag: sigma_1 / sigma_0, shape (n,), s.
         hardening: Growth of sigma_0 with |F^s|, shape (n,), 1/rad; 0 where a stiffness is given.
-        drag: Level without load while sliding, shape (n,), N m.
+        drag: Level without load while sliding, shape (n,), N m; the mean of both directions.
+        drag_asymmetry: a, shape (n,): drag (1 + a) hinders motion to greater angles, drag (1 - a) to smaller ones.
         reversal_speed: v_r of Coulomb's law, shape (n,), rad/s.
         law: The law.
     """
@@ -70,6 +72,7 @@ class JointFriction:
     lag: Array
     hardening: Array
     drag: Array
+    drag_asymmetry: Array
     reversal_speed: Array
     law: Law
 
@@ -81,8 +84,11 @@ class JointFriction:
         shared = bristles(law, numbers)
         shared["viscous"] = bearing * shared["viscous"]
         chosen = joint_law(law.law)
-        if np.any(law.drag) and "drag" not in chosen.parameters:
-            raise InputError("finger.joint_friction.drag", f"has no effect with law = {law.law!r}, which lacks it")
+        for key in ("drag", "drag_asymmetry"):
+            if np.any(numbers[key]) and key not in chosen.parameters:
+                raise InputError(
+                    f"finger.joint_friction.{key}", f"has no effect with law = {law.law!r}, which lacks it"
+                )
         return cls(
             loads=bearing[:, None] * loads,
             bearing=bearing,
@@ -90,6 +96,7 @@ class JointFriction:
             static=numbers[law.break_away_entry],
             **shared,
             drag=bearing * numbers["drag"],
+            drag_asymmetry=numbers["drag_asymmetry"],
             reversal_speed=numbers["reversal_speed"],
             law=chosen,
         )
@@ -99,6 +106,11 @@ class JointFriction:
         """Level without load at which each joint lets go, shape (n,), N m: M^c / M^d of the drag, or all of it."""
         loaded = self.kinetic > 0.0
         return self.drag * np.where(loaded, self.static / np.where(loaded, self.kinetic, 1.0), 1.0)
+
+    def break_away_drag(self, way: Array) -> Array:
+        """Return the level without load at which joints let go in directions of 1 or -1, shape (..., n), N m."""
+        level: Array = directed_drag(self.static_drag, self.drag_asymmetry, way)
+        return level
 
     def rows(
         self,

@@ -192,7 +192,7 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
     limits = [each.limiter for each in limited.values()]
     # Law (9) whose level is its floor.
-    dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0, 0, 0, 0) for each in rubbing.values()]
+    dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()]
     return [
         ("tendon_spring", DEAD_BAND_SPRING, along(sprung), springs),
         ("tendon_limit", STROKE_LIMITER, along(limited), limits),

@@ -52,6 +52,9 @@ def choose(
                 raise InputError(
                     f"{entry}.{pattern}.{key}", 'is for our own step: in MuJoCo\'s there is "lugre"', value
                 )
+            if key == "drag_asymmetry" and value:
+                allowed = "must be 0: friction in the step of MuJoCo is alike in both directions"
+                raise InputError(f"{entry}.{pattern}.{key}", allowed, value)
             if isinstance(value, tuple) and key != "bends":
                 raise InputError(f"{entry}.{pattern}.{key}", "must be one number", list(value))
         for name in matching:

@@ -22,9 +22,14 @@ JACOBIAN = np.array(
 WOUND = 0.11 * np.array([0.3, 0.4 + 0.4, 0.4 + 0.4])
 
 
+# By how much the drag of joints differs by direction.
+MORE = np.array([0.4, -0.25])
+
+
 def planar(drag, pins=0.0, dry=0.0):
     """Return the planar finger without weight."""
     keys = {"gravity": [0.0, 0.0, 0.0], "tendon_friction.drag": drag, "joint_friction.drag": dry}
+    keys |= {"joint_friction.drag_asymmetry": MORE.tolist()}
     keys |= {"joint_friction.coulomb": pins, "joint_friction.stiction": pins}
     return fp.Finger(fp.load_finger("planar", {f"finger.{key}": value for key, value in keys.items()}))
 
@@ -32,7 +37,7 @@ def planar(drag, pins=0.0, dry=0.0):
 @pytest.mark.slow
 @pytest.mark.parametrize(("drag", "dry"), [(0.0, 0.0), (0.5, 0.0), (20.0, 0.0), (0.5, [4e-3, 2e-3])])
 def test_a_finger_that_pushes_has_to_pull_as_much_more_as_drag_takes_and_nothing_where_a_tendon_is_idle(drag, dry):
-    """Strands pull f = J^T E + s dry + l (1, 1, 1), none below zero with the least l.
+    """Strands pull f = J^T E + s dry (1 + a s) + l (1, 1, 1), none below zero with the least l.
 
     f = f^a exp(-mu phi) - d / (1 + mu^d) arrives. The rows of H_c add up to nothing; an idle strand needs no command.
     """
@@ -40,7 +45,7 @@ def test_a_finger_that_pushes_has_to_pull_as_much_more_as_drag_takes_and_nothing
     for angle in np.linspace(0.1, 6.2, 12):
         force = 2.0 * np.array([np.cos(angle), np.sin(angle), 0.0])
         torque = JACOBIAN.T @ force[:2]
-        strands = np.linalg.lstsq(ROWS.T, torque + np.sign(torque) * dry, rcond=None)[0]
+        strands = np.linalg.lstsq(ROWS.T, torque + (np.sign(torque) + MORE) * dry, rcond=None)[0]
         strands -= strands.min()
         command = np.where(strands > 1e-9, (strands + taken) * np.exp(WOUND), 0.0)
         needed = tension_for_force(finger, Q, force, friction=Friction.HINDERING)
@@ -99,14 +104,14 @@ def test_slow_motion_needs_what_drag_takes_besides(drag):
 
 @pytest.mark.parametrize("pins", [0.0, 3e-4])
 def test_slow_motion_needs_what_the_joints_drag_takes_besides(pins):
-    """In every direction s: (H_c^T - M s |H_c|^T) f = s d with the least f >= f0, where no tendon rubs."""
+    """In every direction s: (H_c^T - M s |H_c|^T) f = s d (1 + a s) with the least f >= f0, where no tendon rubs."""
     least, dry, worst = 1.0, np.array([6e-3, 2e-3]), 0.0
     finger = planar(0.0, pins, dry.tolist())
     finger = fp.Finger(finger.description.updated(tendon_friction={"coulomb": 0.0}))
     for signs in product((1.0, -1.0), repeat=2):
         balance = ROWS.T - pins * np.array(signs)[:, None] * (ROWS.T != 0.0)
         kernel = null_space(balance)[:, 0]
-        kernel, base = kernel * np.sign(kernel[0]), np.linalg.lstsq(balance, signs * dry, rcond=None)[0]
+        kernel, base = kernel * np.sign(kernel[0]), np.linalg.lstsq(balance, (signs + MORE) * dry, rcond=None)[0]
         worst = max(worst, (base + kernel * np.max((least - base) / kernel)).max())
     assert self_locking_map(finger, samples=2, minimum_tension=least).tension.max() == pytest.approx(worst, rel=1e-6)
 

@@ -55,3 +55,20 @@ def test_ranges_friction_shapes_and_joints_that_follow_are_written_and_the_rest_
     capsule = root.findall("link[@name='a']/collision")
     assert [next(iter(each.find("geometry"))).tag for each in capsule] == ["cylinder", "sphere", "sphere"]
     assert root.find("link[@name='b']/collision/geometry/box").get("size") == "0.02 0.01 0.008"
+
+
+def test_drag_that_differs_by_direction_is_written_as_its_mean_and_named():
+    from finger_pin.mujoco import add_friction
+
+    text = """<mujoco><worldbody><body name="a"><joint name="a"/><geom size="0.01"/></body></worldbody></mujoco>"""
+    finger = fp.from_mujoco(mujoco.MjModel.from_xml_string(text)).updated(
+        joint_friction={"drag": 0.004, "drag_asymmetry": 0.3}
+    )
+    urdf, mjcf = fp.to_urdf(finger), fp.to_mjcf(finger)
+    assert ElementTree.fromstring(urdf).find("joint[@name='a']/dynamics").get("friction") == "0.004"
+    assert float(ElementTree.fromstring(mjcf).find(".//joint[@name='a']").get("frictionloss")) == 0.004
+    assert "drag_asymmetry" in urdf and "drag_asymmetry" in mjcf
+    spec = mujoco.MjSpec.from_string(mjcf)
+    for choice in ({"of": finger}, {"joints": {"*": {"drag": 0.004, "drag_asymmetry": 0.3}}}):
+        with pytest.raises(fp.InputError, match=r"drag_asymmetry = 0\.3: must be 0"):
+            add_friction(spec, **choice)

@@ -276,8 +276,15 @@ def test_a_hand_has_the_inertia_the_tips_and_the_tendons_that_pinocchio_computes
     np.testing.assert_allclose(lengths, hand.routing.actuated_coupling @ q, atol=1e-15)
 
 
-@pytest.mark.parametrize("law", ["dahl", "coulomb"])
-def test_a_law_that_mujocos_step_does_not_have_is_not_written_as_another(law):
-    finger = fp.load_finger("planar", {"finger.joint_friction.law": law})
-    with pytest.raises(InputError, match=r"finger.joint_friction.law = .*must be \"lugre\", law \(9\)"):
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"law": "dahl"}, r'law = "dahl": must be "lugre", law \(9\)'),
+        ({"law": "coulomb"}, r'law = "coulomb": must be "lugre", law \(9\)'),
+        ({"drag": 1e-3, "drag_asymmetry": [0.0, 0.2]}, "drag_asymmetry = .*must be 0"),
+    ],
+)
+def test_a_law_that_mujocos_step_does_not_have_is_not_written_as_another(keys, says):
+    finger = fp.load_finger("planar", {f"finger.joint_friction.{key}": value for key, value in keys.items()})
+    with pytest.raises(InputError, match=f"finger.joint_friction.{says}"):
         fp.to_mjcf(finger, friction=True)

@@ -16,6 +16,7 @@ RANGES = {
     "lowest": (-0.4, 0.5),
     "least_state": (-1.5, -0.1),
     "one_way": (-1.0, 1.0),
+    "drag_asymmetry": (-1.0, 1.0),
     "surface": (0.1, 0.8),
     "ratio": (1.0, 2.0),
     "lag": (0.0, 0.5),

@@ -92,7 +92,7 @@ def test_below_its_level_coulomb_friction_creeps_where_bristles_hold():
 
 @pytest.mark.slow
 def test_the_compiled_and_the_readable_path_agree_on_every_law(own):
-    drag = {"drag": 2e-3}
+    drag = {"drag": 2e-3, "drag_asymmetry": 0.4}
     for law, more in (("lugre", drag), ("dahl", drag), ("coulomb", drag), ("laws_of_mine:SOFT", {})):
         given = scenario(law, **more)
         both = [fp.simulate(given.updated(simulation={"method": method})) for method in ("Rodas5P", "BDF")]
@@ -127,6 +127,8 @@ def test_the_coefficient_of_dahl_and_coulomb_is_what_analyses_call_stiction(tmp_
         ("dahl", {"micro_damping": 1e-3}, "has no effect"),
         ("coulomb", {"stiffness": 7.0}, "has no effect"),
         ("lugre", {"reversal_speed": 0.1}, "coulomb"),
+        ("dahl", {"drag_asymmetry": 0.2}, "no effect without drag"),
+        ("lugre", {"drag": 1e-3, "drag_asymmetry": -1.2}, "must be at least -1"),
         ("numpy:sin", {}, "must be a Law"),
         ("no_such_module:X", {}, "cannot be imported"),
         ("laws_of_mine:MISSING", {}, "cannot be imported"),
@@ -168,7 +170,7 @@ def test_a_scenario_imports_no_module_unless_the_user_has_or_allows_it(own, monk
     assert mark.exists() and fp.Finger(scenario(law))
 
 
-SPRING, DRAG = 0.05, 0.01
+SPRING, DRAG, RADII = 0.05, 0.01, {"cord": 0.01, "back": -0.01}
 
 
 def dry(law, start=0.0, speed=0.0, duration=1.0, spring=SPRING, controller=None, **more):
@@ -176,15 +178,16 @@ def dry(law, start=0.0, speed=0.0, duration=1.0, spring=SPRING, controller=None,
     numbers = {"law": law, "coulomb": 0.0, "viscous": 0.0, "drag": DRAG} | more
     numbers |= {"stiction": numbers["coulomb"]} if law == "lugre" and "stiction" not in more else {}
     joint = {"range": [-2.0, 2.0], "link": {"length": 0.1, "width": 0.01, "mass": 0.1}}
+    controller = controller or {"kind": "tensions", "minimum_tension": 0.0}
+    pulled = controller.get("tensions", ("cord",))
     finger = {
         "name": "dry",
         "gravity": [0.0, 0.0, 0.0],
         "joints": {"hinge": joint | ({"spring": {"stiffness": spring}} if spring else {})},
-        "tendons": {"cord": {"crossings": {"hinge": {"radius": 0.01}}}},
+        "tendons": {name: {"crossings": {"hinge": {"radius": RADII[name]}}} for name in pulled},
         "joint_friction": numbers,
         "tendon_friction": {"coulomb": 0.0, "viscous": 0.0},
     }
-    controller = controller or {"kind": "tensions", "minimum_tension": 0.0}
     initial = {"position": {"hinge": start}, "velocity": {"hinge": speed}}
     table = {"name": "dry", "finger": finger, "controller": controller}
     given = read_scenario(table | {"simulation": {"duration": duration, "initial": initial}})
@@ -215,14 +218,35 @@ def test_drag_alone_takes_speed_at_a_constant_rate_and_what_it_takes_is_in_the_a
     assert float(result.energy_exchanged_joint_coulomb[-1]) == pytest.approx(lost - held, rel=1e-4)
 
 
-def test_drag_lets_go_at_the_ratio_of_stiction_to_coulomb_friction():
-    """A cord that pulls ever more presses the pin as well: r f = M^c f + d M^c / M^d."""
-    pull = {"kind": "ramp", "height": 2.0, "time": 0.0, "duration": 2.0}
-    controller = {"kind": "tensions", "tensions": {"cord": pull}}
-    law = {"coulomb": 2e-4, "stiction": 2.8e-4, "stiffness": 50.0}
-    result, _ = dry("lugre", duration=2.0, spring=None, controller=controller, **law)
+@pytest.mark.parametrize(("cord", "share"), [("cord", 1.0), ("cord", 1.3), ("back", 0.7)])
+def test_drag_lets_go_at_the_ratio_of_stiction_to_coulomb_friction(cord, share):
+    """A cord that pulls ever more presses the pin as well: r f = M^c f + (1 + a) d M^c / M^d, (1 - a) backwards."""
+    pull = {"kind": "ramp", "height": 2.5, "time": 0.0, "duration": 2.5}
+    controller = {"kind": "tensions", "tensions": {cord: pull}}
+    law = {"coulomb": 2e-4, "stiction": 2.8e-4, "stiffness": 50.0, "drag_asymmetry": 0.0 if share == 1.0 else 0.3}
+    result, _ = dry("lugre", duration=2.5, spring=None, controller=controller, **law)
     moves = np.flatnonzero(abs(result.joint_position.values[:, 0]) > 2e-3)[0]
-    assert float(result.tendon_command[moves, 0]) == pytest.approx(1.4 * DRAG / (0.01 - 2.8e-4), rel=2e-2)
+    tension = float(result.tendon_command.sel(tendon=cord)[moves])
+    assert tension == pytest.approx(1.4 * share * DRAG / (0.01 - 2.8e-4), rel=2e-2)
+
+
+@pytest.mark.parametrize("law", ["lugre", "dahl", "coulomb"])
+def test_drag_that_differs_by_direction_takes_its_part_of_a_torque_that_swings(law):
+    """Of a torque that swings from 3 d to -3 d what is above d (1 + a), or below -d (1 - a), moves a damper."""
+    pulls = {"cord": [3.0, 6.0, 0.0, 3.0], "back": [3.0] * 4}
+    points = {"kind": "points", "times": [0.0, 1.0, 3.0, 4.0]}
+    controller = {"kind": "tensions", "tensions": {name: points | {"values": pull} for name, pull in pulls.items()}}
+    more = {"viscous": 0.1, "drag_asymmetry": 0.4}
+    more |= {"reversal_speed": 1e-4} if law == "coulomb" else {"stiffness": 5e4}
+    result, _ = dry(law, duration=4.0, spring=None, controller=controller, **more)
+    torque, up, down = 0.01 * (result.tendon_command.values @ [1.0, -1.0]), 1.4 * DRAG, 0.6 * DRAG
+    speed = (np.maximum(torque - up, 0.0) + np.minimum(torque + down, 0.0)) / 0.1
+    # It lags by the time in which the damper stops the joint, 3 ms, and bristles spring back.
+    np.testing.assert_allclose(result.joint_velocity.values[:, 0], speed, atol=0.05 * DRAG / 0.1)
+    assert speed.max() > 1.5 * DRAG / 0.1 and speed.min() < -2.3 * DRAG / 0.1
+    taken = np.trapezoid(np.maximum(speed, 0.0) * up - np.minimum(speed, 0.0) * down, result.time.values)
+    assert float(result.energy_exchanged_joint_coulomb[-1]) == pytest.approx(taken, rel=0.02)
+    assert result.power_joint_coulomb.values.min() >= 0.0
 
 
 def test_the_fingers_of_a_hand_have_one_law():
