@@ -6,6 +6,7 @@ from scipy.integrate import quad
 
 import finger_pin as fp
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings, bristles
+from finger_pin.description.parameters import per_item
 from finger_pin.laws.bristle import bristle_energy, bristle_give, bristle_stiffness
 
 GIVE = {TendonFrictionSettings: 20e-6, JointFrictionSettings: 1e-3}
@@ -17,12 +18,13 @@ NO_PIN = {"finger.joint_friction.coulomb": 0.0, "finger.joint_friction.stiction"
 @pytest.mark.parametrize("declared", [True, False], ids=["drag", "load"])
 def test_at_four_fifths_of_any_level_bristles_have_given_by_a_length(kind, level, declared):
     """By (9a) without inertia dF / dx = sigma_0 (F) (1 - F / level)."""
-    numbers = bristles(kind(), 1, level if declared else 0.0)
+    numbers = bristles(kind(), per_item(kind(), 1), level if declared else 0.0)
     stiffness, hardening = numbers["stiffness"][0], numbers["hardening"][0]
     by_share = lambda f: level / (bristle_stiffness(f * level, stiffness, hardening) * (1.0 - f))  # noqa: E731
     given = quad(by_share, 0.0, 0.8, limit=500)[0]
     assert given < 1.7 * GIVE[kind]
-    assert not bristles(kind(stiffness=3.0), 1, level)["hardening"].any()
+    stiff = kind(stiffness=3.0)
+    assert not bristles(stiff, per_item(stiff, 1), level)["hardening"].any()
 
 
 def test_energy_and_length_of_hardening_bristles_are_integrals_of_their_stiffness():
