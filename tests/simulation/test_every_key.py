@@ -45,10 +45,10 @@ HAND = """
 </mujoco>
 """
 
-
 _SINE = ("amplitude", "frequency", "phase")
 _WAVE = {"offset": 0.05, "amplitude": 0.2, "frequency": 20.0, "phase": 0.3}
 _LOOP = {f"controller.{name}.servo.{key}": 0.3 for name in ("spool_angle", "supply_voltage") for key in _SINE}
+_LOOP |= {"controller.supply_voltage.servo.offset": 4.0, "finger.joint_friction.drag": 1e-3}
 
 
 def imported():
@@ -65,7 +65,7 @@ def imported():
 # `pour` is `hand` with more of the objects of `grasp`, and takes as long as all others together.
 SCENARIOS = {name: partial(fp.load_scenario, name) for name in list_scenarios() if name != "pour"} | {
     "imported": imported,
-    "wound": partial(fp.load_scenario, "wound", _LOOP | {"controller.supply_voltage.servo.offset": 4.0}),
+    "wound": partial(fp.load_scenario, "wound", _LOOP),
 }
 
 
@@ -185,7 +185,7 @@ SOMETIMES = {
     r".*\.(frequency|phase|amplitude)": "a sinusoid needs an amplitude, and a frequency or a phase",
     r".*\.(gravity|fingertip_force)": "where no joint is moved by it",
     r".*joints\.link\.(width|twist)": "of a link that touches nothing; of the last, after which there is none",
-    r".*friction\.(floor|stribeck_velocity|coulomb|stiction_ratio)": "canals without bend, stiction as sliding",
+    r".*friction\.(floor|stribeck_velocity|coulomb|stiction_ratio|drag_asymmetry)": "no bend, drag, or stiction",
     r".*motor\.(voltage|maximum_current|encoder\.resolution)": "limits that are not reached",
     r".*actuators\.reversal_speed": "without compensation",
     r".*\.(objects|shapes)\..*": "what touches nothing at these instants, or is turned about its own axis",
