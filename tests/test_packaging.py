@@ -34,6 +34,7 @@ def names(requirements):
     return {CALLED.get(name, name) for name in found}
 
 
+@pytest.mark.slow
 def test_the_package_imports_all_that_it_depends_on_and_nothing_else():
     imported = set()
     for path in (ROOT / "finger_pin").rglob("*.py"):

@@ -62,6 +62,7 @@ def test_sets_that_are_flat_in_space_are_drawn_by_their_section(name, position):
     assert plot_force_polytope(fp.Finger(fp.load_finger(name)), position, 10.0).axes[-1].lines
 
 
+@pytest.mark.slow
 def test_sensitivity_bars_are_the_derivatives_per_millimetre(finger):
     force = [0.3, 0.2, 0.8]
     bars = [bar.get_width() for bar in plot_radius_sensitivity(finger, POSTURE, force).axes[0].patches]

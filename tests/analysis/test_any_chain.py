@@ -135,6 +135,7 @@ def test_every_figure_and_page_of_any_finger_can_be_drawn(joints, data):
     assert "finger_pin" in posture_page(description, polytope, tension_for_force(finger, position, force).strands)
 
 
+@pytest.mark.slow
 @FEW
 @given(fingers())
 def test_statics_of_any_finger_are_finite_and_of_the_documented_shapes(description):

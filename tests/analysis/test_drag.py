@@ -80,6 +80,7 @@ def test_a_finger_that_holds_bears_as_much_more_as_drag_takes():
         assert found.support(towards) == pytest.approx((corners @ towards[:2]).max(), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drag", [0.5, 3.0])
 def test_slow_motion_needs_what_drag_takes_besides(drag):
     """Slowly moving, tensions l k fill the kernel of H_c^T - M s |H_c|^T, of every direction that occurs."""

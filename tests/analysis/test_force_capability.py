@@ -84,6 +84,7 @@ def test_forces_of_random_feasible_tensions_lie_inside(finger, polytope):
     assert inside > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [Friction.NONE, Friction.HELPING])
 def test_largest_force_lies_on_the_boundary(finger, friction):
     found = force_polytope(finger, POSTURE, 20.0, friction=friction)
@@ -127,6 +128,7 @@ def test_required_tensions_balance_the_finger_as_the_model_has_it(finger, fricti
         np.testing.assert_allclose(gap, np.sign(demand) * reaction, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", list(Friction))
 def test_sensitivity_to_radii_is_that_of_differences(ub, finger, friction):
     force, step = [0.3, 0.2, 0.8], 1e-7

@@ -112,6 +112,7 @@ def test_a_posture_or_a_state_by_name_stands_for_the_packed_state():
     assert fp.linearise(finger, part, dict(zip(finger.input_names, pulls, strict=True))).equals(packed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [1e-6, -1e-6, 1e-3, -1e-3, 0.0])
 def test_near_a_reversal_derivatives_are_those_of_the_side_of_the_state_and_it_is_named(speed):
     """F' = s0 (r w - F |r w| / L), L = tanh(mu phi / 2) (2 f^a - F): the slope over w bends at 0, by F / L."""

@@ -45,6 +45,7 @@ def test_the_share_of_a_large_command_is_that_of_gears_without_dry_friction(weig
     np.testing.assert_array_equal(shares[:, :2], 1.0)
 
 
+@pytest.mark.slow
 def test_gears_that_no_load_turns_hold_any_tension_and_lock_a_tension_drive():
     locked = finger(7.0)
     assert tension_limits(fp.Finger(locked), holding=True)[2:] == (np.inf, np.inf)

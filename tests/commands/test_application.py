@@ -81,6 +81,7 @@ def test_without_a_command_all_of_them_are_listed_and_a_misspelt_one_is_told_the
     assert capsys.readouterr().err == "finger-pin: No such command 'simulat'. Did you mean 'simulate'?\n"
 
 
+@pytest.mark.slow
 def test_the_package_runs_as_a_module_and_by_the_name_that_is_installed_and_lists_without_what_draws(tmp_path):
     command = [sys.executable, "-X", "importtime", "-m", "finger_pin", "simulate", "--list"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)

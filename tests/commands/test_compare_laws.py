@@ -40,6 +40,7 @@ def regressions(pull, out):
     }
 
 
+@pytest.mark.slow
 def test_laws_of_a_canal_are_regressions(rows, readings):
     (pull, out), (heavy, arrived) = readings
     laws = regressions(pull, out)
@@ -85,6 +86,7 @@ def test_all_samples_of_a_variable_count_alike():
     assert rms == pytest.approx({"angle": np.sqrt((10 * 9.0 + 30 * 1.0) / 40), "force": 7.0})
 
 
+@pytest.mark.slow
 def test_every_bench_has_the_same_laws_whose_keys_it_knows():
     for bench, laws in LAWS.items():
         assert list(laws) == list(LAWS["transmission"])

@@ -33,6 +33,7 @@ def under_capstan(coulomb):
     return settled(lambda w: [gain * w / (STIFFNESS + gain) for gain in gains])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "truth", "path"), [("constant loss", 0.8, under_loss), ("capstan with bristles", 0.15, under_capstan)]
 )

@@ -29,6 +29,7 @@ def test_a_wrong_file_ends_with_one_line_and_writes_nothing(run, here, case):
     assert set(contents(here)) == {"s.toml", "case.toml"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

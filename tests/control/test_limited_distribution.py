@@ -56,6 +56,7 @@ def test_with_several_internal_directions_it_needs_the_least_tension_of_all(redu
     assert np.max(norms[1] - norms[0]) > 0.5
 
 
+@pytest.mark.slow
 def test_it_falls_short_exactly_where_no_tensions_within_the_limits_exert_the_torque(redundant):
     """Whether there are any is asked of a linear programme."""
     minimum, maximum = np.full(5, 1.0), np.full(5, 6.0)

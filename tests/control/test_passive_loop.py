@@ -84,6 +84,7 @@ def test_it_brings_the_delivered_tension_to_the_wish_where_friction_and_other_mi
     assert abs(float(held["without"][-1]) - 5.0) > 0.25
 
 
+@pytest.mark.slow
 def test_it_serves_a_loop_of_one_s_own():
     """The example of the README, as it is told there: the simulator's tensions go in, the controller's come out."""
     scenario = fp.load_scenario("reversals", LOOP | {"controller.passive_tension": 4.0})

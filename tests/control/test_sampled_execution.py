@@ -112,6 +112,7 @@ def test_noise_is_reproducible_by_its_seed_and_has_the_standard_deviation_and_no
     assert np.max(np.abs(together)) < 5.0 / math.sqrt(count)
 
 
+@pytest.mark.slow
 def test_the_recorded_scenario_repeats_a_noisy_run_bit_by_bit(tmp_path):
     overrides = {
         "controller.damping": 1e-3,

@@ -243,6 +243,7 @@ GROUNDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ground", GROUNDS)
 def test_an_ellipsoid_rocks_as_a_rocking_stone_does_on_every_shape(ground):
     """omega^2 = g (R S / (R + S) - c) / ((a^2 + c^2) / 5 + c^2), R = a^2 / c on a ground of radius S, at rest at c."""

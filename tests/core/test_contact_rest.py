@@ -120,6 +120,7 @@ def test_what_is_laid_on_something_smaller_stays_there(case):
     assert np.abs(x[2, :7] - x[1, :7]).max() < 2e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["box", "cylinder"])
 @pytest.mark.parametrize("aligned", [True, False])
 def test_a_stack_of_three_stands_for_a_hundred_seconds(shape, aligned):

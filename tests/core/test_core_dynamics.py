@@ -69,6 +69,7 @@ def test_the_states_compared_are_of_every_kind(cases, name):
         assert 0.01 < np.mean(happens) < 0.99
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_every_signal_is_the_readable_one_at_one_state_and_at_many(cases, name):
     loop, rng = cases[name].loop, np.random.default_rng(4)

@@ -153,6 +153,7 @@ def test_the_states_examined_touch_a_limiter_and_have_a_slack_tendon(examined):
     assert np.any(signals.tendons.strands == 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("g", [1e1, 1e3, 1e6])
 def test_the_linear_system_is_solved(examined, g):
     """Against a dense solution with the differences' Jacobian, by kind of state, for long and for short steps."""

@@ -25,6 +25,7 @@ def smooth():
     return smooth_motion()
 
 
+@pytest.mark.slow
 def test_the_smooth_motion_has_no_kink(smooth):
     times = np.linspace(0.0, END, 200)
     assert not np.any(np.ptp(pieces(Case.of(smooth.loop), times, smooth.exact(times).T), axis=0))
@@ -104,6 +105,7 @@ def test_a_state_whose_error_is_no_number_is_named_before_any_that_is_only_large
         assert worst(x, broken, 0.0, atol) == place
 
 
+@pytest.mark.slow
 def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_names_the_culprit(cases, method):
     """An absolute tolerance that rounding meets only in steps far below a nanosecond."""
     case = cases["reversals"]

@@ -90,6 +90,7 @@ def damped(scenarios):
     return fp.Scenario.model_validate(table)
 
 
+@pytest.mark.slow
 def test_sampled_control_converges_to_the_continuous_one_with_first_order_in_the_period(damped):
     continuous = run(damped, tolerance=1e-10, duration=0.4, rate=200.0)
     errors = []

@@ -30,6 +30,7 @@ def throw(method, checked):
     return states[:, 2].min(), states[-1, 9]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_a_small_ball_bounces_off_a_thin_plate_whatever_the_method(method):
     """It falls for sqrt(2 h / g), stays for pi sqrt(m / k), and leaves as fast as it came."""

@@ -1,6 +1,7 @@
 """Steps over which sliding turns round."""
 
 import numpy as np
+import pytest
 
 import finger_pin as fp
 from finger_pin.core.stepping.integration import DONE
@@ -44,6 +45,7 @@ def test_no_step_over_a_reversal_of_friction_errs_by_more_than_three_tolerances(
     assert len(errors) > 50 and max(errors) < 3.0
 
 
+@pytest.mark.slow
 def test_friction_above_what_it_can_bear_does_not_grow_at_a_loose_tolerance_either():
     """A tendon goes slack and rings: by (9a) |F^s|' <= sigma_0 |v| (1 - |F^s| / level)."""
     light = {f"finger.actuators.*.motor.friction.{name}": 0.0 for name in ("by_load", "stribeck_by_load")}

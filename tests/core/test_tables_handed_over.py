@@ -53,6 +53,7 @@ def outer():
     )
 
 
+@pytest.mark.slow
 def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
     block = pack(outer, KIND)
     total = weigh(block.address)

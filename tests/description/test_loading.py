@@ -36,6 +36,7 @@ def test_fig6_is_the_papers_finger_with_the_published_friction_coefficient():
     assert [joint.link.length for joint in finger.joints.values()] == [0.0202, 0.045, 0.0299, 0.0218]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list_scenarios())
 def test_the_resolved_text_of_a_scenario_reads_back_as_the_same_scenario(name, tmp_path):
     scenario = load_scenario(name, {"environment.fingertip_force": [0.1, 1 / 3, 1e-7]})

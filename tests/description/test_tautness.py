@@ -52,6 +52,7 @@ def test_a_tendon_over_two_joints_takes_from_the_other_where_it_pulls_most(descr
     assert found.spare == pytest.approx(corners[worst], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_no_posture_within_the_ranges_is_worse_than_the_worst_corner(described):
     description = described(**OPENING)
     least = tautness(description, 0.3).spare

@@ -11,6 +11,7 @@ from mujoco_models import MODELS
 import finger_pin as fp
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::finger_pin.exceptions.LeftOutWarning")
 @pytest.mark.parametrize("name", MODELS)
 def test_inertia_gravity_and_tip_are_those_of_the_tree(name):

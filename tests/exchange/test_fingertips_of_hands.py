@@ -112,6 +112,7 @@ def test_postures_are_found_by_the_tip_that_is_named(hand):
         assert _ends(other)[name] == pytest.approx(place, abs=2e-6)
 
 
+@pytest.mark.slow
 def test_forces_at_tips_are_held_up_by_the_servos(hand):
     description, model, _ = hand
     data, forces = mujoco.MjData(model), 0.1 * np.array([*_FORCES.values()])
@@ -168,6 +169,7 @@ def test_what_is_of_no_fingertip_is_refused_by_name(hand, call, words):
         call(hand[0])
 
 
+@pytest.mark.slow
 def test_a_controller_exerts_a_force_at_the_tip_that_is_named():
     arm = {"mass": 0.02, "inertia": [1e-6, 1e-5, 1e-5, 0.0, 0.0, 0.0]}
     arm |= {"solids": {"bar": {"kind": "box", "sides": [0.08, 0.01, 0.01]}}}

@@ -83,6 +83,7 @@ def flagged(model, *bits):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "flag", ["spring", "damper", "gravity", "actuation", "clampctrl", "limit", "equality", "constraint"]
 )
@@ -106,6 +107,7 @@ def test_what_a_flag_switches_off_in_mujoco_is_off_here(flag):
     assert np.abs(acceleration(flagged(model)) - data.qacc).max() > 1e-2
 
 
+@pytest.mark.slow
 def test_no_flag_is_passed_over():
     """Each changes what is read, or is listed by name; a loss that is disabled is none."""
     lossy = ROUTED.replace('name="j1"', 'name="j1" frictionloss="0.3"').replace(

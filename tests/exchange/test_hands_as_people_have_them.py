@@ -102,6 +102,7 @@ LOOP = """<mujoco>{head}<worldbody>
 <actuator><position name="crank" joint="crank" kp="1.0" ctrlrange="-0.2 1.2"/></actuator></mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("crank", "rod", "base"), [(0.02, 0.04, 0.04), (0.02, 0.045, 0.04), (0.015, 0.04, 0.045)])
 def test_a_four_bar_finger_turns_as_its_links_say(crank, rod, base):
     """The loop closes where the phalanx's horn, upright at zero, is as far from the crank's end as the rod is long."""

@@ -71,6 +71,7 @@ def led_by_mujoco(model):
     return data, np.array(kept)
 
 
+@pytest.mark.slow
 def test_a_palm_follows_its_leader_and_a_ball_its_block_as_in_mujoco():
     """MuJoCo's weld takes mocap bodies for at rest, and lags by what its damper over its spring is: 20 ms."""
     model = mujoco.MjModel.from_xml_string(LED)
@@ -145,6 +146,7 @@ def test_what_cannot_be_led_is_named():
             read_scenario({"name": "x", "finger": table, "controller": {"kind": "tensions"}})
 
 
+@pytest.mark.slow
 def test_statics_leave_leaders_where_they_are():
     hand = read(mujoco.MjModel.from_xml_string(LED))
     alone = hand.tree.updated(objects={}, keyframes={})

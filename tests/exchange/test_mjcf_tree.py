@@ -159,6 +159,7 @@ def test_a_tree_of_ones_own_moves_in_mujoco_as_here(name):
         assert in_mujoco(finger, {"push": torque}) == pytest.approx(simulated(finger, {"push": torque}), abs=4e-3)
 
 
+@pytest.mark.slow
 def test_stops_of_a_tree_and_on_request_of_a_finger_give_by_torque_over_stiffness():
     """A load of 0.08 N m on a stop of 2 N m/rad, beside a joint's spring of 0.05."""
     finger = arm(actuators={"push": {"joint": "one"}}).updated(stroke_limiter={"stiffness": 2.0, "viscous": 0.05})

@@ -136,6 +136,7 @@ def test_a_finger_that_meets_a_plate_bounces_and_pushes_as_in_mujoco():
         np.testing.assert_allclose(errors[:-1] / errors[1:], 2.0, rtol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list_fingers())
 def test_the_default_time_step_is_stable(name):
     description = fp.load_finger(name)

@@ -40,6 +40,7 @@ def of_model(text=MODEL, more=()):
     return read_scenario(table | {"simulation": {"duration": 0.1}}, FREE | dict(more))
 
 
+@pytest.mark.slow
 def test_force_and_activation_are_mujoco_s_whatever_length_speed_state_and_numbers():
     rng, count = np.random.default_rng(4), 3000
     length, speed, act, command = rng.uniform([[-0.1], [-2.0], [0.0], [-0.3]], [[0.4], [2.0], [1.0], [1.3]], (4, count))

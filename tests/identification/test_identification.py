@@ -184,6 +184,7 @@ def test_a_reading_that_is_far_from_all_others_is_named_and_alters_no_robust_fit
         assert np.all((robust.upper - robust.lower).values < 2.0 * width)
 
 
+@pytest.mark.slow
 def test_a_fit_that_meets_a_signal_no_better_than_a_constant_is_said_to_be_none():
     data = readings(np.random.default_rng(2))
     assert "no fit" not in summarize_identification(found(data))
@@ -236,6 +237,7 @@ def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path)
     np.testing.assert_allclose(again.upper, whole.upper, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_search_that_is_interrupted_goes_on_from_where_it_was(tmp_path):
     """Stopped again and again after three evaluations it gets there; begun anew every time, it never would."""
     data = readings(np.random.default_rng(2))
@@ -266,6 +268,7 @@ def test_the_command_writes_a_page_and_a_scenario_with_the_numbers_found(tmp_pat
     assert run("identify", ["no_such_bench"]) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("whole", [True, False], ids=["a scenario", "a name and overrides"])
 def test_a_scenario_that_no_file_has_is_written_out_with_the_numbers_found(tmp_path, whole):
     turn = {"finger.tendons.T1.curvature_offset": 2.5}
@@ -277,6 +280,7 @@ def test_a_scenario_that_no_file_has_is_written_out_with_the_numbers_found(tmp_p
     assert fp.load_scenario(tmp_path / "identified.toml") == fp.load_scenario("canal", turn | numbers)
 
 
+@pytest.mark.slow
 def test_a_column_of_tensions_with_the_wrong_sign_is_named():
     data = readings(np.random.default_rng(1))
     with pytest.raises(fp.InputError, match=r"identify\.recordings\.pull\.inputs\.tendon_command\.T1: .* scale = -1"):

@@ -30,6 +30,7 @@ def under_control(duration):
     return {"parameters": keys, "recordings": recordings}, {"motion": {"t": made.time, **data}}
 
 
+@pytest.mark.slow
 def test_slopes_that_searches_ask_for_know_what_bends_and_bends_back():
     """Twice another tension takes the lead in (22), for less than a hundredth of a second."""
     entries, data = under_control(0.7)
@@ -47,6 +48,7 @@ def test_slopes_that_searches_ask_for_know_what_bends_and_bends_back():
             assert np.sqrt(np.mean((own[:, k] - expected) ** 2)) < 0.02 * np.sqrt(np.mean(expected**2))
 
 
+@pytest.mark.slow
 def test_what_a_finger_under_control_tells_to_a_hundredth_has_nearly_the_intervals_of_its_slopes():
     entries, data = under_control(1.0)
     changed = {COULOMB: 0.16, "finger.joint_friction.viscous": 1.5e-3}

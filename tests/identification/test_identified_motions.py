@@ -57,6 +57,7 @@ def test_a_recorded_motion_gives_the_friction_that_it_was_made_with(more):
     assert result.parameter.size == 2 and result.signal.size == 2
 
 
+@pytest.mark.slow
 def test_a_finger_of_ones_own_is_identified_with_the_rows_that_it_has():
     """Half of the drum's spring is a row of its own: the motion is the same, and so is the friction found in it."""
     truth, half = {COULOMB: 0.15, DRAG: 0.5}, {"finger.joints.drum.spring.stiffness": 0.1}
@@ -131,6 +132,7 @@ def test_wrong_recordings_of_motions_are_refused_in_one_line(change, said):
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_number_that_nothing_recorded_of_a_motion_feels_is_refused_by_its_key():
     recordings = {"pull": {**MOTION, "start": "rest", "outputs": {"tendon_command.T1": "f"}}}
     given = {"parameters": {COULOMB: BOUNDS[COULOMB]}, "recordings": recordings, "starts": 1}
@@ -197,6 +199,7 @@ def test_residuals_that_follow_each_other_count_as_fewer():
     assert 2.5 < width[1] / width[0] < 8.0
 
 
+@pytest.mark.slow
 def test_an_offset_and_a_delay_of_an_output_are_found():
     data = ramp(np.random.default_rng(6), 0.15, 0.5)
     data["f"] = np.interp(data["t"] - 0.05, data["t"], data["f"]) + 0.2

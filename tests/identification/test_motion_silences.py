@@ -23,6 +23,7 @@ def problem(data, **more):
     return build_problem(scenario, settings, [read_recording("pull", settings.recordings["pull"], data)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("failing", ["all", "the changed one"])
 def test_slopes_where_the_steps_of_a_run_do_not_bear_other_numbers_are_those_of_runs(monkeypatch, failing):
     data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)

@@ -80,6 +80,7 @@ def test_a_joint_that_nothing_damps_is_said_as_its_runs_take_long():
     assert "Nothing damps drum" in said[0] and "Nothing damps" not in said[1]
 
 
+@pytest.mark.slow
 def test_a_motor_is_found_under_a_supply_that_sags_beside_its_goal():
     """J w' = K (V(t) - K w) / R - b w of a motor that unwinds a slack cord at the limit of its loop, by scipy."""
     time, motor = np.arange(0.0, 0.4, 0.005), "finger.actuators.servo.motor."
@@ -209,6 +210,7 @@ def test_what_a_motion_cannot_be_given_is_refused_with_what_it_can():
         fp.identify("canal", parameters={COULOMB: (0.01, 0.5)}, recordings={"pull": told}, data=data)
 
 
+@pytest.mark.slow
 def test_the_difference_of_two_tensions_is_compared_with_a_column():
     key, truth = "finger.tendon_friction.coulomb", 0.13
     run = fp.simulate(fp.load_scenario("reversals", {key: truth, "simulation.duration": 0.3}))

@@ -28,6 +28,7 @@ def slide(velocity, distance, start=0.0):
     return solution.y[0, -1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [0.002, -0.002, 0.05, -0.05])
 def test_sliding_settles_at_normal_force_times_coefficient_against_the_motion(velocity):
     expected = math.copysign(NORMAL * (KINETIC + (STATIC - KINETIC) * math.exp(-abs(velocity) / STRIBECK)), velocity)
@@ -38,6 +39,7 @@ def test_sliding_settles_at_normal_force_times_coefficient_against_the_motion(ve
     assert friction.friction_force(expected, velocity, 3.0) == pytest.approx(total, rel=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [0.002, -0.05])
 @pytest.mark.parametrize("start", [0.0, 0.6, -0.9])
 def test_stiction_approaches_its_level_exponentially_in_distance(velocity, start):
@@ -112,6 +114,7 @@ def test_the_level_is_proportional_to_the_normal_force():
     assert level_at(0.02, normal=20.0) == pytest.approx(2.0 * level_at(0.02, normal=10.0), rel=1e-14)
 
 
+@pytest.mark.slow
 def test_a_full_cycle_of_sliding_dissipates_the_area_of_its_hysteresis_loop():
     """Back and forth by d at one speed, starting from steady sliding: 4 L d less what each reversal spares.
 

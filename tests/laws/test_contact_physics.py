@@ -69,6 +69,7 @@ def test_beyond_that_angle_it_slides_downhill_with_the_acceleration_of_kinetic_f
     assert later / np.hypot(*later) == pytest.approx([0.6, 0.8], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_block_that_is_thrown_across_the_incline_stops_and_stays():
     slope = np.arctan(0.5 * SOFT["kinetic"])
     y, _, pull, numbers = block(slope, 5.0, start=(0.0, 0.0, -0.8, 0.6, 0.0, 0.0))
@@ -145,6 +146,7 @@ def test_a_mass_on_the_contact_oscillates_at_the_square_root_of_stiffness_over_m
     assert found.y[:, -1] == pytest.approx([rest + amplitude, 0.0], abs=1e-4 * amplitude * pulse)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("normal", [12.0, 60.0])
 def test_a_pinched_capsule_neither_creeps_nor_falls_until_its_load_is_twice_mu_times_the_pinch(normal):
     """45 g, mu 0.7; engines with regularised friction creep here at 50 to 155 um/s."""

@@ -61,6 +61,7 @@ def test_the_greatest_friction_before_sliding_takes_over_is_every_published_brea
         assert break_aways[rate].greatest(lugre.READ_UP_TO) == pytest.approx(published, abs=6e-4)
 
 
+@pytest.mark.slow
 def test_a_mass_pulled_by_a_spring_sticks_and_slips_as_published():
     """A spring of 2 N/m pulled at 0.1 m/s, section III-D."""
     pulled = lugre.stick_slip()
@@ -71,6 +72,7 @@ def test_a_mass_pulled_by_a_spring_sticks_and_slips_as_published():
     assert pulled.end == pytest.approx(1.27259, abs=2e-5)
 
 
+@pytest.mark.slow
 def test_before_sliding_force_and_displacement_make_closed_loops_that_dissipate():
     """Section III-A: the force goes up to 1.425 N, below break-away, down to -1.425 N and up again, slowly."""
     peak, period = 1.425, 4.0

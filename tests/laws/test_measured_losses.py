@@ -35,6 +35,7 @@ def test_a_tendon_that_slides_evenly_delivers_the_capstan_law_less_its_drag(way)
     assert closed == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_gears_lose_what_either_torque_costs_in_two_numbers():
     """A level |c_e T + c_m tau|, steady: tau = T + s level; the same level in closed form from the two numbers."""
     external, own, pull = 0.12, 0.2, 0.3

@@ -197,6 +197,7 @@ def test_a_run_ends_finite_and_accounted_for_or_says_why_it_stopped(table):
     assert float(abs(result["energy_residual"]).max()) <= 5e-3 * exchanged + 1e-12 * total + NOTHING
 
 
+@pytest.mark.slow
 @FEW
 @given(
     fingers(closed=False),

@@ -105,6 +105,7 @@ def test_a_tilted_box_over_a_table_is_as_high_as_its_lowest_corner_and_a_cylinde
     assert lowest("can") == pytest.approx(0.1 - 0.01 * np.hypot(*up[:2]) - 0.025 * abs(up[2]), abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["sphere", "box", "cylinder", "capsule"])
 def test_bodies_farther_apart_than_their_reach_do_not_touch(shape):
     """Random poses of a free object near the finger: whatever touches is within reach."""

@@ -62,6 +62,7 @@ def test_evaluation_agrees_with_the_scalar_model_at_random_states(case, evaluato
     assert not np.all(np.array(seen)[:, -1])
 
 
+@pytest.mark.slow
 def test_the_closed_loop_agrees_with_the_scalar_model_and_controller(case):
     numbers, loop = case
     for (x, _, _), time in zip(random_states(numbers, 30), np.linspace(0.0, 2.0, 30), strict=True):

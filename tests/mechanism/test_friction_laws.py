@@ -62,12 +62,14 @@ def scenario(law, **more):
     )
 
 
+@pytest.mark.slow
 def test_dahl_is_the_paper_s_law_without_stribeck_s_curve():
     dahl, flat = fp.simulate(scenario("dahl")), fp.simulate(scenario("lugre", stiction=2.5e-4))
     np.testing.assert_array_equal(dahl.joint_position, flat.joint_position)
     np.testing.assert_array_equal(dahl.joint_stiction, flat.joint_stiction)
 
 
+@pytest.mark.slow
 def test_coulomb_friction_is_a_function_of_speed_and_reaction_and_has_no_state():
     result = fp.simulate(scenario("coulomb", coulomb=4e-4, viscous=2e-3, reversal_speed=0.05))
     speed = result.joint_velocity.values

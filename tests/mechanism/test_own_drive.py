@@ -40,6 +40,7 @@ def driven(finger):
     return with_muscles(finger)
 
 
+@pytest.mark.slow
 def test_a_tendon_under_a_drive_does_what_it_does_under_an_ideal_source_of_that_tension(driven, finger):
     """At any state: friction in canals and joints, torque and acceleration, by both evaluators."""
     rng, parts = np.random.default_rng(4), finger.layout.unpack

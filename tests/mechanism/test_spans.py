@@ -83,6 +83,7 @@ def test_lengths_and_arms_are_those_of_mujoco(span, side):
     assert 100 < wrapped < 900
 
 
+@pytest.mark.slow
 @every_case
 def test_pulls_and_slopes_are_derivatives(span, side):
     p = numbers(side)

@@ -20,6 +20,7 @@ def pulled():
     return model, fp.from_mujoco(model)
 
 
+@pytest.mark.slow
 def test_paths_are_as_long_as_their_tendons_and_end_at_their_sites(pulled):
     model, description = pulled
     geometry, hand, data = TendonGeometry(description), fp.Hand(description), mujoco.MjData(model)
@@ -58,6 +59,7 @@ def test_cords_that_no_motor_pulls_are_drawn_branch_by_branch_with_ends_at_their
     assert not Scene("ub_stand_in").header("", np.zeros((1, 4)), 1.0)["cords"]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:hand. not carried over")
 def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
     """Of the Shadow hand meshes, but of two links that have boxes; its capsules are hidden."""
@@ -91,6 +93,7 @@ def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
     assert len(description.tree.meshes) == 10
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:hand. not carried over")
 def test_what_falls_out_of_a_hand_leaves_the_view():
     description = fp.from_mujoco(str(asset("adroit_hand/adroit_pen.xml")))
@@ -158,6 +161,7 @@ def test_sums_of_hinges_wind_around_them_and_are_drawn_longer_by_their_excursion
     assert len(geometry.pulleys) == 6
 
 
+@pytest.mark.slow
 def test_a_tree_whose_bodies_may_touch_is_filmed_without_objects():
     description = fp.from_mujoco(mujoco.MjModel.from_xml_string(SUMS))
     simulator = fp.Simulator(fp.Finger(description))

@@ -146,6 +146,7 @@ def test_signals_are_mujoco_s_own_memory(model):
     np.testing.assert_array_equal(signals.friction[order], -data.efc_force[: data.nefc][rows])
 
 
+@pytest.mark.slow
 def test_a_process_that_has_not_imported_us_is_told_what_is_missing_by_the_xml():
     text = spec().to_xml()
     code = (

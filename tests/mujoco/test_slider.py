@@ -11,6 +11,7 @@ ROPE = {"coulomb": 0.2, "curvature_offset": 1.0}
 TENSION, BORNE = 10.0, 10.0 * (1.0 - np.exp(-0.2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
 def test_at_four_fifths_of_the_level_nothing_creeps_in_a_minute(integrator):
     model = slider(integrator=integrator, stiffness=5e4, **ROPE)

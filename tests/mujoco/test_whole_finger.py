@@ -42,6 +42,7 @@ def test_a_routed_hand_with_our_friction_moves_in_mujoco_as_here():
     assert errors[-1] < 1e-3 and errors[0] / errors[1] > 1.8
 
 
+@pytest.mark.slow
 def test_a_hand_that_was_changed_and_written_rubs_in_mujoco_as_here():
     """Other coefficients of every tendon and joint, and a turn that the model does not show."""
     spec = mujoco.MjSpec.from_string(ROUTED)

@@ -114,6 +114,7 @@ def test_what_needs_no_more_than_forces_has_the_bits_of_the_whole_result(name):
         assert np.array_equal(run[each], whole[each].values), each
 
 
+@pytest.mark.slow
 def test_runs_in_several_threads_at_once_give_the_bits_of_one_after_the_other():
     prepared = fp.prepare("stick_slip", ["finger.tendon_friction.coulomb", "simulation.duration"])
     values = [(coulomb, 0.2) for coulomb in np.linspace(0.05, 0.15, 12)]

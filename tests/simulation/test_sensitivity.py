@@ -56,6 +56,7 @@ def test_sensitivities_are_the_differences_of_tight_runs(name, entries, keys, va
             assert error < bound * np.sqrt(np.mean(expected**2)), (variable, keys[k])
 
 
+@pytest.mark.slow
 def test_a_loop_with_an_encoder_that_rounds_feels_a_parameter_as_one_that_reads_exactly_does():
     """Between the encoder's steps nothing comes back to the loop, so that there it would seem to run open."""
     key, entries = "finger.actuators.servo.position_loop.proportional", {"simulation.duration": 1.0}

@@ -77,6 +77,7 @@ def swept(load):
     return load(HAND, TUMBLE, POST, 'frame = "world"\n', "[simulation]\nduration = 0.4\n")
 
 
+@pytest.mark.slow
 def test_what_a_ball_does_on_a_slab_does_not_depend_on_a_palm_that_tumbles_beside_them(load):
     still, moved = fp.simulate(load(HAND, THROWN)), fp.simulate(load(HAND, TUMBLE, THROWN))
     seen = fp.in_world(moved)

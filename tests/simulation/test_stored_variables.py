@@ -38,6 +38,7 @@ def test_a_variable_that_there_is_not_is_refused_before_the_run(names, said):
         fp.simulate(fp.load_scenario("pinch", {"simulation.duration": 1e3}), variables=names)
 
 
+@pytest.mark.slow
 def test_pairs_that_never_came_near_are_not_written_and_a_run_goes_on_from_the_rest(pinched, tmp_path):
     scenario, whole = pinched
     fp.save(whole, tmp_path / "r.nc")

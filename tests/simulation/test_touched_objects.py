@@ -161,6 +161,7 @@ def test_an_object_cannot_have_the_name_of_a_joint(tmp_path):
         fp.simulate(fp.load_scenario(file))
 
 
+@pytest.mark.slow
 def test_two_fingers_hold_a_ball_until_friction_can_no_longer_carry_it():
     """Its weight is carried by friction at two pads; it falls no earlier than mu times both normal forces allow."""
     found = fp.simulate(fp.load_scenario("pinch", {"simulation.duration": 4.6}))
@@ -203,6 +204,7 @@ def last_state(finger, result, k):
     return packed_state(result.isel(time=slice(k, k + 1)), finger)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("touch", [None, True, False])
 def test_fingers_touch_each_other_without_objects_where_they_are_told_to(touch):
     """One is led into its neighbour: through it, or up to it."""

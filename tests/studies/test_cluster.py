@@ -103,6 +103,7 @@ def test_a_scheduler_that_goes_away_is_told_and_what_was_done_stays(tmp_path):
     np.testing.assert_array_equal(again["slow_gain"], GAINS)
 
 
+@pytest.mark.slow
 def test_workers_of_another_source_are_refused(executor, monkeypatch):
     monkeypatch.setattr("finger_pin.studies.records.source_digest", lambda: "another")
     with pytest.raises(ExecutorError, match=r"a worker has another finger_pin \(\d.*\), not that of source another"):

@@ -92,6 +92,7 @@ STUDIES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("study", STUDIES)
 def test_ctrl_c_in_python_keeps_the_runs_that_are_finished(study):
     def press(done, *others):

@@ -145,6 +145,7 @@ def open_loop(command):
     return run
 
 
+@pytest.mark.slow
 def test_without_a_reference_the_hysteresis_is_that_over_the_command():
     """The chord 2 L sin(0.05) between the ways, L from the joint to the tip; a pull without return has none."""
     run = open_loop(lambda time: 3.0 - np.cos(np.pi * time))

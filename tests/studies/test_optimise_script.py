@@ -42,6 +42,7 @@ def test_a_search_goes_on_from_what_a_kill_leaves_and_ends_with_the_same_front(s
     assert (folder / "front.csv").read_text() == table
 
 
+@pytest.mark.slow
 def test_a_design_of_the_front_can_be_simulated_and_gives_its_numbers(script, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert script.main([*QUICK, "--population", "4", "--generations", "1", "--quiet"]) == 0

@@ -101,6 +101,7 @@ def test_an_interrupt_keeps_what_was_done_and_says_so(tmp_path):
     assert (result["status"] == "missing").any()
 
 
+@pytest.mark.slow
 def test_every_run_failing_has_its_own_exit_code(script, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     static = ["--over", "finger.joint_friction.stiction=3e-4,3.4e-4"]
@@ -146,6 +147,7 @@ def test_wrong_options_are_one_line_and_write_nothing(script, refuses, arguments
     refuses(script, arguments, says)
 
 
+@pytest.mark.slow
 def test_another_study_in_the_folder_does_its_own_runs_and_one_of_an_earlier_version_is_left_as_it_is(
     script, tmp_path, monkeypatch, capsys
 ):

@@ -52,6 +52,7 @@ def test_a_tension_turns_a_joint_until_its_spring_balances_it(hinge):
     assert session.simulator.state.position[0] == pytest.approx(3.0 * RADIUS / STIFFNESS, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_spring_at_the_tip_pulls_with_its_stiffness(hinge):
     session = Session(hinge, rtol=1e-6)
     tip = session.tips[0]
@@ -155,6 +156,7 @@ def test_a_record_has_a_piece_for_every_change_of_the_finger(tmp_path):
         session.stop()
 
 
+@pytest.mark.slow
 def test_servos_in_position_drive_wind_as_in_a_simulation():
     session = Session("wound", rtol=1e-6)
     whole = fp.simulate(fp.load_scenario("wound", {"simulation.duration": 1.0}))

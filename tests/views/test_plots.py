@@ -187,6 +187,7 @@ def test_a_figure_that_a_result_does_not_have_is_named_and_nothing_is_drawn(tmp_
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_an_earlier_picture_survives_a_figure_that_cannot_be_drawn(tmp_path):
     path = plots.save_figure(plot_friction_law(), tmp_path / "figure.png")
     before = path.read_bytes()

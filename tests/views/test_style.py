@@ -185,10 +185,12 @@ def test_figures_are_written_in_the_format_that_was_asked_for(tmp_path):
         plots.draw_all(synthetic(samples=5), tmp_path, format="gif")
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_a_figure_though_it_belongs_to_no_window():
     assert plot_friction_law()._repr_png_().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_png_is_drawn_once_and_the_figure_keeps_its_layout(tmp_path, monkeypatch):
     figure = plots.plot_energy(synthetic(samples=5))
     line, engine, drawn = figure.axes[0].lines[0], figure.get_layout_engine(), []
