@@ -10,6 +10,8 @@ from numpy.linalg import norm
 from finger_pin.control.interface import ControlSignals
 from finger_pin.core.inputs import HELD
 
+pytestmark = pytest.mark.slow
+
 #: Sixth-order central differences: where to look, in steps, and weights.
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
@@ -131,7 +133,6 @@ def extracted(case: Case, time, x, g):
     return g * np.eye(len(x)) - np.linalg.inv(case.solve(time, x, g)[1][:, :-1])
 
 
-@pytest.mark.slow
 def test_every_block_of_the_jacobian_is_that_of_differences(examined):
     case, found = examined
     for time, x, jacobian, _ in found:
@@ -153,7 +154,6 @@ def test_the_states_examined_touch_a_limiter_and_have_a_slack_tendon(examined):
     assert np.any(signals.tendons.strands == 0.0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("g", [1e1, 1e3, 1e6])
 def test_the_linear_system_is_solved(examined, g):
     """Against a dense solution with the differences' Jacobian, by kind of state, for long and for short steps."""

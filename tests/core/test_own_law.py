@@ -14,6 +14,8 @@ from finger_pin.core.inputs import held_control
 from finger_pin.laws.law import Law
 from finger_pin.mechanism.rows import Rows
 
+pytestmark = pytest.mark.slow
+
 
 def hysteresis_rate(state, speed, stiffness, level):
     """Dahl's model: z' = s (v - z |v| / level)."""
@@ -129,7 +131,6 @@ def simulated(rubber):
     return found
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Rodas5P", "Radau"])
 def test_a_simulation_shows_its_signals_and_books_its_energy_and_its_loss(simulated, method):
     result = simulated[method]

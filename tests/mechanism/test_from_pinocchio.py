@@ -10,6 +10,8 @@ import finger_pin as fp
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.energy import energies, powers
 
+pytestmark = pytest.mark.slow
+
 JOINTS = {"spread": "joint_0.0", "proximal": "joint_1.0", "medial": "joint_2.0", "distal": "joint_3.0"}
 INDICES = [0, 1, 2, 3]
 TIP = "link_3.0_tip"
@@ -127,7 +129,6 @@ def test_the_fingertip_is_where_the_whole_hand_has_it(finger, hand, posture):
         np.testing.assert_allclose(finger.rigid_body.tip_position(rows), expected, rtol=1e-12, atol=1e-15)
 
 
-@pytest.mark.slow
 def test_along_the_motion_the_whole_hand_needs_just_the_torques_that_the_finger_reports(finger, hand, posture, motion):
     times, x, _ = motion
     data = hand.createData()

@@ -8,6 +8,8 @@ from scipy.optimize import minimize_scalar
 
 from finger_pin.mechanism.gaps import prism_parameters
 
+pytestmark = pytest.mark.slow
+
 SHAPES = ("half_space", "sphere", "box", "cylinder", "capsule")
 #: coal's distances of these are iterated to about 1e-6 m.
 ITERATED = ("box", "cylinder")
@@ -38,7 +40,6 @@ def half_rounding(p):
     return 0.5 * (p[:, 0] + p[:, 9]) if p.shape[1] > 4 else np.full(len(p), np.inf)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "part"), PAIRS)
 def test_distances_are_those_of_coal_on_ten_thousand_random_pairs(shape, part):
     """550 of each kind; of what reaches into the other body's core but for points, coal alone knows how deep it is.

@@ -12,6 +12,8 @@ from paper.plot_controllers import plot_controllers
 import finger_pin as fp
 from finger_pin.commands.application import run_function
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def coupling(routing):
@@ -40,7 +42,6 @@ def test_every_case_is_sampled_alike_and_no_two_are_the_same():
     assert all(one.controller != other.controller for k, one in enumerate(cases) for other in cases[:k])
 
 
-@pytest.mark.slow
 def test_friction_compensation_cuts_the_error_by_three_at_no_more_than_1_3_times_the_peak_tension(rows):
     """A whole period of the motion, four seconds after the first, with every minimum tension as in the paper's run."""
     paper, best = rows["paper"], rows["all friction, f5d 4 N, loop"]
@@ -99,7 +100,6 @@ def script(monkeypatch):
     return partial(run_function, controllers)
 
 
-@pytest.mark.slow
 def test_the_script_shows_the_table_and_writes_it_with_the_figure(script, tmp_path, capsys):
     assert script(["--output", str(tmp_path / "made")]) == 0
     assert sorted(each.name for each in (tmp_path / "made").iterdir()) == ["controllers.csv", "controllers.png"]

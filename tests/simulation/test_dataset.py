@@ -8,6 +8,8 @@ import xarray as xr
 
 import finger_pin as fp
 
+pytestmark = pytest.mark.slow
+
 JOINT, TENDON, AXIS, TIME = ("time", "joint"), ("time", "tendon"), ("time", "axis"), ("time",)
 
 #: Variables that other programs hold on to: dims and unit.
@@ -45,7 +47,6 @@ def result(request, fig6_runs):
     return fig6_runs[request.param]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", INTERFACE)
 def test_the_dataset_has_every_variable_of_the_interface(result, name):
     dims, unit = INTERFACE[name]
