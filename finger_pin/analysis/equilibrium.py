@@ -136,9 +136,8 @@ class _Statics:
                 least, most, lowest, highest = table.parameters[limits]
                 actuator_state[: table.count] = np.clip(np.clip(command[table.channels], least, most), lowest, highest)
                 actuator_state = actuator_state[table.count :]
-        on_paths = np.isin(finger.routing.joints, list(finger.description.tree.on_paths))
         scale = np.concatenate([np.ones(len(position)), np.full(passive, 1e-3)])
-        return cls(finger, command, pushed, rest, scale, on_paths)
+        return cls(finger, command, pushed, rest, scale, finger.led_joints)
 
     @property
     def start(self) -> Array:

@@ -53,7 +53,7 @@ class TipPosture(BriefRepr):
 def _constraints(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
     """Return a function of theta: by how much couplings and loops are missed, shape (k,), and its slopes, (k, n)."""
     joints = len(finger.routing.joints)
-    moves = ~np.isin(finger.routing.joints, list(finger.description.tree.on_paths))
+    moves = ~finger.led_joints
     tables = [table for table in finger.mechanism.rows if table.group in ("coupling", "loop")]
     if not tables:
         return lambda theta: (np.zeros(0), np.zeros((0, joints)))
@@ -97,8 +97,7 @@ def inverse_kinematics(
     low, high = (np.clip(each, -np.pi, np.pi) for each in (finger.stroke_limiter.lower, finger.stroke_limiter.upper))
     wanted = np.clip(0.0, low, high) if near is None else np.array(finite_vector("near", near, len(low)))
     # What is moved along paths stays.
-    led = np.isin(finger.routing.joints, list(finger.description.tree.on_paths))
-    low, high = (np.where(led, wanted + half, each) for half, each in ((-_STAYS, low), (_STAYS, high)))
+    low, high = (np.where(finger.led_joints, wanted + half, each) for half, each in ((-_STAYS, low), (_STAYS, high)))
     coupling = PassiveCoupling.inextensible(finger.routing)
     free = coupling.free
     followers, moved = list(coupling.followers), coupling.matrix[:, free]

@@ -50,7 +50,7 @@ def resting_finger(finger: FingerDescription, wound: Collection[str]) -> FingerD
 
 
 def wound_length(finger: FingerDescription, motor: str, goal: Array, angle: bool) -> Array:
-    """Return what the winch in place of a motor winds in, m, for goals of its spool, rad, or of its cord, m."""
+    """Return the winding of the winch in place of a motor, m, for goals of its spool, rad, or of its cord, m."""
     stiffness, pretension = _cord(finger, motor)
     return np.asarray((finger.actuators[motor].radii[0] if angle else 1.0) * goal + pretension / stiffness)
 

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
@@ -152,6 +153,11 @@ class Finger:
     def coupling(self) -> Array:
         """H_c, shape (t, n), m, (3)."""
         return self.routing.coupling
+
+    @property
+    def led_joints(self) -> NDArray[np.bool_]:
+        """Mask of the joints that are moved along paths, shape (n,)."""
+        return np.isin(self.routing.joints, [*self.description.tree.on_paths])
 
     @property
     def strand_coupling(self) -> Array:

@@ -188,6 +188,22 @@ def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
     return along, out, across, inverse
 
 
+def _displaced(j: int, s: float, r: Any, n: Any, axis: Any, shorter: float, whole: bool) -> Any:
+    """Return the motion of the nearest point by one component of y, at constant s, with r turned with the axis.
+
+    An ellipsoid moves as a whole, and what turns it turns the normal as it sees it. That is returned too, and the sign
+    with which a component turns the axis, its place k, and how far the distance changes: s and r minimise it.
+    """
+    k, share, sign = (j, 1.0 - s, -1.0) if j < 3 else (j - 3, s, 1.0)
+    if whole and j > 2:
+        swing = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
+        moved = cross(swing, r)
+        return moved, cross(swing, n), sign, k, dot(n, moved)
+    tilt = -sign * r[k] * shorter
+    moved = share * (k == 0) + tilt * axis[0], share * (k == 1) + tilt * axis[1], share * (k == 2) + tilt * axis[2]
+    return moved, (0.0, 0.0, 0.0), sign, k, share * n[k] - sign * r[k] * (dot(axis, n) * shorter)
+
+
 def _slopes(y: Any, p: Any, out: Any) -> None:
     level, size, sunk, rate, bend, flat, s, r_x, r_y, r_z = _level(y, p)
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
@@ -212,18 +228,7 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         f, g, k, spread = _sinking(offset(x_, y_, z_, p, sunk), p)
         sinking, turning = (f, g, k), ((f - spread * u) / far, (g - spread * v) / far, (k - spread * w) / far)
     for j in range(6):
-        k, share, sign = (j, 1.0 - s, -1.0) if j < 3 else (j - 3, s, 1.0)
-        # By the one component that moves, at constant s, and r turned with the axis. An ellipsoid moves as a whole.
-        tilt = -sign * r[k] * shorter
-        dx = share * (k == 0) + tilt * axis[0]
-        dy = share * (k == 1) + tilt * axis[1]
-        dz = share * (k == 2) + tilt * axis[2]
-        # The distance changes as the nearest point does at constant s and r: they minimise it.
-        change, swung = share * n[k] - sign * r[k] * leaning, (0.0, 0.0, 0.0)
-        if whole and j > 2:
-            swing = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
-            (dx, dy, dz), swung = cross(swing, r), cross(swing, n)
-            change = dot(n, (dx, dy, dz))
+        (dx, dy, dz), swung, sign, k, change = _displaced(j, s, r, n, axis, shorter, whole)
         shrinks = -rate * size * change
         d = turned(h, dx, dy, dz)
         d = (d[0] + shrinks * turning[0], d[1] + shrinks * turning[1], d[2] + shrinks * turning[2])

@@ -48,7 +48,7 @@ def _squared(f: Any, g: Any, e: Any) -> Any:
 
 
 def _support(square: Any, n: Any) -> Any:
-    """Return a body's extent along n, the point where a plane across n touches it, and the slope of that by n."""
+    """Return the extent of a body along n, its farthest point from its centre, and the slope of that point by n."""
     x, y, z = turned(square, n[0], n[1], n[2])
     far = (x * n[0] + y * n[1] + z * n[2]) ** 0.5
     x, y, z, shorter = x / far, y / far, z / far, 1.0 / far

@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from finger_pin.mechanism.gaps.ellipsoid import on_ball, semi_axes
+from finger_pin.mechanism.gaps.ellipsoid import drawn, on_ball, semi_axes
 from finger_pin.mechanism.gaps.prism import GAP, offset
 from finger_pin.mechanism.gaps.vectors import across
 
@@ -204,45 +204,34 @@ def _along(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, st
     return share
 
 
-def _of_ellipsoid(y: Any, p: Any, sunk: float, blunt: float) -> Any:
-    """Return 0 and r of the point of an ellipsoid that is nearest to the shrunk core."""
-    frame = semi_axes(y, p[GAP.third])
-    none, u, v, s, size = (0.0, 0.0), 0.0, 0.0, 0.0, 1.0
-    for _ in range(_MOST_STEPS):
-        x, y_, z = _place(y, frame, u, v, s)
-        w = offset(x, y_, z, p, sunk)
-        # In the core there is nothing nearer.
-        if w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < _ROUNDING * _ROUNDING * blunt * blunt:
-            break
-        d_u, d_v, d_s = on_ball(_expanded(y, p, sunk, blunt, frame, none, u, v, s), (u, v, s))
-        d_u, d_v, d_s = d_u - u, d_v - v, d_s - s
-        before, size = size, abs(d_u) + abs(d_v) + abs(d_s)
-        if size < 1e-14 or (size < _ROUNDING and size > 0.5 * before):
-            break
-        share = _along(y, p, sunk, blunt, frame, none, (u, v, s), (d_u, d_v, d_s))
-        u, v, s = u + share * d_u, v + share * d_v, s + share * d_s
-    r_x, r_y, r_z = _place((0.0, 0.0, 0.0), frame, u, v, s)
-    return 0.0, r_x, r_y, r_z
+def _is_in_core(x: Any, p: Any, sunk: float, blunt: float) -> Any:
+    """Return whether a point is in the shrunk core: nothing is nearer."""
+    w = offset(x[0], x[1], x[2], p, sunk)
+    return w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < _ROUNDING * _ROUNDING * blunt * blunt
 
 
 def nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
-    """Return s and r of the point nearest to the shrunk core of a part whose ends P_0 and P_1 are y, shape (6,).
+    """Return s and r of the point nearest to the shrunk core of a part whose points are y; 0 and r of an ellipsoid.
 
     Up to a distance ``blunt``, m, |w| counts as (|w|^2 / blunt + blunt) / 2, so that the point is unique inside too.
     """
-    if p[GAP.third] > 0.0:
-        return _of_ellipsoid(y, p, sunk, blunt)
-    if p[GAP.disc] == 0.0:
+    whole, along, pulls = p[GAP.third] > 0.0, p[GAP.along], (0.0, 0.0)
+    if whole:
+        f, g, e = semi_axes(y, p[GAP.third])
+    elif p[GAP.disc] == 0.0:
         return _on_segment(y, p, sunk, blunt), 0.0, 0.0, 0.0
-    e = (y[3] - y[0], y[4] - y[1], y[5] - y[2])
-    length = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-    a, b, c = e[0] / length, e[1] / length, e[2] / length
-    big, (f, g) = p[GAP.disc], across(a, b, c)
-    f, g = (big * f[0], big * f[1], big * f[2]), (big * g[0], big * g[1], big * g[2])
-    along, pulls = p[GAP.along], (2.0 * EPSILON * length, EPSILON * big)
+    else:
+        e, big = (y[3] - y[0], y[4] - y[1], y[5] - y[2]), p[GAP.disc]
+        length = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+        f, g = across(e[0] / length, e[1] / length, e[2] / length)
+        f, g = (big * f[0], big * f[1], big * f[2]), (big * g[0], big * g[1], big * g[2])
+        pulls = (2.0 * EPSILON * length, EPSILON * big)
     u, v, s, size = 0.0, 0.0, 0.5 * along, 1.0
     for _ in range(_MOST_STEPS):
-        d_u, d_v, d_s = _minimum(_expanded(y, p, sunk, blunt, (f, g, e), pulls, u, v, s), along)
+        if whole and _is_in_core(_place(y, (f, g, e), u, v, s), p, sunk, blunt):
+            break
+        h = _expanded(y, p, sunk, blunt, (f, g, e), pulls, u, v, s)
+        d_u, d_v, d_s = on_ball(h, (u, v, s)) if whole else _minimum(h, along)
         d_u, d_v, d_s = d_u - u, d_v - v, d_s - s
         before, size = size, abs(d_u) + abs(d_v) + abs(d_s)
         # Steps that no longer shrink are those of rounding.
@@ -250,6 +239,9 @@ def nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
             break
         share = _along(y, p, sunk, blunt, (f, g, e), pulls, (u, v, s), (d_u, d_v, d_s))
         u, v, s = u + share * d_u, v + share * d_v, s + share * d_s
+    if whole:
+        x, y_, z = drawn(f, g, e, (u, v, s))
+        return 0.0, x, y_, z
     return s, u * f[0] + v * g[0], u * f[1] + v * g[1], u * f[2] + v * g[2]
 
 
