@@ -52,8 +52,6 @@ class Subset:
         """Start empty."""
         self.kept: dict[str, Indices] = {}
         self.new: dict[str, Indices] = {}
-        # Of one wiring all integers of a table are the same.
-        self._integers: dict[type, dict[str, Indices]] = {}
 
     def keep(self, axis: str, indices: Indices, size: int) -> None:
         """Keep some indices of an axis of a size."""
@@ -68,16 +66,10 @@ class Subset:
         self.keep(axis, np.concatenate([np.zeros(0, dtype=np.int64), *ranges]), int(starts[-1][0][-1]))
 
     def select(self, table: _Table) -> _Table:
-        """Return the table of this part; fields without axes stay as they are.
-
-        Tables of one type have the same integers.
-        """
-        known = self._integers.get(type(table), {})
-        fields: dict[str, Any] = dict(known)
+        """Return the table of this part; fields without axes stay as they are."""
+        fields: dict[str, Any] = {}
         ends: dict[str, int] = {}
         for name, (axes, of, starts) in _fields(table):
-            if name in known:
-                continue
             value = getattr(table, name)
             if starts:
                 counts = np.diff(value)[self.kept[axes[0]]]
@@ -88,8 +80,6 @@ class Subset:
                 if axis in self.kept:
                     value = value.take(self.kept[axis], axis=place)
             fields[name] = self.new[of][value] if of else value
-        if not known:
-            self._integers[type(table)] = {name: each for name, each in fields.items() if each.dtype == np.int64}
         return table._replace(**fields)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.buffers import Work, build_work
+from finger_pin.core.buffers import build_work
 from finger_pin.core.evaluation.condensation import condense
 from finger_pin.core.evaluation.contacts import add_pushes, fill_contact_gains, measure
 from finger_pin.core.evaluation.dynamics import evaluate, exert
@@ -18,10 +18,11 @@ from finger_pin.core.evaluation.path_derivatives import linearise_paths
 from finger_pin.core.evaluation.paths import look
 from finger_pin.core.evaluation.state_batches import STATES, States, evaluate_many
 from finger_pin.core.inputs import InputTable, held_control
-from finger_pin.core.jit import call, copied, nothing, pack
+from finger_pin.core.jit import call, nothing, pack
 from finger_pin.core.linear_systems import Linear, build_linear
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.structure import Structure
 from finger_pin.core.threads import in_threads, threads
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import GUIDES
@@ -94,43 +95,62 @@ class BoundModel:
     """
 
     def __init__(
-        self, tables: Tables, control: InputTable, work: Work, moved: bool = False, linearised: bool = True
+        self,
+        structure: Structure,
+        parameters: Parameters,
+        laws: Sequence[Law | ContactLaw],
+        control: InputTable,
+        moved: bool = False,
+        linearised: bool = True,
     ) -> None:
         """Bind; arrays are taken as they are, not copied.
 
         Args:
-            tables: Of a mechanism.
+            structure: Of a mechanism.
+            parameters: Its parameters.
+            laws: Of its groups of rows.
             control: Its inputs.
-            work: Memory.
             moved: Whether the base is moved by others than its control.
             linearised: Whether it has memory for `linearise` and `condense`.
         """
-        size = 2 * len(work.torque) + len(tables.state_row)
+        size = 2 * len(structure.prescribed) + len(structure.state_row)
         moved = moved or len(control.palm.harmonics) > 0
-        through_space = len(tables.paths.columns) > 0
+        through_space = len(structure.paths.columns) > 0
         units = [unit.address for unit in (evaluate, exert, linearise, condense)]
         # Compiled only for mechanisms that need them: paths through space or contacts, and a base that moves.
         units += [unit.address if through_space else 0 for unit in _THROUGH_SPACE]
         units += [unit.address if moved else 0 for unit in _MOVED]
-        linear = build_linear(tables, control) if linearised else _NO_LINEAR
-        self.model = Model(tables, control, work, linear, np.zeros(size), np.zeros(size), *units)
+        work = build_work(structure, laws, len(control.tension))
+        linear = build_linear(structure, control) if linearised else _NO_LINEAR
+        self.model = Model(structure, parameters, control, work, linear, np.zeros(size), np.zeros(size), *units)
+        # No path and no moving body changes these.
+        work.base_acceleration[3:] = -parameters.gravity
+        work.arm[:], work.gradient[:] = parameters.arm, parameters.measure
+        work.paths.frame[:], work.paths.origin[:] = parameters.paths.rotation, parameters.paths.origin
+        if linearised:
+            lumped = np.arange(len(structure.parents), len(structure.prescribed))
+            linear.mass[lumped, lumped] = parameters.lumps
+            linear.arm[:], linear.measure[:], linear.bend[:] = parameters.arm, parameters.measure, parameters.bend
         self._block = pack(self.model, MODEL)
         self.address = self._block.address
 
 
 class Models:
-    """Models of the same tables under given inputs: memory for threads, with or without forces at tips."""
+    """Models of the same mechanism under given inputs: memory for threads, with or without forces at tips."""
 
-    def __init__(self, tables: Tables, laws: Sequence[Law | ContactLaw], channels: int, moved: bool) -> None:
-        """Keep tables and inputs.
+    def __init__(
+        self, structure: Structure, parameters: Parameters, laws: Sequence[Law | ContactLaw], channels: int, moved: bool
+    ) -> None:
+        """Keep a mechanism.
 
         Args:
-            tables: Of a mechanism.
-            laws: Of their groups of rows.
+            structure: Of a mechanism.
+            parameters: Its parameters.
+            laws: Of its groups of rows.
             channels: Number of inputs.
             moved: Whether the base moves.
         """
-        self.tables = tables
+        self.structure, self.parameters = structure, parameters
         self._laws, self._channels, self._moved = laws, channels, moved
         self._known: dict[tuple[bool, int], BoundModel] = {}
 
@@ -140,10 +160,10 @@ class Models:
         Each has memory of its own: without loads, nothing writes where loads have left their torques.
         """
         if (loaded, thread) not in self._known:
-            tables = copied(self.tables)._replace(has_tip_force=loaded)
-            work = build_work(tables, self._laws, self._channels)
-            control = held_control(self._channels, len(work.torque))
-            self._known[loaded, thread] = BoundModel(tables, control, work, self._moved, False)
+            parameters = self.parameters.separate()._replace(has_tip_force=loaded)
+            control = held_control(self._channels, len(self.structure.prescribed))
+            bound = BoundModel(self.structure, parameters, self._laws, control, self._moved, linearised=False)
+            self._known[loaded, thread] = bound
         return self._known[loaded, thread]
 
 
@@ -167,7 +187,7 @@ def fill(
         forces: At the tips, shape (m, t, 3), N.
         base: Motion of the base, as for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
     """
-    bases = path_motions(base, len(states), int(models.tables.prescribed.max(initial=-1)) + 1)
+    bases = path_motions(base, len(states), int(models.structure.prescribed.max(initial=-1)) + 1)
     loaded, count = bool(np.any(forces)), len(states)
 
     def fill_part(model: BoundModel, part: slice) -> None:

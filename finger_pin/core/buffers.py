@@ -10,7 +10,7 @@ import numpy as np
 from finger_pin.core.evaluation.law_code import SLOPE_COLUMNS, widest
 from finger_pin.core.jit import Layers, Matrix, Vector
 from finger_pin.core.path_tables import PathWork, build_path_work
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 from finger_pin.laws.law import ContactLaw, Law
 
 
@@ -48,7 +48,7 @@ class Work(NamedTuple):
         rows: Arguments and results of the rows' laws, shape (columns, K); columns `ROW`.
         slopes: Derivatives of the laws, shape (columns, K); columns `SLOPE`, of contacts `TOUCH_SLOPE`.
         powers: Stored energy and powers of the rows, shape (1 + powers, K).
-        arm: As in the tables, shape (arms,), with what paths through space add.
+        arm: As in the parameters, shape (arms,), with what paths through space add.
         gradient: dl/dq there, with what they add, shape (arms,).
         pull: Total force on the pin of each row, shape (K, 3), N.
         lever: The pin's link direction, shape (K, 3).
@@ -96,11 +96,12 @@ class Work(NamedTuple):
     paths: PathWork
 
 
-def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) -> Work:
-    """Allocate the memory for tables whose rows follow some laws."""
-    size, count, width, tips = len(tables.parents), len(tables.state), len(tables.prescribed), len(tables.tip_body)
+def build_work(structure: Structure, laws: Sequence[Law | ContactLaw], channels: int) -> Work:
+    """Allocate the memory for a structure whose rows follow some laws."""
+    size, count, width = len(structure.parents), len(structure.state), len(structure.prescribed)
+    tips = len(structure.tip_body)
     columns, powers = widest(laws)
-    work = Work(
+    return Work(
         rotation=np.zeros((size, 3, 3)),
         origin=np.zeros((size, 3)),
         centre=np.zeros(3),
@@ -120,8 +121,8 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         rows=np.zeros((columns, count)),
         slopes=np.zeros((SLOPE_COLUMNS, count)),
         powers=np.zeros((powers, count)),
-        arm=np.zeros(len(tables.arm)),
-        gradient=np.zeros(len(tables.arm)),
+        arm=np.zeros(len(structure.arm_at)),
+        gradient=np.zeros(len(structure.arm_at)),
         pull=np.zeros((count, 3)),
         lever=np.zeros((count, 3)),
         tip=np.zeros((tips, 3)),
@@ -132,12 +133,7 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         bias=np.zeros(width),
         acceleration=np.zeros(width),
         command=np.zeros(channels),
-        guide=np.zeros(int(tables.prescribed.max(initial=-1)) + 1),
-        guide_rate=np.zeros(int(tables.prescribed.max(initial=-1)) + 1),
-        paths=build_path_work(tables.paths, count, width),
+        guide=np.zeros(int(structure.prescribed.max(initial=-1)) + 1),
+        guide_rate=np.zeros(int(structure.prescribed.max(initial=-1)) + 1),
+        paths=build_path_work(structure.paths, count, width),
     )
-    # No path and no moving body changes these.
-    work.base_acceleration[3:] = -tables.gravity
-    work.arm[:], work.gradient[:] = tables.arm, tables.measure
-    work.paths.frame[:], work.paths.origin[:] = tables.paths.rotation, tables.paths.origin
-    return work

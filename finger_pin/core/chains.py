@@ -39,10 +39,10 @@ _ANYWHERE = 1e3
 
 
 class Chains(NamedTuple):
-    """The bodies of `Tables`, and the places of the model's joints among them.
+    """The bodies of a `Structure`, and the places of the model's joints among them.
 
     Attributes:
-        parents, roots, kinds, charts, chart_frames: As in `Tables`.
+        parents, roots, kinds, charts, chart_frames: As in `Structure` and `Parameters`.
         bodies: Likewise, without inertias.
         slides: Largest displacement of each sliding body, shape (n,), m.
         last: Of every joint of the model, the base first, its last body; -1 for the base.
@@ -141,8 +141,8 @@ def _frame_along(axis: tuple[float, float, float]) -> Array:
     return np.column_stack([first, np.cross(axis, first), axis])
 
 
-def tree_arrays(body: RigidBody, chains: Chains) -> dict[str, Any]:
-    """Return the tree of rigid bodies, its tips, and the loads of joints as pins."""
+def tree_arrays(body: RigidBody, chains: Chains) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return fields of `Structure`, the tree, its tips and the loads of joints as pins, and those of `Parameters`."""
     model, last, turns = body.model, chains.last, chains.turns
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
     tips = [model.frames[tip] for tip in body.tips]
@@ -150,15 +150,17 @@ def tree_arrays(body: RigidBody, chains: Chains) -> dict[str, Any]:
     parent_links = [body.parent_links[joint] for joint in joint_of]
     offsets = [turns[joint].T @ tip.placement.translation for joint, tip in zip(holders, tips, strict=True)]
     directions = [turns[at].T @ body.proximal_axes[joint] for at, joint in zip(parent_links, joint_of, strict=True)]
-    return {
+    structure = {
         "parents": chains.parents,
         "roots": chains.roots,
         "kinds": chains.kinds,
         "charts": chains.charts,
-        "chart_frames": chains.chart_frames,
         "tip_body": np.array([last[joint] for joint in holders], dtype=np.int64),
-        "tip_offset": np.array(offsets).reshape(-1, 3),
         "parent_links": np.array([last[joint] for joint in parent_links], dtype=np.int64),
-        "directions": np.array(directions).reshape(-1, 3),
         "supported_by": np.ascontiguousarray(body.supports[:, joint_of - 1]),
+    }
+    return structure, {
+        "chart_frames": chains.chart_frames,
+        "tip_offset": np.array(offsets).reshape(-1, 3),
+        "directions": np.array(directions).reshape(-1, 3),
     }

@@ -11,7 +11,7 @@ from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.state_batches import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
-from finger_pin.core.tables import build_tables
+from finger_pin.core.parameters import compile_mechanism
 from finger_pin.description.caching import cached_property
 from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs
@@ -31,7 +31,8 @@ class CompiledMechanism:
     Attributes:
         mechanism: The mechanism.
         charts: Places of quaternions in its packed states.
-        tables: Its arrays.
+        structure: Its structure.
+        parameters: Its parameters.
         models: Bound models of them.
     """
 
@@ -39,12 +40,12 @@ class CompiledMechanism:
         """Read a mechanism."""
         self.mechanism = mechanism
         self.charts = Charts.from_mechanism(mechanism)
-        self.tables = build_tables(mechanism)
-        size = 2 * len(self.tables.prescribed) + len(self.tables.state_row)
+        self.structure, self.parameters = compile_mechanism(mechanism)
+        size = 2 * len(self.structure.prescribed) + len(self.structure.state_row)
         if self.charts.size != size:
-            raise RuntimeError(f"tables have {size} numbers of the state, the mechanism {self.charts.size}")
+            raise RuntimeError(f"the structure has {size} numbers of the state, the mechanism {self.charts.size}")
         laws = [table.law for table in mechanism.rows]
-        self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved)
+        self.models = Models(self.structure, self.parameters, laws, mechanism.channels, mechanism.moved)
         self._motions: dict[int, _Asked] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -79,7 +80,7 @@ class CompiledMechanism:
             externals=np.empty((summed, width)),
             energy_terms=np.empty((summed, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
             # Of what touches, forces are added up.
-            touches=np.zeros((min(kept, summed), self.tables.contact_rows // self.tables.contact_arms, 9)),
+            touches=np.zeros((min(kept, summed), self.structure.contact_rows // self.structure.contact_arms, 9)),
         )
 
     def to_evaluation(self, buffer: SignalBuffer, at: slice | int = slice(None)) -> Evaluation:
@@ -133,11 +134,11 @@ class CompiledMechanism:
         self, buffer: SignalBuffer, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> None:
         """Fill a buffer with the signals of packed states, shape (size,) or (m, size)."""
-        mechanism, tables = self.mechanism, self.tables
+        mechanism = self.mechanism
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
         buffer.packed[:] = x
-        count, tips = len(buffer.packed), len(tables.tip_body)
+        count, tips = len(buffer.packed), len(self.structure.tip_body)
         commands = rows_of(command, (count, mechanism.channels))
         loaded = force is not None and bool(np.any(force))
         forces = np.zeros((count, tips, 3))
@@ -170,9 +171,8 @@ class CompiledMechanism:
 
     def _bound_motions(self, count: int, base: Array | None) -> _Asked:
         """Return buffers for postures, its tips, and the block by which compiled code finds it."""
-        tables = self.tables
-        shape = (count, len(tables.parents))
-        filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)
+        shape = (count, len(self.structure.parents))
+        filled = np.zeros((count, len(self.structure.tip_body), 3)), np.zeros(count), np.zeros(count)
         motions = Motions(
             self.models.model().address, np.zeros(shape), np.zeros(shape), *filled, path_motions(base, count, 0)
         )

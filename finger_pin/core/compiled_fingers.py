@@ -38,13 +38,13 @@ class CompiledFingers:
         # Says where tips are as long as bodies are the same, whoever is the first: that it binds once.
         self._mover = fingers[0]
         mechanism, count = self._first.mechanism, len(fingers)
-        tables = mechanism.tables
+        structure = mechanism.structure
         self._buffer = mechanism.allocate(count, "all" if accelerated else "no_acceleration")
         self._states = np.zeros((count, mechanism.charts.size))
         self._attitudes = np.zeros((count, len(mechanism.charts.quaternions), 4))
         self._commands = np.zeros((count, mechanism.mechanism.channels))
-        self._forces = np.zeros((count, len(tables.tip_body), 3))
-        self._prescribed = int(tables.prescribed.max(initial=-1)) + 1
+        self._forces = np.zeros((count, len(structure.tip_body), 3))
+        self._prescribed = int(structure.prescribed.max(initial=-1)) + 1
         self._bases = np.zeros((count, 15 + self._prescribed))
         # By whether there are forces at the tips, and whether the base moves.
         self._blocks: dict[tuple[bool, bool], list[Block]] = {}
@@ -75,8 +75,8 @@ class CompiledFingers:
         same_arms = all(one.arm is other.arm or np.array_equal(one.arm, other.arm) for one, other in pairs)
         at_home = finger is self._mover
         if not at_home:
-            tables = [each.mechanism.tables for each in (finger, self._mover)]
-            bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in tables]
+            numbers = [each.mechanism.parameters for each in (finger, self._mover)]
+            bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in numbers]
             at_home = all(map(np.array_equal, *bodies))
         return not same_arms or any(table.routed for table in rows[0]), not at_home
 

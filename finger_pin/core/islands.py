@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from finger_pin.core.axes import Subset
 from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.inputs import PLANNED, InputTable
-from finger_pin.core.jit import indices
-from finger_pin.core.row_tables import Groups
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.structure import Structure
 from finger_pin.description.caching import memoised
 
 Indices = NDArray[np.int64]
@@ -39,52 +38,51 @@ def _reads(control: InputTable) -> NDArray[np.bool_]:
     return np.asarray((control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0)))
 
 
-def _wires(tables: Tables, control: InputTable, *more: bool) -> tuple[object, ...]:
+def _wires(structure: Structure, control: InputTable, *more: bool) -> tuple[object, ...]:
     """Return all that islands depend on."""
-    wires = indices(tables), control.loop.tobytes(), control.channel.tobytes(), _reads(control).tobytes()
-    arrays = tables.parents, tables.lumps, tables.state, control.tension, control.minimum
-    return (*wires, control.kind, *map(len, arrays), *more)
+    wires = control.loop.tobytes(), control.channel.tobytes(), _reads(control).tobytes()
+    return (structure, *wires, control.kind, len(control.tension), len(control.minimum), *more)
 
 
 @memoised(_wires)
-def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> list[Island]:
+def find_islands(structure: Structure, control: InputTable, touching: bool = True) -> list[Island]:
     """Return the islands of a mechanism under its inputs, coupled by possible contacts or apart from them."""
-    count, bodies = len(tables.state), len(tables.parents)
-    width = bodies + len(tables.lumps)
+    count, bodies = len(structure.state), len(structure.parents)
+    width = len(structure.prescribed)
     planned = len(control.minimum) if control.kind == PLANNED else 0
     channels = len(control.tension)
     # Nodes: coordinates, rows, controllers; a controller stands at the index of its first planned tension.
     row_at, loop_at = width, width + count
     links: list[tuple[Indices, Indices]] = []
-    moved = np.flatnonzero(tables.parents >= 0)
-    links.append((moved, tables.parents[moved]))
-    for start, at in ((tables.arm_start, tables.arm_at), (tables.bend_start, tables.bend_at)):
+    moved = np.flatnonzero(structure.parents >= 0)
+    links.append((moved, structure.parents[moved]))
+    for start, at in ((structure.arm_start, structure.arm_at), (structure.bend_start, structure.bend_at)):
         owners = np.repeat(np.arange(count), np.diff(start))
-        kept = touching | (tables.touch[owners] == 0)
+        kept = touching | (structure.touch[owners] == 0)
         links.append((row_at + owners[kept], at[kept]))
-    for start in (tables.input_start, tables.load_start):
+    for start in (structure.input_start, structure.load_start):
         owners = np.repeat(np.arange(count), np.diff(start))
-        links.append((row_at + owners, row_at + tables.terms[start[0] : start[-1]]))
-    links.append((row_at + tables.read_row, row_at + tables.state_row[tables.read_at]))
+        links.append((row_at + owners, row_at + structure.terms[start[0] : start[-1]]))
+    links.append((row_at + structure.read_row, row_at + structure.state_row[structure.read_at]))
     if planned:
         tensions, read = np.nonzero(_reads(control))
         links.append((loop_at + control.loop[tensions], read))
         loop_of = np.full(channels, -1)
         driven = control.channel >= 0
         loop_of[control.channel[driven]] = control.loop[driven]
-        wired = np.flatnonzero((tables.channel >= 0) & (loop_of[tables.channel] >= 0))
-        links.append((row_at + wired, loop_at + loop_of[tables.channel[wired]]))
+        wired = np.flatnonzero((structure.channel >= 0) & (loop_of[structure.channel] >= 0))
+        links.append((row_at + wired, loop_at + loop_of[structure.channel[wired]]))
     first, second = (np.concatenate(side) for side in zip(*links, strict=True))
     total = loop_at + (int(control.loop.max(initial=-1)) + 1 if planned else 0)
     labels = _connected(first, second, total)
     # What no coordinate feels, such as friction of a cord whose points all stand still, is the first one's.
     labels[~np.isin(labels, labels[:width])] = labels[0]
     islands: list[Island] = []
-    unread = np.setdiff1d(np.arange(channels), tables.channel)
+    unread = np.setdiff1d(np.arange(channels), structure.channel)
     for label in dict.fromkeys(labels[:width].tolist()):
         rows = np.flatnonzero(labels[row_at:loop_at] == label)
-        fed = tables.channel[rows]
-        states = tables.state[rows]
+        fed = structure.channel[rows]
+        states = structure.state[rows]
         islands.append(
             Island(
                 coordinates=np.flatnonzero(labels[:width] == label),
@@ -95,7 +93,9 @@ def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> 
                 planned=np.flatnonzero(labels[loop_at + control.loop] == label)
                 if planned
                 else np.zeros(0, dtype=np.int64),
-                tips=np.flatnonzero((tables.tip_body >= 0) & (labels[tables.tip_body] == label) if bodies else []),
+                tips=np.flatnonzero(
+                    (structure.tip_body >= 0) & (labels[structure.tip_body] == label) if bodies else []
+                ),
             )
         )
     return islands
@@ -103,61 +103,59 @@ def find_islands(tables: Tables, control: InputTable, touching: bool = True) -> 
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The part of tables of one wiring that an island has.
+    """An island's part of the structure of a mechanism.
 
     Attributes:
         island: Its indices in the whole.
         subset: Its places by axis; None where it is the whole.
-        groups: Its groups of rows, as in the tables.
-        of_groups: Numbers of these groups among all.
-        contact_rows: Number of rows of contacts.
+        structure: Its structure.
+        groups: Numbers of its groups of rows among all.
     """
 
     island: Island
     subset: Subset | None
-    groups: Groups
-    of_groups: Indices
-    contact_rows: int
+    structure: Structure
+    groups: Indices
 
     @classmethod
-    def from_island(cls, tables: Tables, island: Island) -> Selection:
-        """Return an island's part of tables."""
-        rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.prescribed)
+    def from_island(cls, structure: Structure, island: Island) -> Selection:
+        """Return an island's part of a structure."""
+        rows, paths, size, width = island.rows, structure.paths, len(structure.parents), len(structure.prescribed)
         bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
-        counts = np.diff(np.searchsorted(rows, np.append(tables.groups.first, len(tables.state))))
+        counts = np.diff(np.searchsorted(rows, np.append(structure.groups.first, len(structure.state))))
         present = np.flatnonzero(counts)
         ends = np.cumsum([0, *counts[present]])
+        channels = 1 + max(structure.channel.max(initial=-1), island.channels.max(initial=-1))
+        read = structure.read_states
         part = Subset()
         part.keep("coordinate", island.coordinates, width)
         part.keep("body", bodies, size)
         part.keep("lump", lumps - size, width - size)
-        part.keep("chart", np.flatnonzero(np.isin(tables.charts, bodies)), len(tables.charts))
-        part.keep("tip", island.tips, len(tables.tip_body))
-        part.keep("row", rows, len(tables.state))
+        part.keep("chart", np.flatnonzero(np.isin(structure.charts, bodies)), len(structure.charts))
+        part.keep("tip", island.tips, len(structure.tip_body))
+        part.keep("row", rows, len(structure.state))
         part.keep("group", present, len(counts))
-        part.keep("state", island.states, len(tables.state_row))
-        part.keep("input row", np.flatnonzero(np.isin(tables.input_rows, rows)), len(tables.input_rows))
-        part.keep("channel", island.channels, 1 + max(tables.channel.max(initial=-1), island.channels.max(initial=-1)))
-        read = tables.read_states
+        part.keep("state", island.states, len(structure.state_row))
+        part.keep("input row", np.flatnonzero(np.isin(structure.input_rows, rows)), len(structure.input_rows))
+        part.keep("channel", island.channels, channels)
         part.keep("read state", np.flatnonzero(np.isin(read, island.states)), len(read))
         for entries in ("arm", "bend", "term", "reading"):
-            part.keep_entries(tables, entries)
+            part.keep_entries(structure, entries)
         part.keep("path", np.flatnonzero(np.isin(paths.rows, rows)), len(paths.rows))
         part.keep_entries(paths, "leg")
         part.keep("piece", np.unique(paths.piece[part.kept["leg"]]), len(paths.columns))
         part.keep_entries(paths, "mover")
-        groups = part.select(tables.groups)._replace(first=ends[:-1], end=ends[1:])
-        return cls(island, part, groups, present, int(np.count_nonzero(tables.touch[rows])))
-
-    def tables(self, tables: Tables) -> Tables:
-        """Return the tables of the island."""
-        part = self.subset
-        if part is None:
-            return tables
-        island_tables = part.select(tables)
-        return island_tables._replace(
-            groups=self.groups, contact_rows=self.contact_rows, paths=part.select(tables.paths)
+        selected = part.select(structure)._replace(
+            groups=part.select(structure.groups)._replace(first=ends[:-1], end=ends[1:]),
+            contact_rows=int(np.count_nonzero(structure.touch[rows])),
+            paths=part.select(paths),
         )
+        return cls(island, part, selected, present)
+
+    def parameters(self, parameters: Parameters) -> Parameters:
+        """Return the parameters of the island."""
+        part = self.subset
+        return parameters if part is None else part.select(parameters)._replace(paths=part.select(parameters.paths))
 
     def control(self, control: InputTable) -> InputTable:
         """Return the inputs of the island."""
@@ -175,15 +173,15 @@ class Selection:
 
 
 @memoised(_wires)
-def selections(tables: Tables, control: InputTable) -> list[Selection]:
-    """Return the rows and states of every island; remembered for equal wiring."""
-    islands = find_islands(tables, control)
+def selections(structure: Structure, control: InputTable) -> list[Selection]:
+    """Return the islands of a mechanism under its inputs, with their structures."""
+    islands = find_islands(structure, control)
     states = np.sort(np.concatenate([each.states for each in islands]))
-    if not np.array_equal(states, np.arange(len(tables.state_row))):
-        raise RuntimeError(f"islands have the states {states.tolist()} of {len(tables.state_row)}")
+    if not np.array_equal(states, np.arange(len(structure.state_row))):
+        raise RuntimeError(f"islands have the states {states.tolist()} of {len(structure.state_row)}")
     if len(islands) == 1:
-        return [Selection(islands[0], None, tables.groups, np.arange(len(tables.groups.first)), tables.contact_rows)]
-    return [Selection.from_island(tables, island) for island in islands]
+        return [Selection(islands[0], None, structure, np.arange(len(structure.groups.first)))]
+    return [Selection.from_island(structure, island) for island in islands]
 
 
 def _chosen(signal: SignalTable, functions: Indices) -> SignalTable:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.islands import find_islands
 from finger_pin.core.jit import Indices, Matrix, Vector
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 from finger_pin.core.threads import physical_memory
 from finger_pin.exceptions import InputError
 
@@ -56,16 +56,16 @@ class Blocks(NamedTuple):
     current: Indices
 
 
-def build_blocks(tables: Tables, control: InputTable) -> Blocks:
-    """Return the blocks of tables while nothing touches."""
-    count, width, states = len(tables.state), len(tables.prescribed), len(tables.state_row)
+def build_blocks(structure: Structure, control: InputTable) -> Blocks:
+    """Return the blocks of a structure while nothing touches."""
+    count, width, states = len(structure.state), len(structure.prescribed), len(structure.state_row)
     atom, row_atom, atoms = np.zeros(width, dtype=np.int64), np.zeros(count, dtype=np.int64), 1
-    if tables.contact_rows:
-        islands = find_islands(tables, control, False)
+    if structure.contact_rows:
+        islands = find_islands(structure, control, False)
         atoms = len(islands)
         for index, island in enumerate(islands):
             atom[island.coordinates], row_atom[island.rows] = index, index
-        row_atom[tables.touch > 0] = -1
+        row_atom[structure.touch > 0] = -1
 
     def room(size: int) -> NDArray[np.int64]:
         return np.zeros(size, dtype=np.int64)
@@ -80,7 +80,7 @@ def build_blocks(tables: Tables, control: InputTable) -> Blocks:
         row_start=np.array([0, *[count] * atoms]),
         rows=np.arange(count),
         touch_start=room(atoms + 1),
-        touches=room(tables.contact_rows // tables.contact_arms),
+        touches=room(structure.contact_rows // structure.contact_arms),
         state_start=np.array([0, *[states] * atoms]),
         states=np.arange(states),
         place=np.arange(width),
@@ -107,7 +107,7 @@ class Linear(NamedTuple):
         arm: dl'/dv, shape (arms,).
         measure: dl/dq, shape (arms,).
         turning: dl'/dq at constant v, shape (arms,).
-        bend: d(curvature)/dq, as in the tables, shape (bends,).
+        bend: d(curvature)/dq, shape (bends,).
         load_slope: dN/dS, S the sum of earlier forces, shape (K,).
         load_by_position: dN/dq at constant S, shape (K, N).
         load_by_time: dN/dt at constant S, shape (K,).
@@ -159,33 +159,33 @@ class Linear(NamedTuple):
     blocks: Blocks
 
 
-def build_linear(tables: Tables, control: InputTable) -> Linear:
-    """Allocate the linearisation of tables.
+def build_linear(structure: Structure, control: InputTable) -> Linear:
+    """Allocate the linearisation of a structure.
 
     Raises:
         InputError: If so many bodies can touch that it cannot fit into the machine's memory.
     """
-    count, width, states = len(tables.state), len(tables.prescribed), len(tables.state_row)
-    wide, reads = 2 * width + states + 1, len(tables.read_states)
+    count, width, states = len(structure.state), len(structure.prescribed), len(structure.state_row)
+    wide, reads = 2 * width + states + 1, len(structure.read_states)
     full = wide + reads
     if (needed := 8.0 * wide * max(count, wide)) > (present := physical_memory()):
-        pairs, most = tables.contact_rows // tables.contact_arms, present / 2**30
+        pairs, most = structure.contact_rows // structure.contact_arms, present / 2**30
         allowed = f"{pairs} pairs of bodies can touch, which needs {needed / 2**30:.3g} GiB of memory, of {most:.3g}"
         raise InputError("contacts", f"{allowed}; let fewer bodies touch")
-    linear = Linear(
+    return Linear(
         mass=np.zeros((width, width)),
         by_position=np.zeros((width, width)),
         by_velocity=np.zeros((width, width)),
         bias_rate=np.zeros(width),
-        arm=np.zeros(len(tables.arm)),
-        measure=np.zeros(len(tables.arm)),
-        turning=np.zeros(len(tables.arm)),
-        bend=np.zeros(len(tables.bend)),
+        arm=np.zeros(len(structure.arm_at)),
+        measure=np.zeros(len(structure.arm_at)),
+        turning=np.zeros(len(structure.arm_at)),
+        bend=np.zeros(len(structure.bend_at)),
         load_slope=np.zeros(count),
         load_by_position=np.zeros((count, width)),
         load_by_time=np.zeros(count),
-        contact_matrix=np.zeros((tables.contact_arms - 1,) * 2),
-        contact_weights=np.zeros(tables.contact_arms + 1),
+        contact_matrix=np.zeros((structure.contact_arms - 1,) * 2),
+        contact_weights=np.zeros(structure.contact_arms + 1),
         gain=np.zeros((count, full)),
         state_gain=np.zeros((states, full)),
         load=np.zeros(full),
@@ -200,10 +200,5 @@ def build_linear(tables: Tables, control: InputTable) -> Linear:
         solution=np.zeros((wide - 1, wide)),
         loose=np.zeros(states),
         right=np.zeros(wide),
-        blocks=build_blocks(tables, control),
+        blocks=build_blocks(structure, control),
     )
-    # No posture changes these.
-    lumped = np.arange(len(tables.parents), width)
-    linear.mass[lumped, lumped] = tables.lumps
-    linear.arm[:], linear.measure[:], linear.bend[:] = tables.arm, tables.measure, tables.bend
-    return linear

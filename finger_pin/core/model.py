@@ -1,4 +1,4 @@
-"""Compiled model of a mechanism: tables, inputs and memory at one address."""
+"""Compiled model of a mechanism: structure, parameters, inputs and memory at one address."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import StructType, Vector
 from finger_pin.core.linear_systems import Linear
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.structure import Structure
 
 
 class Model(NamedTuple):
-    """The tables, inputs and memory of an evaluation and its linearisation.
+    """The structure, parameters, inputs and memory of an evaluation and its linearisation.
 
     Attributes:
-        tables: The mechanism.
+        structure, parameters: The mechanism.
         control: Its inputs.
         work: Memory of an evaluation.
         linear: Memory of a linearisation.
@@ -35,7 +36,8 @@ class Model(NamedTuple):
         base_power: Address of what fills the power that it supplies.
     """
 
-    tables: Tables
+    structure: Structure
+    parameters: Parameters
     control: InputTable
     work: Work
     linear: Linear

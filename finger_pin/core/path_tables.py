@@ -44,27 +44,18 @@ WRENCH = 12
 LOOKS = 60
 
 
-class Paths(NamedTuple):
+class PathStructure(NamedTuple):
     """E pieces, and the L legs with which R rows use them.
 
     Attributes:
         bodies: Columns `PIECE`, -1 for the base, shape (E, 4).
-        points: Both points, and a third one, in the frames of their bodies, shape (E, 9), m.
-        rotation: Of the piece's frame in its body's, shape (E, 3, 3).
-        origin: Of the piece's frame in its body's, shape (E, 3), m.
         thirds: One where a piece has a third point, shape (E,).
         value, slopes: Addresses of the shape of each, shape (E,).
         columns: Number of wrenches of each that rows use, shape (E,).
-        parameters: Shape (E, most parameters).
-        reach: Shape (E,), m.
         start: First index of the coordinates that move a piece, shape (E + 1,).
         at: Coordinates, shape (entries,).
         moves: One where a coordinate moves the body, the first columns of `PIECE`, shape (entries, 3).
-        motion_bounds: Largest displacement of a point of a gap's bodies against the other body by a unit of each, shape
-            (entries,), m; zero where it carries both, or only turns what looks alike.
         opposing_coordinate: Coordinate that moves the other body in the same direction, -1 for none, shape (entries,).
-        cores: Extent of the core of a gap's first body from the middle of its two points, shape (E,), m.
-        extents: Extent of the core of a gap's second body from its frame's origin, shape (E,), m.
         row: First row that uses each, shape (E,).
         carries: One where a body carries another, shape (n, n).
         rows: Rows with paths, shape (R,).
@@ -72,27 +63,18 @@ class Paths(NamedTuple):
         piece: Of each leg, shape (L,).
         column: Of each leg, shape (L,).
         follows: Of each leg, shape (L,).
-        arm_weight, length_weight: Of each leg, in the arm and in the length, shape (L,).
         bends: Whether each leg's turn counts, shape (L,).
     """
 
     bodies: Annotated[IndexTable, along("piece", "x", of="body")]
-    points: Annotated[Matrix, along("piece", "x")]
-    rotation: Annotated[Layers, along("piece", "x", "y")]
-    origin: Annotated[Matrix, along("piece", "x")]
     thirds: Annotated[Indices, along("piece")]
     value: Annotated[Indices, along("piece")]
     slopes: Annotated[Indices, along("piece")]
     columns: Annotated[Indices, along("piece")]
-    parameters: Annotated[Matrix, along("piece", "c")]
-    reach: Annotated[Vector, along("piece")]
     start: Annotated[Indices, along("piece", starts="mover")]
     at: Annotated[Indices, along("mover", of="body")]
     moves: Annotated[IndexTable, along("mover", "x")]
-    motion_bounds: Annotated[Vector, along("mover")]
     opposing_coordinate: Annotated[Indices, along("mover", of="body")]
-    cores: Annotated[Vector, along("piece")]
-    extents: Annotated[Vector, along("piece")]
     row: Annotated[Indices, along("piece", of="row")]
     carries: Annotated[IndexTable, along("body", "body")]
     rows: Annotated[Indices, along("path", of="row")]
@@ -100,13 +82,39 @@ class Paths(NamedTuple):
     piece: Annotated[Indices, along("leg", of="piece")]
     column: Annotated[Indices, along("leg")]
     follows: Annotated[Indices, along("leg")]
-    arm_weight: Annotated[Vector, along("leg")]
-    length_weight: Annotated[Vector, along("leg")]
     bends: Annotated[Indices, along("leg")]
 
     def __reduce__(self) -> NoReturn:
         """Refuse: addresses of shapes are those of one process."""
         refuse_copy(self)
+
+
+class PathParameters(NamedTuple):
+    """Numbers of E pieces and L legs.
+
+    Attributes:
+        points: Both points, and a third one, in the frames of their bodies, shape (E, 9), m.
+        rotation: Of the piece's frame in its body's, shape (E, 3, 3).
+        origin: Of the piece's frame in its body's, shape (E, 3), m.
+        shapes: Parameters of the shapes, shape (E, most parameters).
+        reach: Shape (E,), m.
+        motion_bounds: Largest displacement of a point of a gap's bodies against the other body by a unit of each, shape
+            (entries,), m; zero where it carries both, or only turns what looks alike.
+        cores: Extent of the core of a gap's first body from the middle of its two points, shape (E,), m.
+        extents: Extent of the core of a gap's second body from its frame's origin, shape (E,), m.
+        arm_weight, length_weight: Of each leg, in the arm and in the length, shape (L,).
+    """
+
+    points: Annotated[Matrix, along("piece", "x")]
+    rotation: Annotated[Layers, along("piece", "x", "y")]
+    origin: Annotated[Matrix, along("piece", "x")]
+    shapes: Annotated[Matrix, along("piece", "c")]
+    reach: Annotated[Vector, along("piece")]
+    motion_bounds: Annotated[Vector, along("mover")]
+    cores: Annotated[Vector, along("piece")]
+    extents: Annotated[Vector, along("piece")]
+    arm_weight: Annotated[Vector, along("leg")]
+    length_weight: Annotated[Vector, along("leg")]
 
 
 class PathWork(NamedTuple):
@@ -171,8 +179,8 @@ class PathWork(NamedTuple):
     wrench_slope: Layers
 
 
-def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
-    """Return the arrays of the paths of all rows, each empty for none, through the bodies of a model."""
+def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> tuple[PathStructure, PathParameters]:
+    """Return structure and parameters of the paths of all rows, each empty for none, through the bodies of a model."""
     parents, last, turns = chains.parents, chains.last, chains.turns
     pieces: list[PathElement] = list(dict.fromkeys(leg.piece for legs in paths for leg in legs))
     number = {piece: e for e, piece in enumerate(pieces)}
@@ -183,8 +191,8 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
     carried = [(a.joint, b.joint, p.joint, third.joint) for p, (a, b, third) in zip(pieces, ends, strict=True)]
     bodies = np.array([[last[joint] for joint in row] for row in carried], dtype=np.int64).reshape(-1, len(PIECE))
     entries = [_movers(row, parents) for row in bodies]
-    parameters = np.zeros((len(pieces), max((len(p.shape.parameters) for p in pieces), default=0)))
-    for row, piece in zip(parameters, pieces, strict=True):
+    shapes = np.zeros((len(pieces), max((len(p.shape.parameters) for p in pieces), default=0)))
+    for row, piece in zip(shapes, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in row]) for row in ends]
     carrying = Carrying.from_chains(chains)
@@ -196,24 +204,16 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         if parent >= 0:
             carries[:, body] = carries[:, parent]
             carries[parent, body] = 1
-    return Paths(
+    structure = PathStructure(
         bodies=bodies,
-        points=np.array(points).reshape(-1, 9),
-        rotation=np.array([turns[p.joint].T @ p.frame.rotation for p in pieces]).reshape(-1, 3, 3),
-        origin=np.array([turns[p.joint].T @ p.frame.translation for p in pieces]).reshape(-1, 3),
         thirds=np.array([len(p.ends) == 3 for p in pieces], dtype=np.int64),
         value=np.array([shape_address(p.shape.value) for p in pieces], dtype=np.int64),
         slopes=np.array([shape_address(p.shape.slopes) for p in pieces], dtype=np.int64),
         columns=np.array([columns[p] for p in pieces], dtype=np.int64),
-        parameters=parameters,
-        reach=np.array([p.reach for p in pieces], dtype=float),
         start=np.cumsum([0, *(len(at) for at, _ in entries)]),
         at=np.concatenate([np.zeros(0, dtype=np.int64), *(at for at, _ in entries)]),
         moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
-        motion_bounds=np.concatenate([np.zeros(0), *(each for each, _ in bounds)]),
         opposing_coordinate=np.concatenate([np.zeros(0, dtype=np.int64), *(others for _, others in bounds)]),
-        cores=np.array([half + piece.breadth for half, piece in zip(halves, pieces, strict=True)]),
-        extents=np.array([piece.extent for piece in pieces], dtype=float),
         row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
         carries=carries,
         rows=rows,
@@ -221,13 +221,23 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> Paths:
         piece=np.array([number[leg.piece] for leg in legs], dtype=np.int64),
         column=np.array([leg.column for leg in legs], dtype=np.int64),
         follows=np.array([leg.follows for leg in legs], dtype=np.int64),
+        bends=np.array([leg.bends for leg in legs], dtype=np.int64),
+    )
+    return structure, PathParameters(
+        points=np.array(points).reshape(-1, 9),
+        rotation=np.array([turns[p.joint].T @ p.frame.rotation for p in pieces]).reshape(-1, 3, 3),
+        origin=np.array([turns[p.joint].T @ p.frame.translation for p in pieces]).reshape(-1, 3),
+        shapes=shapes,
+        reach=np.array([p.reach for p in pieces], dtype=float),
+        motion_bounds=np.concatenate([np.zeros(0), *(each for each, _ in bounds)]),
+        cores=np.array([half + piece.breadth for half, piece in zip(halves, pieces, strict=True)]),
+        extents=np.array([piece.extent for piece in pieces], dtype=float),
         arm_weight=np.array([leg.arm for leg in legs], dtype=float),
         length_weight=np.array([leg.length_weight for leg in legs], dtype=float),
-        bends=np.array([leg.bends for leg in legs], dtype=np.int64),
     )
 
 
-def reached(paths: Paths, count: int, width: int) -> NDArray[np.bool_]:
+def reached(paths: PathStructure, count: int, width: int) -> NDArray[np.bool_]:
     """Return a mask of the coordinates that the paths of every row depend on, shape (K, N)."""
     mask = np.zeros((count, width), dtype=bool)
     for k, begin, end in zip(paths.rows, paths.leg_start[:-1], paths.leg_start[1:], strict=True):
@@ -248,7 +258,7 @@ def _movers(bodies: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDAr
     return moved, np.ascontiguousarray(moves[moved, : PIECE.third])
 
 
-def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
+def build_path_work(paths: PathStructure, count: int, width: int) -> PathWork:
     """Allocate the memory for the pieces of K rows."""
     pieces, entries, columns = len(paths.columns), len(paths.at), int(paths.columns.max(initial=1))
     return PathWork(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from finger_pin.core.jit import Indices
 from finger_pin.laws.contact_law import CONTACT
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
+from finger_pin.typing import Array
 
 
 class Groups(NamedTuple):
@@ -39,7 +40,7 @@ class Groups(NamedTuple):
 
 
 def row_arrays(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return the fields of `Tables` that say how rows are wired.
+    """Return the fields of `Structure` that say how rows are wired.
 
     Args:
         mechanism: Of K rows and N coordinates.
@@ -48,14 +49,14 @@ def row_arrays(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any
     count = len(routed)
     return {
         "energies": _energies(mechanism),
-        **_of_states(mechanism, count),
-        **_of_readings(mechanism),
-        **_of_wiring(mechanism),
-        **_of_arms(mechanism, routed),
+        **_state_arrays(mechanism, count),
+        **_reading_arrays(mechanism),
+        **_wiring_arrays(mechanism),
+        **_arm_arrays(mechanism, routed),
     }
 
 
-def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
+def _state_arrays(mechanism: Mechanism, count: int) -> dict[str, Any]:
     """Return the states and contacts among the rows."""
     rows = mechanism.rows
     ends = np.cumsum([0, *(table.count for table in rows)])
@@ -77,62 +78,66 @@ def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
     }
 
 
-def _of_readings(mechanism: Mechanism) -> dict[str, Any]:
+def _reading_arrays(mechanism: Mechanism) -> dict[str, Any]:
     """Return the states that rows read."""
-    starts, at, weights = [0], [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
-    states = {table.group: part for table, part in zip(mechanism.rows, mechanism.states, strict=True)}
-    for table in mechanism.rows:
-        for k in range(table.count):
-            for group, matrix in table.readings.items():
-                read = np.flatnonzero(matrix[k])
-                at.append(states[group].start + read)
-                weights.append(matrix[k, read])
-            starts.append(sum(map(len, at)))
-    read_at = np.concatenate(at)
+    first = {table.group: part.start for table, part in zip(mechanism.rows, mechanism.states, strict=True)}
+    read_start, read_at = _sources(mechanism.rows, "readings", first)
     read_states, place = np.unique(read_at), np.full(mechanism.state_count, -1, dtype=np.int64)
     place[read_states] = np.arange(len(read_states))
     return {
-        "read_start": np.array(starts, dtype=np.int64),
+        "read_start": read_start,
         "read_at": read_at,
-        "read_row": np.repeat(np.arange(len(starts) - 1), np.diff(starts)),
-        "read_weight": np.concatenate(weights),
+        "read_row": np.repeat(np.arange(len(read_start) - 1), np.diff(read_start)),
         "read_states": read_states,
         "read_place": place,
     }
 
 
-def _of_wiring(mechanism: Mechanism) -> dict[str, Any]:
+def _wiring_arrays(mechanism: Mechanism) -> dict[str, Any]:
     """Return the wiring of rows: inputs and loads by earlier ones, from outside, and as pins."""
     rows, ends = mechanism.rows, np.cumsum([0, *(table.count for table in mechanism.rows)])
-    first_row = {table.group: int(begin) for table, begin in zip(rows, ends[:-1], strict=True)}
+    first = {table.group: int(begin) for table, begin in zip(rows, ends[:-1], strict=True)}
     first_body = [*(int(joint.idx_v) for joint in mechanism.body.model.joints[1:]), -1]
-    terms: list[int] = []
-    weights: list[float] = []
-    starts: list[list[int]] = []
-    for wiring in ("inputs", "loads"):
-        starts.append([len(terms)])
-        for table in rows:
-            weighted = getattr(table, wiring)
-            if not weighted:
-                starts[-1] += [len(terms)] * table.count
-                continue
-            for k in range(table.count):
-                for group, matrix in weighted.items():
-                    sources = np.flatnonzero(matrix[k])
-                    terms.extend(first_row[group] + sources)
-                    weights.extend(matrix[k, sources])
-                starts[-1].append(len(terms))
+    (input_start, inputs), (load_start, loads) = (_sources(rows, wiring, first) for wiring in ("inputs", "loads"))
     channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
     return {
         "groups": _groups(rows, ends),
         "channel": channel,
-        "input_rows": np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
-        "input_start": np.array(starts[0], dtype=np.int64),
-        "load_start": np.array(starts[1], dtype=np.int64),
-        "terms": np.array(terms, dtype=np.int64),
-        "weights": np.array(weights, dtype=float),
+        "input_rows": np.flatnonzero((channel >= 0) | (np.diff(input_start) > 0)),
+        "input_start": input_start,
+        "load_start": len(inputs) + load_start,
+        "terms": np.concatenate([inputs, loads]),
         "joint_pin": np.array([first_body[pin] for table in rows for pin in table.pins], dtype=np.int64),
     }
+
+
+def _weights(table: Rows, wiring: str) -> Array:
+    """Return the weights of all that a table reads by some wiring, side by side, shape (k, sources)."""
+    return np.hstack([np.zeros((table.count, 0)), *getattr(table, wiring).values()])
+
+
+def _sources(
+    rows: Sequence[Rows], wiring: str, first: Mapping[str, int]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first term of each row's sum and the sources of all terms, from the first one of each group."""
+    counts, at = [np.zeros(1, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for table in rows:
+        entries, columns = np.nonzero(_weights(table, wiring))
+        places = [first[group] + np.arange(matrix.shape[1]) for group, matrix in getattr(table, wiring).items()]
+        counts.append(np.bincount(entries, minlength=table.count))
+        at.append(np.concatenate([at[0], *places])[columns])
+    return np.cumsum(np.concatenate(counts)), np.concatenate(at)
+
+
+def term_weights(rows: Sequence[Rows], wiring: str) -> Array:
+    """Return the weights of the terms of all rows by some wiring, in the order of the terms of `Structure`."""
+    weights = [_weights(table, wiring) for table in rows if getattr(table, wiring)]
+    return np.concatenate([np.zeros(0), *(matrix[matrix != 0.0] for matrix in weights)])
+
+
+def stacked(mechanism: Mechanism, name: str) -> Array:
+    """Return a matrix of all rows by coordinates, shape (K, N): ``arm``, ``measure`` or ``bends``."""
+    return np.concatenate([np.zeros((0, mechanism.coordinates)), *(getattr(table, name) for table in mechanism.rows)])
 
 
 def _groups(rows: Sequence[Rows], ends: NDArray[np.int64]) -> Groups:
@@ -154,26 +159,18 @@ def _integers(values: Iterable[Any]) -> NDArray[np.int64]:
     return np.fromiter(values, dtype=np.int64)
 
 
-def _of_arms(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return the entries of arms, measures and bends that are not zero, or depend on paths."""
-    rows, none = mechanism.rows, np.zeros((0, mechanism.coordinates))
-    arm, measure, bends = (
-        np.concatenate([none, *(getattr(table, name) for table in rows)]) for name in ("arm", "measure", "bends")
-    )
+def _arm_arrays(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:
+    """Return the places of arms, measures and bends that are not zero, or depend on paths."""
+    arm, measure, bends = (stacked(mechanism, name) for name in ("arm", "measure", "bends"))
     arm_start, arm_row, arm_at = _sparse((arm != 0.0) | (measure != 0.0) | routed)
     bend_start, bend_row, bend_at = _sparse((bends != 0.0) | routed)
     return {
-        "offset": np.concatenate([np.zeros(0), *(table.offset for table in rows)]),
         "arm_start": arm_start,
         "arm_at": arm_at,
         "arm_row": arm_row,
-        "arm": arm[arm_row, arm_at],
-        "measure": measure[arm_row, arm_at],
         "bend_start": bend_start,
         "bend_at": bend_at,
         "bend_row": bend_row,
-        "bend": bends[bend_row, bend_at],
-        "curvature_offset": np.concatenate([np.zeros(0), *(table.curvature_offset for table in rows)]),
     }
 
 

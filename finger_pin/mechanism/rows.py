@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.caching import cached_property
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.path_elements import PathTerm
@@ -180,12 +179,12 @@ class Rows:
         """Return whether paths through space belong to any row."""
         return any(self.paths)
 
-    @cached_property
+    @property
     def structure_key(self) -> tuple[Any, ...]:
-        """Everything but the parameters of the law, to be compared by value."""
-        arrays = (self.arm, self.measure, self.offset, self.channels, self.pins, self.bends, self.curvature_offset)
+        """All that does not change with numbers that stay zero or stay other than zero, to be compared by value."""
         wiring = self.inputs, self.loads, self.readings
-        weighted = [(*each, *(matrix.tobytes() for matrix in each.values())) for each in wiring]
+        weighted = [(*each, *((matrix != 0.0).tobytes() for matrix in each.values())) for each in wiring]
+        arrays = (self.arm != 0.0) | (self.measure != 0.0), self.bends != 0.0, self.channels, self.pins
         named = (self.group, self.law, self.paths, self.stored, self.powers)
         return (*named, *self.arm.shape, *weighted, *(each.tobytes() for each in arrays))
 

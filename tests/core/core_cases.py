@@ -9,13 +9,12 @@ import pinocchio as pin
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.bound_models import BoundModel
-from finger_pin.core.buffers import build_work
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.inputs import held_control
 from finger_pin.core.jit import CompiledFunction, Matrix, StructType, Vector, call, call_at, unpack
 from finger_pin.core.model import MODEL
+from finger_pin.core.parameters import compile_mechanism
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.tables import build_tables
 from finger_pin.mechanism.state import State
 
 BODIES = ("ub_stand_in", "planar", "dexmart_index", "tree", "hand")
@@ -194,18 +193,17 @@ class Bound:
 
     Attributes:
         mechanism: The mechanism.
-        model: Its tables, inputs and memory.
+        model: Its structure, parameters, inputs and memory.
     """
 
     def __init__(self, mechanism, control, force=None):
         """Bind a mechanism; ``force`` acts at its tips."""
-        tables = build_tables(mechanism)
+        structure, parameters = compile_mechanism(mechanism)
         if force is not None and np.any(force):
-            tables.tip_force[:] = force
-            tables = tables._replace(has_tip_force=True)
-        work = build_work(tables, [table.law for table in mechanism.rows], len(control.tension))
+            parameters.tip_force[:] = force
+            parameters = parameters._replace(has_tip_force=True)
         self.mechanism = mechanism
-        self._bound = BoundModel(tables, control, work)
+        self._bound = BoundModel(structure, parameters, [table.law for table in mechanism.rows], control)
         self.model = self._bound.model
 
     def solve(self, time, x, g):

@@ -12,10 +12,8 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.inputs import held_control
-from finger_pin.core.islands import Selection, selections
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.tables import build_tables
 from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
@@ -91,28 +89,6 @@ def test_a_mechanism_with_a_free_body_evaluates_alike(seed):
     force = rng.normal(size=(len(mechanism.body.tips), 3))
     compiled = CompiledMechanism(mechanism)
     assert_same(compiled.evaluate(x, command, force), mechanism.evaluate(x, command, force), mechanism)
-
-
-def test_islands_found_for_other_numbers_of_the_same_wiring_select_the_same_tables():
-    """What is remembered of one hand serves all that are wired alike."""
-    keys = ("tendon_friction.coulomb", "joint_friction.stiction", "joints.medial.link.length")
-    more = {f"hand.fingers.index.finger.{key}": value for key, value in zip(keys, (0.07, 0.03, 0.041), strict=True)}
-    one, other = (build_tables(fp.Finger(fp.load_scenario("hand", each)).mechanism) for each in ({}, more))
-    control = held_control(int(one.channel.max()) + 1, len(one.prescribed))
-    found = selections(one, control)
-    assert len(found) > 1 and selections(other, control) is found
-    for each in found:
-        anew = Selection.from_island(other, each.island).tables(other)
-        assert all(np.array_equal(*pair) for pair in zip(leaves(each.tables(other)), leaves(anew), strict=True))
-    assert any(
-        not np.array_equal(*pair)
-        for each in found
-        for pair in zip(leaves(each.tables(other)), leaves(each.tables(one)), strict=True)
-    )
-
-
-def leaves(table):
-    return [leaf for each in table for leaf in (leaves(each) if isinstance(each, tuple) else [each])]
 
 
 @pytest.mark.parametrize("seed", SEEDS)

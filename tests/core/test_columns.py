@@ -16,7 +16,7 @@ from finger_pin.core.evaluation.law_code import (
     TouchSlopeColumns,
     addresses,
 )
-from finger_pin.core.tables import build_tables
+from finger_pin.core.parameters import compile_mechanism
 from finger_pin.exchange.mujoco_friction import ELEMENT, PIN, TENDON, Coefficients, ElementPlaces, PluginFriction
 from finger_pin.laws.law import Law, Row, Touch
 from finger_pin.mechanism.finger import Finger
@@ -86,7 +86,7 @@ def test_compiled_laws_read_and_fill_named_columns():
 
 def test_columns_of_bodies_are_those_of_the_model():
     finger = Finger("reversals")
-    bodies, model = build_tables(finger.mechanism).bodies, finger.mechanism.body.model
+    bodies, model = compile_mechanism(finger.mechanism)[1].bodies, finger.mechanism.body.model
     inertias = list(model.inertias)[1:]
     assert bodies[:, BODY.mass] == pytest.approx([each.mass for each in inertias])
     assert bodies[:, BODY.armature] == pytest.approx(model.armature)

@@ -14,10 +14,10 @@ from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.inputs import held_control, planned_control
 from finger_pin.core.islands import find_islands
 from finger_pin.core.jit import pack
+from finger_pin.core.parameters import compile_mechanism
 from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.tables import build_tables
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import InputError
@@ -179,7 +179,8 @@ def test_a_row_between_two_fingers_joins_their_islands_and_moves_both(fingers):
 
 
 def islands(mechanism, control=None):
-    return find_islands(build_tables(mechanism), control or held_control(mechanism.channels, mechanism.coordinates))
+    structure, _ = compile_mechanism(mechanism)
+    return find_islands(structure, control or held_control(mechanism.channels, mechanism.coordinates))
 
 
 def test_a_load_an_input_or_a_measured_length_from_another_finger_couples_too(fingers):

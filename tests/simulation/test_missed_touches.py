@@ -43,7 +43,7 @@ def shelf(height, **settings):
 
 def coordinates_of_ball(part):
     """Three that slide and three that turn."""
-    return np.arange(part.tables.charts[0] - 3, part.tables.charts[0] + 3)
+    return np.arange(part.structure.charts[0] - 3, part.structure.charts[0] + 3)
 
 
 def tolerances(tolerance):
@@ -86,12 +86,12 @@ def test_a_step_that_meets_a_plate_ends_just_behind_the_touch_without_another_tr
     """A ball falls freely until sqrt(2 h / g), with the speed g t; the finger beside it rests."""
     height, gravity = 0.05, 9.81
     falling = scene(0.2, {"shelf": plate(0.02, 0.0, 0.3, -0.01), "ball": ball(0.0, 0.3, 0.005 + height)})
-    part = next(each for each in Setup.from_scenario(falling).stepper().parts if len(each.tables.charts))
+    part = next(each for each in Setup.from_scenario(falling).stepper().parts if len(each.structure.charts))
     room, touch, before, rejected = part.room(1), np.sqrt(2.0 * height / gravity), 0.0, 0.0
     while part.time <= touch:
         before, rejected = part.time, part.memory.rejected_steps[0]
         part.advance(1.0, room)
-    width, fall = len(part.tables.prescribed), coordinates_of_ball(part)[2]
+    width, fall = len(part.structure.prescribed), coordinates_of_ball(part)[2]
     assert part.memory.rejected_steps[0] == rejected
     assert 0.0 < part.time - touch < 1e-3 * (part.time - before)
     np.testing.assert_allclose(part.x[width + fall], -gravity * part.time, rtol=1e-6)
@@ -133,9 +133,9 @@ def test_a_body_that_flies_freely_has_an_account_that_closes():
 def test_what_sleeps_and_is_met_and_left_within_one_step_is_met():
     """A ball falls 1 m onto a thin plate, with a step that would end far behind it, and is thrown back as fast."""
     thin = scene(1.0, {"plate": plate(0.005, 30.0, 0.0, -1.0075), "ball": ball(30.0, 0.0, 0.0)})
-    (part,) = (each for each in Setup.from_scenario(thin).stepper().parts if len(each.tables.charts))
-    width, own = len(part.tables.prescribed), coordinates_of_ball(part)
-    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.culled[: part.tables.contact_rows])
+    (part,) = (each for each in Setup.from_scenario(thin).stepper().parts if len(each.structure.charts))
+    width, own = len(part.structure.prescribed), coordinates_of_ball(part)
+    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.culled[: part.structure.contact_rows])
     # Only the ball is integrated as exactly as ever, so that nothing else makes this step short.
     exact = np.concatenate([own, width + own])
     part.atol[np.setdiff1d(np.arange(len(part.atol)), exact)] = 1.0

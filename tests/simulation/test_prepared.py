@@ -9,7 +9,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
-from finger_pin.core.tables import build_tables
+from finger_pin.core.parameters import compile_mechanism
 from finger_pin.description.loading import ParametrisedScenario, read_scenario
 from finger_pin.exceptions import InputError, Interrupted
 
@@ -64,7 +64,7 @@ def same(one, other):
 def built(scenario):
     """Return all that a run of a scenario computes with."""
     loop = ClosedLoop.from_scenario(scenario)
-    return build_tables(loop.finger.mechanism), compiled_control(loop), loop.initial_state(), loop.fingertip_force
+    return compile_mechanism(loop.finger.mechanism), compiled_control(loop), loop.initial_state(), loop.fingertip_force
 
 
 @pytest.mark.slow

@@ -13,8 +13,9 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
-from finger_pin.core.path_tables import PIECE, Paths, PathWork
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.path_tables import PIECE, PathParameters, PathWork
+from finger_pin.core.structure import Structure
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Accuracy to which gaps are computed, m: `mechanism/gaps/nearest.py` flattens distances by as much (`INSIDE`).
@@ -26,22 +27,22 @@ _STRAIGHT_DEFLECTION = 1e-14
 
 
 @njit_always_inline
-def record_start_gaps(tables: Tables, pieces: PathWork) -> None:
+def record_start_gaps(structure: Structure, parameters: Parameters, pieces: PathWork) -> None:
     """Record the gap of every active pair at the start of a step."""
-    paths = tables.paths
+    paths, geometry = structure.paths, parameters.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and pieces.culled[paths.row[e]] == 0:
-            pieces.clear[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap], distance(paths, e, pieces)
+            pieces.clear[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap], distance(geometry, e, pieces)
 
 
 @njit_inline
-def distance(paths: Paths, e: int, pieces: PathWork) -> float:
+def distance(geometry: PathParameters, e: int, pieces: PathWork) -> float:
     """Return the largest distance of the core of a gap's first body from the origin of its frame, m."""
     total = 0.0
     for c in range(3):
         middle = 0.5 * (pieces.local_points[e, c] + pieces.local_points[e, 3 + c])
         total += middle * middle
-    return np.sqrt(total) + paths.cores[e]
+    return np.sqrt(total) + geometry.cores[e]
 
 
 @njit_always_inline
@@ -72,13 +73,13 @@ def bound_linear_motion(x: Vector, end: Vector, size: int, pieces: PathWork) -> 
 
 
 @njit_inline
-def path_of(tables: Tables, e: int, pieces: PathWork) -> float:
+def path_of(structure: Structure, parameters: Parameters, e: int, pieces: PathWork) -> float:
     """Return a bound of the relative path of a contact's bodies in the bounded motion, m."""
-    paths, control = tables.paths, pieces.control
-    endless = np.isinf(paths.extents[e])
+    paths, geometry, control = structure.paths, parameters.paths, pieces.control
+    endless = np.isinf(geometry.extents[e])
     total, turned = 0.0, 0.0
     for s in range(paths.start[e], paths.start[e + 1]):
-        j, other, lever = paths.at[s], paths.opposing_coordinate[s], paths.motion_bounds[s]
+        j, other, lever = paths.at[s], paths.opposing_coordinate[s], geometry.motion_bounds[s]
         way = pieces.travel[j]
         if other >= 0:
             # Beside what the last stage is off: what both have in common moves neither.
@@ -87,7 +88,7 @@ def path_of(tables: Tables, e: int, pieces: PathWork) -> float:
                 way += abs(one - two) - abs(one) - abs(two)
             way += pieces.travel[other]
         total += lever * way
-        if endless and paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and tables.kinds[j] == 0:
+        if endless and paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and structure.kinds[j] == 0:
             turned += way
     return widened(total, turned, pieces.far[e])
 
@@ -101,65 +102,65 @@ def widened(path: float, turned: float, far: float) -> float:
 
 
 @njit_inline
-def set_culled(tables: Tables, k: int, value: int, culled: Indices) -> None:
+def set_culled(structure: Structure, k: int, value: int, culled: Indices) -> None:
     """Set or clear the flag `culled` of a contact's rows."""
-    for m in range(k, k + tables.contact_arms):
+    for m in range(k, k + structure.contact_arms):
         culled[m] = value
 
 
 @njit_inline
-def list_active_pairs(tables: Tables, pieces: PathWork) -> None:
+def list_active_pairs(structure: Structure, pieces: PathWork) -> None:
     """List the active contact pairs."""
     count = 0
-    for e in range(tables.contact_rows // tables.contact_arms):
-        if pieces.culled[tables.paths.row[e]] == 0:
+    for e in range(structure.contact_rows // structure.contact_arms):
+        if pieces.culled[structure.paths.row[e]] == 0:
             pieces.active_pairs[count] = e
             count += 1
     pieces.active_pair_count[0] = count
 
 
 @njit_always_inline
-def activate_near(tables: Tables, pieces: PathWork) -> None:
+def activate_near(structure: Structure, parameters: Parameters, pieces: PathWork) -> None:
     """Activate the pairs that may close in the bounded motion; fill the paths of all."""
-    paths = tables.paths
+    paths = structure.paths
     for e in range(paths.columns.size):
         k = paths.row[e]
         if paths.columns[e] > 1:
-            pieces.path[e] = path_of(tables, e, pieces)
+            pieces.path[e] = path_of(structure, parameters, e, pieces)
             if pieces.culled[k]:
                 pieces.ahead[e] = pieces.clear[e] - pieces.path[e]
                 if not pieces.ahead[e] > 0.0:
-                    set_culled(tables, k, 0, pieces.culled)
+                    set_culled(structure, k, 0, pieces.culled)
 
 
 @njit_always_inline
-def record_end_gaps(tables: Tables, pieces: PathWork) -> None:
+def record_end_gaps(structure: Structure, parameters: Parameters, pieces: PathWork) -> None:
     """Record the gap of every active pair at the end of a bounded motion."""
-    paths = tables.paths
+    paths, geometry = structure.paths, parameters.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and pieces.culled[paths.row[e]] == 0:
-            pieces.ahead[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap] - GAP_ACCURACY, distance(paths, e, pieces)
+            pieces.ahead[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap] - GAP_ACCURACY, distance(geometry, e, pieces)
 
 
 @njit_always_inline
-def _straighten(tables: Tables, rows: Matrix, k: int, states: Vector) -> bool:
+def _straighten(structure: Structure, rows: Matrix, k: int, states: Vector) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
-    for m in range(k + 1, k + tables.contact_arms):
-        if not abs(states[tables.state[m]]) < _STRAIGHT_DEFLECTION:
+    for m in range(k + 1, k + structure.contact_arms):
+        if not abs(states[structure.state[m]]) < _STRAIGHT_DEFLECTION:
             return False
-    for m in range(k + 1, k + tables.contact_arms):
-        states[tables.state[m]] = rows[ROW.rate, m] = 0.0
+    for m in range(k + 1, k + structure.contact_arms):
+        states[structure.state[m]] = rows[ROW.rate, m] = 0.0
     return True
 
 
 @njit_inline
-def update_culling(tables: Tables, rows: Matrix, pieces: PathWork, states: Vector) -> bool:
+def update_culling(structure: Structure, rows: Matrix, pieces: PathWork, states: Vector) -> bool:
     """Cull or activate contact pairs at the end of a step, by bounds of their gaps there.
 
     Returns:
         Whether any did.
     """
-    paths, changed = tables.paths, False
+    paths, changed = structure.paths, False
     for e in range(paths.columns.size):
         k = paths.row[e]
         if paths.columns[e] == 1:
@@ -170,56 +171,64 @@ def update_culling(tables: Tables, rows: Matrix, pieces: PathWork, states: Vecto
             pieces.far[e] += pieces.path[e]
             if near:
                 changed = True
-                set_culled(tables, k, 0, pieces.culled)
-        elif not near and pieces.active[e] == 0 and _straighten(tables, rows, k, states):
+                set_culled(structure, k, 0, pieces.culled)
+        elif not near and pieces.active[e] == 0 and _straighten(structure, rows, k, states):
             pieces.clear[e], pieces.far[e] = pieces.ahead[e], pieces.far[e] + pieces.path[e]
             changed = True
-            set_culled(tables, k, 1, pieces.culled)
+            set_culled(structure, k, 1, pieces.culled)
     return changed
 
 
 @njit_always_inline
-def forget_culled(tables: Tables, pieces: PathWork, first: int, values: Vector) -> None:
+def forget_culled(structure: Structure, pieces: PathWork, first: int, values: Vector) -> None:
     """Set the states of culled contacts to zero in a vector, in which states of rows begin at a place."""
-    for k in range(0, tables.contact_rows, tables.contact_arms):
+    for k in range(0, structure.contact_rows, structure.contact_arms):
         if pieces.culled[k]:
-            for m in range(k + 1, k + tables.contact_arms):
-                values[first + tables.state[m]] = 0.0
+            for m in range(k + 1, k + structure.contact_arms):
+                values[first + structure.state[m]] = 0.0
 
 
 @njit_inline
-def activate_all_pairs(tables: Tables, work: Work) -> None:
+def activate_all_pairs(structure: Structure, work: Work) -> None:
     """Activate all contact pairs, as for a new state."""
-    for k in range(tables.contact_rows):
+    for k in range(structure.contact_rows):
         work.paths.culled[k] = 0
     for e in range(work.paths.path.size):
         work.paths.path[e] = 0.0
-    list_active_pairs(tables, work.paths)
+    list_active_pairs(structure, work.paths)
 
 
 @njit_inline
-def activate_since(tables: Tables, work: Work, first: Matrix, second: Matrix, before: Vector, after: Vector) -> None:
+def activate_since(
+    structure: Structure,
+    parameters: Parameters,
+    work: Work,
+    first: Matrix,
+    second: Matrix,
+    before: Vector,
+    after: Vector,
+) -> None:
     """Activate the pairs that may have closed between two states, given with their quaternions."""
-    for f in range(tables.charts.size):
+    for f in range(structure.charts.size):
         # What a free body has turned by: its angles count from its attitude.
         cosine = 0.0
         for r in range(4):
             cosine += first[f, r] * second[f, r]
-        before[tables.charts[f]] = after[tables.charts[f]] - 2.0 * np.arccos(min(abs(cosine), 1.0))
-    bound_linear_motion(before, after, tables.parents.size, work.paths)
-    activate_near(tables, work.paths)
+        before[structure.charts[f]] = after[structure.charts[f]] - 2.0 * np.arccos(min(abs(cosine), 1.0))
+    bound_linear_motion(before, after, structure.parents.size, work.paths)
+    activate_near(structure, parameters, work.paths)
     width = work.torque.size
-    for k in range(tables.contact_rows):
+    for k in range(structure.contact_rows):
         # Bent bristles tell of a contact that was closed meanwhile.
-        if tables.state[k] >= 0 and after[2 * width + tables.state[k]] != 0.0:
-            set_culled(tables, k - k % tables.contact_arms, 0, work.paths.culled)
-    list_active_pairs(tables, work.paths)
+        if structure.state[k] >= 0 and after[2 * width + structure.state[k]] != 0.0:
+            set_culled(structure, k - k % structure.contact_arms, 0, work.paths.culled)
+    list_active_pairs(structure, work.paths)
 
 
 @njit_inline
-def cull_distant(tables: Tables, work: Work, state: Vector, before: Vector) -> None:
+def cull_distant(structure: Structure, parameters: Parameters, work: Work, state: Vector, before: Vector) -> None:
     """Cull the pairs that are far apart at a state, and store the state for `activate_since`."""
-    record_end_gaps(tables, work.paths)
-    update_culling(tables, work.rows, work.paths, state[2 * work.torque.size :])
+    record_end_gaps(structure, parameters, work.paths)
+    update_culling(structure, work.rows, work.paths, state[2 * work.torque.size :])
     for c in range(state.size):
         before[c] = state[c]

@@ -26,9 +26,10 @@ from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
+from finger_pin.core.parameters import Parameters
 from finger_pin.core.path_tables import LOOK, LOOKS, PIECE, PathWork
 from finger_pin.core.stepping.integration import Integration
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 
 # Bernstein coefficients of a coordinate over a step.
 _Coefficients: TypeAlias = tuple[float, float, float, float, float]
@@ -67,14 +68,16 @@ def _between(start: float, end: float, b: _Coefficients) -> _Coefficients:
 
 
 @njit_always_inline
-def _bounds(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) -> tuple[float, float]:
+def _bounds(
+    structure: Structure, parameters: Parameters, pieces: PathWork, e: int, one: Vector, two: Vector
+) -> tuple[float, float]:
     """Return bounds of the path between two moments, and of its distance from its chord, m."""
-    paths, far = tables.paths, max(one[LOOK.far], two[LOOK.far])
-    endless = np.isinf(paths.extents[e])
+    paths, geometry, far = structure.paths, parameters.paths, max(one[LOOK.far], two[LOOK.far])
+    endless = np.isinf(geometry.extents[e])
     path = turned = moves = bends = turns = swing = curl = 0.0
     for s in range(paths.start[e], paths.start[e + 1]):
-        j, other, lever = paths.at[s], paths.opposing_coordinate[s], paths.motion_bounds[s]
-        carries = paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and tables.kinds[j] == 0
+        j, other, lever = paths.at[s], paths.opposing_coordinate[s], geometry.motion_bounds[s]
+        carries = paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and structure.kinds[j] == 0
         if lever == 0.0 and not carries:
             continue
         whole = (
@@ -92,7 +95,7 @@ def _bounds(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) 
         path += lever * way
         moves += lever * most
         bends += lever * curve
-        if tables.kinds[j] == 0:
+        if structure.kinds[j] == 0:
             turns += most
         if carries:
             # As the second body sees it, the first turns about it.
@@ -107,9 +110,9 @@ def _bounds(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) 
 
 
 @njit_always_inline
-def _clear(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) -> bool:
+def _clear(structure: Structure, parameters: Parameters, pieces: PathWork, e: int, one: Vector, two: Vector) -> bool:
     """Return whether bodies surely neither touch nor part between two moments."""
-    path, bend = _bounds(tables, pieces, e, one, two)
+    path, bend = _bounds(structure, parameters, pieces, e, one, two)
     if one[LOOK.gap] < 0.0 or two[LOOK.gap] < 0.0:
         return path < PARTING_PATH_PER_DEPTH * (abs(one[LOOK.gap]) + abs(two[LOOK.gap])) + MIN_PARTING_PATH
     if path < one[LOOK.gap] + two[LOOK.gap] + _GAP_ROUNDING:
@@ -121,7 +124,7 @@ def _clear(tables: Tables, pieces: PathWork, e: int, one: Vector, two: Vector) -
     if not size > _MIN_NORMAL_COSINE:
         return False
     # Of the plane across the first normal the second tells, as far as it is the same.
-    slant = np.sqrt(tilt) * (max(one[LOOK.far], two[LOOK.far]) + tables.paths.extents[e]) if tilt > 0.0 else 0.0
+    slant = np.sqrt(tilt) * (max(one[LOOK.far], two[LOOK.far]) + parameters.paths.extents[e]) if tilt > 0.0 else 0.0
     return bend + slant + GAP_ACCURACY < min(one[LOOK.gap], two[LOOK.gap])
 
 
@@ -131,15 +134,12 @@ def _look(integration: Integration, model: Model, e: int, share: float, look: Ve
     pieces, state = model.work.paths, model.state
     s, c = share, 1.0 - share
     w0, w1, w2, w3, w4 = c**4, 4.0 * c**3 * s, 6.0 * c * c * s * s, 4.0 * c * s**3, s**4
-    for j in range(model.tables.parents.size):
+    for j in range(model.structure.parents.size):
         b = pieces.control[j]
         state[j] = w0 * b[0] + w1 * b[1] + w2 * b[2] + w3 * b[3] + w4 * b[4]
     near = call_at(model.look, integration.model, float(e))
-    look[LOOK.share], look[LOOK.gap], look[LOOK.far] = (
-        share,
-        pieces.out[e, GAP_OUT.gap],
-        distance(model.tables.paths, e, pieces),
-    )
+    look[LOOK.share], look[LOOK.gap] = share, pieces.out[e, GAP_OUT.gap]
+    look[LOOK.far] = distance(model.parameters.paths, e, pieces)
     for r in range(3):
         # Of what is far away the normal is not asked for.
         look[LOOK.normal_x + r] = pieces.out[e, GAP_OUT.normal + r] if near else 0.0
@@ -165,7 +165,7 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
 
     Those that are not apart at its end have parted too, unless ``contact_known``: the step knows of it.
     """
-    tables, pieces = model.tables, model.work.paths
+    structure, parameters, pieces = model.structure, model.parameters, model.work.paths
     looks = pieces.looks
     _look(integration, model, e, 1.0, looks[1])
     _look(integration, model, e, 0.0, looks[0])
@@ -173,7 +173,7 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
     parted, met, depth = looks[0, LOOK.gap] >= 0.0, NOTHING, 1
     while depth > 0:
         one, two = looks[0], looks[depth]
-        if depth < LOOKS - 2 and not _clear(tables, pieces, e, one, two):
+        if depth < LOOKS - 2 and not _clear(structure, parameters, pieces, e, one, two):
             depth += 1
             _look(integration, model, e, 0.5 * (one[LOOK.share] + two[LOOK.share]), looks[depth])
             continue
@@ -190,12 +190,12 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
 
 
 @njit_always_inline
-def _pressed(tables: Tables, rows: Matrix, k: int) -> bool:
+def _pressed(structure: Structure, rows: Matrix, k: int) -> bool:
     """Return whether a contact presses, or would if it were not frozen open."""
     pressed = False
-    for g in range(tables.groups.first.size):
-        if tables.groups.first[g] <= k < tables.groups.end[g]:
-            pressed = rows[tables.groups.kink[g], k] > 0.0
+    for g in range(structure.groups.first.size):
+        if structure.groups.first[g] <= k < structure.groups.end[g]:
+            pressed = rows[structure.groups.kink[g], k] > 0.0
     return pressed
 
 
@@ -205,13 +205,14 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
 
     It is `MISSED_BY_CULLING` if a culled pair is closed at the end, or may be: it is active now.
     """
-    tables, pieces, rows, state = model.tables, model.work.paths, model.work.rows, model.state
-    paths, size, first, woken = tables.paths, tables.parents.size, NOTHING, False
+    structure, parameters = model.structure, model.parameters
+    pieces, rows, state = model.work.paths, model.work.rows, model.state
+    paths, size, first, woken = structure.paths, structure.parents.size, NOTHING, False
     bound_step_motion(integration.dense, integration.k, integration.x, state, size, pieces)
     for e in range(paths.columns.size):
         if paths.columns[e] == 1:
             continue
-        k, path = paths.row[e], path_of(tables, e, pieces)
+        k, path = paths.row[e], path_of(structure, parameters, e, pieces)
         pieces.path[e] = path
         if pieces.culled[k]:
             pieces.ahead[e] = pieces.clear[e] - path
@@ -220,7 +221,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
             share = _scan(integration, model, e, True)
             if share < NOTHING or pieces.ahead[e] < 0.0:
                 # Until it is listed again it exerts nothing, whatever else the step has met.
-                set_culled(tables, k, 0, pieces.culled)
+                set_culled(structure, k, 0, pieces.culled)
                 woken = True
         else:
             start, end = pieces.clear[e], pieces.out[e, GAP_OUT.gap]
@@ -230,7 +231,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
             if max(start, end) < 0.0 and rows[ROW.side, k] > 0.0:
                 continue
             ahead = pieces.ahead[e]
-            share = _scan(integration, model, e, _pressed(tables, rows, k))
+            share = _scan(integration, model, e, _pressed(structure, rows, k))
             pieces.ahead[e] = ahead
         first = min(first, share)
     for j in range(size):

@@ -15,9 +15,9 @@ from finger_pin.core.collision.broad_phase import GAP_ACCURACY
 from finger_pin.core.collision.continuous import MIN_PARTING_PATH, PARTING_PATH_PER_DEPTH
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.shape_code import GAP_OUT, OUT
+from finger_pin.core.parameters import compile_mechanism
 from finger_pin.core.path_tables import PIECE
 from finger_pin.core.stepping.trajectory import Meeting
-from finger_pin.core.tables import build_tables
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 
@@ -38,16 +38,17 @@ _APPROACH_SHARE = 1e-3
 
 def meetings(mechanism: Mechanism) -> Meeting | None:
     """Return the finder of touches that a step passes over; None without contacts."""
-    return _Meetings(mechanism) if np.any(build_tables(mechanism).touch) else None
+    return _Meetings(mechanism) if np.any(compile_mechanism(mechanism)[0].touch) else None
 
 
 class _Meetings:
     """The least opening of every gap, kept from step to step."""
 
     def __init__(self, mechanism: Mechanism) -> None:
-        tables = build_tables(mechanism)
-        self._mechanism, self._charts, self._paths = mechanism, Charts.from_mechanism(mechanism), tables.paths
-        self._bodies, self._kinds = len(tables.parents), tables.kinds
+        structure, parameters = compile_mechanism(mechanism)
+        self._mechanism, self._charts = mechanism, Charts.from_mechanism(mechanism)
+        self._paths, self._geometry = structure.paths, parameters.paths
+        self._bodies, self._kinds = len(structure.parents), structure.kinds
         pieces = list(dict.fromkeys(leg.piece for table in mechanism.rows for legs in table.paths for leg in legs))
         self._pieces = [(e, piece) for e, piece in enumerate(pieces) if piece.shape.columns > 1]
         self._clear = np.zeros(len(pieces))
@@ -90,7 +91,7 @@ class _Meetings:
             steps[:, paths.at] - np.where(paths.opposing_coordinate >= 0, steps[:, paths.opposing_coordinate], 0.0)
         ).sum(axis=0)
         ways = np.where(paths.opposing_coordinate >= 0, against, way[paths.at])
-        levers = np.where(ways > 0.0, paths.motion_bounds, 0.0)
+        levers = np.where(ways > 0.0, self._geometry.motion_bounds, 0.0)
         bounds = np.zeros(len(paths.columns))
         for e, _ in self._pieces:
             entries = slice(paths.start[e], paths.start[e + 1])
@@ -98,7 +99,7 @@ class _Meetings:
             carries = (paths.moves[entries, PIECE.frame] > paths.moves[entries, PIECE.first]) & (
                 self._kinds[paths.at[entries]] == 0
             )
-            turned = float(ways[entries][carries].sum()) if np.isinf(paths.extents[e]) else 0.0
+            turned = float(ways[entries][carries].sum()) if np.isinf(self._geometry.extents[e]) else 0.0
             if turned > 0.0:
                 distance = self._gap_and_distance(e, interpolate(np.array([start]))[0])[1]
                 bounds[e] = (bounds[e] + turned * distance) / (1.0 - turned) if turned < 1.0 else np.inf
@@ -115,10 +116,10 @@ class _Meetings:
         ends = [frame.actInv(placements[end.joint].act(np.asarray(end.point, dtype=float))) for end in piece.ends]
         middle = float(np.linalg.norm(0.5 * (ends[0] + ends[1])))
         if middle > piece.reach:
-            return middle - piece.reach, middle + float(self._paths.cores[e])
+            return middle - piece.reach, middle + float(self._geometry.cores[e])
         out = np.zeros(OUT)
         piece.shape.value(np.concatenate(ends), piece.parameters, out)
-        return float(out[GAP_OUT.gap]), middle + float(self._paths.cores[e])
+        return float(out[GAP_OUT.gap]), middle + float(self._geometry.cores[e])
 
     def _scan(self, e: int, start: float, end: float, interpolate: Interpolant) -> tuple[float, float]:
         """Return a bound of the gap at the end, and the time of a touch that ends before it, else infinity."""

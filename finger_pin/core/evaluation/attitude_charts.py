@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from finger_pin.core.chains import BODY
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.structure import Structure
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 
@@ -39,10 +40,10 @@ def place(frame: Matrix, q: Vector, body: Vector) -> None:
         body[BODY.rotation + 3 * r + 2] = frame[r, 0] * along_x[0] + frame[r, 1] * along_x[1] + frame[r, 2] * along_x[2]
 
 
-def place_all(tables: Tables, attitude: Matrix) -> None:
+def place_all(structure: Structure, parameters: Parameters, attitude: Matrix) -> None:
     """Place all free bodies by their quaternions, shape (f, 4)."""
-    for f in range(tables.charts.size):
-        place(tables.chart_frames[f], attitude[f], tables.bodies[tables.charts[f]])
+    for f in range(structure.charts.size):
+        place(parameters.chart_frames[f], attitude[f], parameters.bodies[structure.charts[f]])
 
 
 _place = inlined(place)
@@ -51,11 +52,11 @@ place_bodies = inlined(place_all)
 
 
 @njit_always_inline
-def rechart(tables: Tables, x: Vector, attitude: Matrix) -> None:
+def rechart(structure: Structure, parameters: Parameters, x: Vector, attitude: Matrix) -> None:
     """Move the angles of all free bodies into their quaternions (x, y, z, w), and into the bodies' placements."""
-    width = tables.parents.size + tables.lumps.size
-    for f in range(tables.charts.size):
-        i = tables.charts[f]
+    width = structure.parents.size + parameters.lumps.size
+    for f in range(structure.charts.size):
+        i = structure.charts[f]
         a, b, c = x[i], x[i + 1], x[i + 2]
         da, db, dc = x[width + i], x[width + i + 1], x[width + i + 2]
         x[width + i] = da * np.cos(b) * np.cos(c) + db * np.sin(c)
@@ -69,7 +70,7 @@ def rechart(tables: Tables, x: Vector, attitude: Matrix) -> None:
         size = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
         for r in range(4):
             q[r] /= size
-        _place(tables.chart_frames[f], q, tables.bodies[i])
+        _place(parameters.chart_frames[f], q, parameters.bodies[i])
 
 
 @njit_inline

@@ -11,7 +11,7 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import ROW, TOUCH_SLOPE
 from finger_pin.core.jit import Indices, Matrix, njit_always_inline, njit_inline
 from finger_pin.core.linear_systems import Blocks
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 
 
 @njit_inline
@@ -22,9 +22,9 @@ def extent(blocks: Blocks, b: int) -> tuple[int, int]:
 
 
 @njit_always_inline
-def _join(tables: Tables, work: Work, blocks: Blocks) -> None:
+def _join(structure: Structure, work: Work, blocks: Blocks) -> None:
     """Fill the block of every atom."""
-    paths, label = tables.paths, blocks.label
+    paths, label = structure.paths, blocks.label
     for a in range(label.size):
         label[a] = a
     for index in range(work.paths.closed_count[0]):
@@ -50,20 +50,20 @@ def _join(tables: Tables, work: Work, blocks: Blocks) -> None:
 
 
 @njit_always_inline
-def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
+def partition(structure: Structure, work: Work, blocks: Blocks, gain: Matrix) -> None:
     """Find the blocks of a step, after the slopes of all laws; of contacts that have opened, clear the rows' gains."""
-    paths = tables.paths
+    paths = structure.paths
     for index in range(blocks.touch_start[blocks.number[0]]):
-        for k in range(blocks.touches[index], blocks.touches[index] + tables.contact_arms):
+        for k in range(blocks.touches[index], blocks.touches[index] + structure.contact_arms):
             for c in range(gain.shape[1]):
                 gain[k, c] = 0.0
-    _join(tables, work, blocks)
+    _join(structure, work, blocks)
     coordinates = rows = touches = states = active = 0
     for index in range(work.paths.active_pair_count[0]):
         k = paths.row[work.paths.active_pairs[index]]
-        for m in range(1, tables.contact_arms):
-            blocks.active_states[active] = tables.state[k + m]
-            blocks.loose[tables.state[k + m]] = -work.slopes[TOUCH_SLOPE.rate_by_state_1 + m - 1, k + m]
+        for m in range(1, structure.contact_arms):
+            blocks.active_states[active] = structure.state[k + m]
+            blocks.loose[structure.state[k + m]] = -work.slopes[TOUCH_SLOPE.rate_by_state_1 + m - 1, k + m]
             active += 1
     blocks.active_state_count[0] = active
     for b in range(blocks.number[0]):
@@ -79,17 +79,17 @@ def partition(tables: Tables, work: Work, blocks: Blocks, gain: Matrix) -> None:
                 continue
             blocks.touches[touches] = k
             touches += 1
-            for m in range(1, tables.contact_arms):
-                state = tables.state[k + m]
+            for m in range(1, structure.contact_arms):
+                state = structure.state[k + m]
                 blocks.states[states], blocks.loose[state] = state, 0.0
                 blocks.state_place[state] = states - blocks.state_start[b]
                 states += 1
-        for k in range(tables.contact_rows, blocks.row_atom.size):
+        for k in range(structure.contact_rows, blocks.row_atom.size):
             if blocks.label[blocks.row_atom[k]] != b:
                 continue
             blocks.rows[rows] = k
             rows += 1
-            state = tables.state[k]
+            state = structure.state[k]
             if state >= 0:
                 blocks.states[states] = state
                 blocks.state_place[state] = states - blocks.state_start[b]

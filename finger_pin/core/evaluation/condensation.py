@@ -19,7 +19,6 @@ from finger_pin.core.evaluation.readings import add_readings, resolve_readings
 from finger_pin.core.jit import (
     CompiledFunction,
     Indices,
-    Matrix,
     Vector,
     call_at,
     njit_always_inline,
@@ -29,7 +28,7 @@ from finger_pin.core.jit import (
 )
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 
 
 @njit_always_inline
@@ -40,29 +39,30 @@ def _add_scaled(out: Vector, factor: float, source: Vector, size: int) -> None:
 
 
 @njit_inline
-def _terms(tables: Tables, begin: int, end: int, slope: float, gain: Matrix, wide: int, out: Vector) -> None:
+def _terms(model: Model, begin: int, end: int, slope: float, wide: int, out: Vector) -> None:
     """Fill the change of a weighted sum of earlier forces, times a slope."""
     for c in range(wide):
         out[c] = 0.0
     for e in range(begin, end):
-        _add_scaled(out, slope * tables.weights[e], gain[tables.terms[e]], wide)
+        _add_scaled(out, slope * model.parameters.weights[e], model.linear.gain[model.structure.terms[e]], wide)
 
 
 @njit_always_inline
 def _outside(model: Model, address: int, g: float, b: int, width: int, wide: int) -> None:
     """Fill A^T d phi of a block by forces other than its rows': inertial forces, those at tips, and contacts."""
-    tables, work, linear, force = model.tables, model.work, model.linear, model.linear.force
+    structure, parameters = model.structure, model.parameters
+    work, linear, force = model.work, model.linear, model.linear.force
     places, last = linear.blocks.coordinates[linear.blocks.coordinate_start[b] :], wide - 1
     for j in range(width):
-        for c in range(wide + tables.read_states.size):
+        for c in range(wide + structure.read_states.size):
             force[j, c] = 0.0
         force[j, last] -= linear.bias_rate[places[j]]
-    if tables.has_tip_force:
-        for t in range(tables.tip_body.size):
+    if parameters.has_tip_force:
+        for t in range(structure.tip_body.size):
             for j in range(width):
                 for r in range(3):
                     force[j, last] += work.jacobian[t, r, places[j]] * work.force_rate[t, r]
-    if tables.contact_rows:
+    if structure.contact_rows:
         linear.blocks.current[0] = b
         call_at(model.fill_contact_gains, address, g)
 
@@ -70,24 +70,24 @@ def _outside(model: Model, address: int, g: float, b: int, width: int, wide: int
 @njit_always_inline
 def _load(model: Model, address: int, k: int, places: Indices, width: int, wide: int) -> None:
     """Fill the change of a row's load."""
-    tables, linear, load = model.tables, model.linear, model.linear.load
-    full, begin, end = wide + tables.read_states.size, tables.load_start[k], tables.load_start[k + 1]
-    _terms(tables, begin, end, linear.load_slope[k], linear.gain, full, load)
-    if (tables.has_tip_force or tables.contact_rows) and tables.joint_pin[k] >= 0:
+    structure, parameters, linear, load = model.structure, model.parameters, model.linear, model.linear.load
+    full, begin, end = wide + structure.read_states.size, structure.load_start[k], structure.load_start[k + 1]
+    _terms(model, begin, end, linear.load_slope[k], full, load)
+    if (parameters.has_tip_force or structure.contact_rows) and structure.joint_pin[k] >= 0:
         for c in range(width):
             load[c] += linear.load_by_position[k, places[c]]
         load[wide - 1] += linear.load_by_time[k]
-        if tables.contact_rows:
+        if structure.contact_rows:
             call_at(model.add_pushes, address, float(k))
 
 
 @njit_always_inline
 def _command(model: Model, k: int, places: Indices, width: int, wide: int) -> None:
     """Fill the change of a row's input."""
-    tables, control, linear, command = model.tables, model.control, model.linear, model.linear.command
-    full = wide + tables.read_states.size
-    _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, full, command)
-    channel = tables.channel[k]
+    structure, control, command = model.structure, model.control, model.linear.command
+    full = wide + structure.read_states.size
+    _terms(model, structure.input_start[k], structure.input_start[k + 1], 1.0, full, command)
+    channel = structure.channel[k]
     if channel >= 0:
         for c in range(width):
             command[c] += control.by_position[channel, places[c]]
@@ -100,32 +100,33 @@ def _add_motion(
     model: Model, k: int, width: int, by_length: float, by_speed: float, by_curvature: float, out: Vector
 ) -> None:
     """Add slopes by a row's length, speed and curvature, by coordinates and velocities."""
-    tables, linear, place = model.tables, model.linear, model.linear.blocks.place
-    for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-        out[place[tables.arm_at[e]]] += by_length * linear.measure[e] + by_speed * linear.turning[e]
-        out[width + place[tables.arm_at[e]]] += by_speed * linear.arm[e]
-    for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
-        out[place[tables.bend_at[e]]] += by_curvature * linear.bend[e]
+    structure, linear, place = model.structure, model.linear, model.linear.blocks.place
+    for e in range(structure.arm_start[k], structure.arm_start[k + 1]):
+        out[place[structure.arm_at[e]]] += by_length * linear.measure[e] + by_speed * linear.turning[e]
+        out[width + place[structure.arm_at[e]]] += by_speed * linear.arm[e]
+    for e in range(structure.bend_start[k], structure.bend_start[k + 1]):
+        out[place[structure.bend_at[e]]] += by_curvature * linear.bend[e]
 
 
 @njit_inline
-def _push(tables: Tables, linear: Linear, k: int, full: int, row: Vector) -> None:
+def _push(structure: Structure, linear: Linear, k: int, full: int, row: Vector) -> None:
     """Add A^T d phi of a row."""
-    for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-        _add_scaled(linear.force[linear.blocks.place[tables.arm_at[e]]], linear.arm[e], row, full)
+    for e in range(structure.arm_start[k], structure.arm_start[k + 1]):
+        _add_scaled(linear.force[linear.blocks.place[structure.arm_at[e]]], linear.arm[e], row, full)
 
 
 @njit_inline
 def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) -> bool:
     """Fill the gains of a block's rows and states, and sum up A^T d phi; false if states that are read are singular."""
-    tables, linear, slopes, blocks = model.tables, model.linear, model.work.slopes, model.linear.blocks
+    structure, parameters = model.structure, model.parameters
+    linear, slopes, blocks = model.linear, model.work.slopes, model.linear.blocks
     load, command = linear.load, linear.command
     own_places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
-    full = wide + tables.read_states.size
+    full = wide + structure.read_states.size
     _outside(model, address, g, b, width, wide)
     for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
         k = blocks.rows[index]
-        row, state = linear.gain[k], tables.state[k]
+        row, state = linear.gain[k], structure.state[k]
         of_length, of_speed = slopes[SLOPE.force_by_length, k], slopes[SLOPE.force_by_speed, k]
         of_curvature = slopes[SLOPE.force_by_curvature, k]
         of_load, of_command = slopes[SLOPE.force_by_load, k], slopes[SLOPE.force_by_command, k]
@@ -142,24 +143,26 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
         if state >= 0:
             for c in range(full):
                 state_gain[c] = 0.0
-        pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.contact_rows and tables.joint_pin[k] >= 0)
+        pressed = structure.load_start[k + 1] > structure.load_start[k] or (
+            structure.contact_rows and structure.joint_pin[k] >= 0
+        )
         if pressed and (of_load != 0.0 or by_load != 0.0):
             _load(model, address, k, own_places, width, wide)
             _add_scaled(row, of_load, load, full)
             if by_load != 0.0:
                 _add_scaled(state_gain, by_load, load, full)
-        fed = tables.channel[k] >= 0 or tables.input_start[k + 1] > tables.input_start[k]
+        fed = structure.channel[k] >= 0 or structure.input_start[k + 1] > structure.input_start[k]
         if fed and (of_command != 0.0 or by_command != 0.0):
             _command(model, k, own_places, width, wide)
             _add_scaled(row, of_command, command, full)
             if by_command != 0.0:
                 _add_scaled(state_gain, by_command, command, full)
-        reads = tables.read_start[k + 1] > tables.read_start[k]
+        reads = structure.read_start[k + 1] > structure.read_start[k]
         if state >= 0:
             by_length, by_speed = factor * slopes[SLOPE.rate_by_length, k], factor * slopes[SLOPE.rate_by_speed, k]
             _add_motion(model, k, width, by_length, by_speed, factor * slopes[SLOPE.rate_by_curvature, k], state_gain)
             if reads:
-                add_readings(tables, k, factor * slopes[SLOPE.rate_by_reading, k], wide, state_gain)
+                add_readings(structure, parameters, k, factor * slopes[SLOPE.rate_by_reading, k], wide, state_gain)
             _add_scaled(row, total, state_gain, full)
             # The column of r_z itself, without the difference g dz - r_z.
             itself = 2 * width + blocks.state_place[state]
@@ -172,9 +175,9 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
             continue
         _add_motion(model, k, width, of_length, of_speed, of_curvature, row)
         if reads:
-            add_readings(tables, k, slopes[SLOPE.force_by_reading, k], wide, row)
-        _push(tables, linear, k, full, row)
-    return full == wide or resolve_readings(tables, linear, b, width, wide)
+            add_readings(structure, parameters, k, slopes[SLOPE.force_by_reading, k], wide, row)
+        _push(structure, linear, k, full, row)
+    return full == wide or resolve_readings(structure, linear, b, width, wide)
 
 
 @CompiledFunction
@@ -213,14 +216,14 @@ def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
             velocity[i, width + j] = of_mass[places[j]]
         for c in range(2 * width, wide):
             velocity[i, c] = force[i, c]
-        if model.tables.prescribed[at_row] >= 0:
+        if model.structure.prescribed[at_row] >= 0:
             # v' is given as a function of time.
             for j in range(width):
                 reduced[i, j] = 0.0
             for c in range(wide):
                 velocity[i, c] = 0.0
             reduced[i, i], velocity[i, width + i] = g, 1.0
-            velocity[i, wide - 1] = model.work.guide_rate[model.tables.prescribed[at_row]]
+            velocity[i, wide - 1] = model.work.guide_rate[model.structure.prescribed[at_row]]
     if not factorise(reduced, width, linear.pivots):
         return False
     substitute(reduced, width, linear.pivots, velocity, wide)

@@ -13,57 +13,58 @@ from finger_pin.core.evaluation.paths import measure_paths, passes, push
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.structure import Structure
 
 
 @CompiledFunction
 def measure(address: int, _time: float) -> int:
     """Fill lengths, turns and arms of rows with paths through space, and forces of contacts, after `move`."""
     model = unpack(address, MODEL)
-    measure_paths(model.tables, model.work)
-    if model.tables.contact_rows:
+    measure_paths(model.structure, model.parameters, model.work)
+    if model.structure.contact_rows:
         width = model.work.torque.size
-        _exert(model.tables, model.state[width : 2 * width], model.state[2 * width :], model.work)
+        _exert(model.structure, model.parameters, model.state[width : 2 * width], model.state[2 * width :], model.work)
     return 1
 
 
 @njit_always_inline
-def _exert(tables: Tables, v: Vector, z: Vector, work: Work) -> None:
+def _exert(structure: Structure, parameters: Parameters, v: Vector, z: Vector, work: Work) -> None:
     """Evaluate the contacts, which come before all other rows, but for those culled, and add to A^T phi."""
     rows, paths = work.rows, work.paths
-    for g in range(tables.groups.first.size):
-        begin, end = tables.groups.first[g], tables.groups.end[g]
-        if begin >= tables.contact_rows:
+    for g in range(structure.groups.first.size):
+        begin, end = structure.groups.first[g], structure.groups.end[g]
+        if begin >= structure.contact_rows:
             continue
         for index in range(paths.active_pair_count[0]):
             e = paths.active_pairs[index]
-            k = tables.paths.row[e]
+            k = structure.paths.row[e]
             if not begin <= k < end:
                 continue
-            for m in range(k, k + tables.contact_arms):
+            for m in range(k, k + structure.contact_arms):
                 speed = 0.0
                 # One that is open moves nothing, and sees no speed.
-                for a in range(tables.arm_start[m], tables.arm_start[m + 1] if paths.active[e] else 0):
-                    speed += work.arm[a] * v[tables.arm_at[a]]
+                for a in range(structure.arm_start[m], structure.arm_start[m + 1] if paths.active[e] else 0):
+                    speed += work.arm[a] * v[structure.arm_at[a]]
                 rows[ROW.length, m], rows[ROW.speed, m] = paths.length[m], speed
                 if m > k:
-                    rows[ROW.state, m] = z[tables.state[m]]
-            call_value(tables.groups.value[g], rows, tables.parameters, k, k + tables.contact_arms)
-    push(tables, work)
+                    rows[ROW.state, m] = z[structure.state[m]]
+            call_value(structure.groups.value[g], rows, parameters.laws, k, k + structure.contact_arms)
+    push(structure, work)
     for index in range(work.paths.closed_count[0]):
-        k = tables.paths.row[work.paths.closed[index]]
-        for e in range(tables.arm_start[k], tables.arm_start[k + tables.contact_arms]):
-            work.torque[tables.arm_at[e]] += work.arm[e] * rows[ROW.force, tables.arm_row[e]]
+        k = structure.paths.row[work.paths.closed[index]]
+        for e in range(structure.arm_start[k], structure.arm_start[k + structure.contact_arms]):
+            work.torque[structure.arm_at[e]] += work.arm[e] * rows[ROW.force, structure.arm_row[e]]
 
 
 @njit_inline
-def _add_inputs(tables: Tables, k: int, linear: Linear, width: int, out: Vector) -> None:
+def _add_inputs(structure: Structure, k: int, linear: Linear, width: int, out: Vector) -> None:
     """Add the change of a contact's gap, speed and slips, with the weights in ``contact_weights``."""
     place, weights = linear.blocks.place, linear.contact_weights
-    for m in range(tables.contact_arms):
+    for m in range(structure.contact_arms):
         by_length, by_speed = (weights[0] if m == 0 else 0.0), weights[m + 1]
-        for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
-            j = place[tables.arm_at[e]]
+        for e in range(structure.arm_start[k + m], structure.arm_start[k + m + 1]):
+            j = place[structure.arm_at[e]]
             out[j] += by_length * linear.measure[e] + by_speed * linear.turning[e]
             out[width + j] += by_speed * linear.arm[e]
 
@@ -84,14 +85,14 @@ def _invert(matrix: Matrix) -> None:
 
 
 @njit_always_inline
-def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear, width: int, wide: int) -> None:
+def _contact_gains(structure: Structure, g: float, k: int, work: Work, linear: Linear, width: int, wide: int) -> None:
     """Fill the gains of the rows of a contact and of its states, in the columns of its block."""
     slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
     matrix, weights, states, full = (
         linear.contact_matrix,
         linear.contact_weights,
-        tables.state[k + 1 : k + tables.contact_arms],
-        wide + tables.read_states.size,
+        structure.state[k + 1 : k + structure.contact_arms],
+        wide + structure.read_states.size,
     )
     # (g - A) dz = r_z + B (what the contact sees).
     for i in range(states.size):
@@ -107,10 +108,10 @@ def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear,
             weights[c] = 0.0
             for j in range(states.size):
                 weights[c] += matrix[i, j] * slopes[AT.rate_by_gap + c, k + 1 + j]
-        _add_inputs(tables, k, linear, width, state_gain)
+        _add_inputs(structure, k, linear, width, state_gain)
         for j in range(states.size):
             state_gain[2 * width + state_place[states[j]]] += matrix[i, j]
-    for m in range(tables.contact_arms):
+    for m in range(structure.contact_arms):
         row = linear.gain[k + m]
         for column in range(full):
             row[column] = 0.0
@@ -120,9 +121,9 @@ def _contact_gains(tables: Tables, g: float, k: int, work: Work, linear: Linear,
                 row[column] += slope * state_gain[column]
         for c in range(weights.size):
             weights[c] = slopes[AT.force_by_gap + c, k + m]
-        _add_inputs(tables, k, linear, width, row)
-        for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
-            arm, target = linear.arm[e], linear.force[place[tables.arm_at[e]]]
+        _add_inputs(structure, k, linear, width, row)
+        for e in range(structure.arm_start[k + m], structure.arm_start[k + m + 1]):
+            arm, target = linear.arm[e], linear.force[place[structure.arm_at[e]]]
             if arm != 0.0:
                 for column in range(wide):
                     target[column] += arm * row[column]
@@ -136,7 +137,7 @@ def fill_contact_gains(address: int, g: float) -> int:
     b = blocks.current[0]
     width, wide = extent(blocks, b)
     for index in range(blocks.touch_start[b], blocks.touch_start[b + 1]):
-        _contact_gains(model.tables, g, blocks.touches[index], model.work, linear, width, wide)
+        _contact_gains(model.structure, g, blocks.touches[index], model.work, linear, width, wide)
     return 1
 
 
@@ -144,12 +145,12 @@ def fill_contact_gains(address: int, g: float) -> int:
 def add_pushes(address: int, row: float) -> int:
     """Add to the change of a row's load that of the forces of the closed contacts of its block on its pin."""
     model = unpack(address, MODEL)
-    tables, work, linear, k = model.tables, model.work, model.linear, int(row)
-    paths, pieces, blocks, load = tables.paths, work.paths, linear.blocks, linear.load
+    structure, work, linear, k = model.structure, model.work, model.linear, int(row)
+    paths, pieces, blocks, load = structure.paths, work.paths, linear.blocks, linear.load
     _, wide = extent(blocks, blocks.current[0])
     for index in range(pieces.closed_count[0]):
         e = pieces.closed[index]
-        passing = passes(paths, e, tables.joint_pin[k])
+        passing = passes(paths, e, structure.joint_pin[k])
         if passing == 0.0 or work.rows[ROW.side, paths.row[e]] < 0.0:
             continue
         size = max(work.rows[ROW.load, k], 1e-100)

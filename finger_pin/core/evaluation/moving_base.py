@@ -29,7 +29,7 @@ def _coordinates(signal: SignalTable, time: float, order: int) -> tuple[float, f
 def move_base(address: int, time: float) -> int:
     """Fill velocity and acceleration of a moving base, and their rates."""
     model = unpack(address, MODEL)
-    control, tables, work = model.control, model.tables, model.work
+    control, parameters, work = model.control, model.parameters, model.work
     if control.palm.harmonics.shape[0] == 0:
         return 1
     place = _coordinates(control.palm, time, 0)
@@ -39,7 +39,7 @@ def move_base(address: int, time: float) -> int:
         _coordinates(control.palm, time, 2),
         _coordinates(control.palm, time, 3),
         turns,
-        (tables.gravity[0], tables.gravity[1], tables.gravity[2]),
+        (parameters.gravity[0], parameters.gravity[1], parameters.gravity[2]),
     )
     for k in range(6):
         work.base_velocity[k] = motion[k]
@@ -57,12 +57,12 @@ def move_base(address: int, time: float) -> int:
 def base_power(address: int, _time: float) -> int:
     """Fill the power that a moving base supplies, W, after an evaluation: its velocity times its wrench."""
     model = unpack(address, MODEL)
-    tables, work, width = model.tables, model.work, model.work.torque.size
+    structure, parameters, work, width = model.structure, model.parameters, model.work, model.work.torque.size
     velocity = model.state[width : 2 * width]
-    inverse_dynamics(tables, velocity, work.acceleration, work, work.bias, True)
+    inverse_dynamics(structure, parameters, velocity, work.acceleration, work, work.bias, True)
     power = 0.0
-    for i in range(tables.parents.size):
-        if tables.parents[i] < 0:
+    for i in range(structure.parents.size):
+        if structure.parents[i] < 0:
             power += dot(work.base_velocity, work.spatial.force[i])
     work.base_power[0] = power
     return 1
@@ -76,10 +76,10 @@ def bias_rate(address: int, _time: float) -> int:
     an evaluation has left in two layers is overwritten.
     """
     model = unpack(address, MODEL)
-    tables, work, width, out = model.tables, model.work, model.work.torque.size, model.linear.bias_rate
-    velocity, size, change = model.state[width : 2 * width], tables.parents.size, work.base_rate[0]
+    structure, work, width, out = model.structure, model.work, model.work.torque.size, model.linear.bias_rate
+    velocity, size, change = model.state[width : 2 * width], structure.parents.size, work.base_rate[0]
     for i in range(size):
-        parent = tables.parents[i]
+        parent = structure.parents[i]
         rate, force = work.spatial.axis_curve[i], work.spatial.force[i]
         above = work.base_rate[1] if parent < 0 else work.spatial.axis_curve[parent]
         motion_cross(change, work.spatial.axis[i], work.vectors[0])
@@ -92,7 +92,7 @@ def bias_rate(address: int, _time: float) -> int:
         add_force_cross(work.spatial.motion[i], work.vectors[0], force)
     for i in range(size - 1, -1, -1):
         out[i] = dot(work.spatial.axis[i], work.spatial.force[i])
-        if tables.parents[i] >= 0:
+        if structure.parents[i] >= 0:
             for k in range(6):
-                work.spatial.force[tables.parents[i], k] += work.spatial.force[i, k]
+                work.spatial.force[structure.parents[i], k] += work.spatial.force[i, k]
     return 1

@@ -14,8 +14,8 @@ from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cros
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import PIECE, WRENCH, Paths
-from finger_pin.core.tables import Tables
+from finger_pin.core.path_tables import PIECE, WRENCH, PathParameters, PathStructure
+from finger_pin.core.structure import Structure
 
 
 @njit_always_inline
@@ -42,12 +42,12 @@ def _changed(slopes: Vector, first: int, dy: Vector, rotation: Matrix, out: Vect
 
 
 @njit_inline
-def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
+def _slopes_of_piece(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -> None:
     """Fill the derivatives of a piece's wrenches and turn by the coordinates that move it."""
     pieces = work.paths
     rotation, ends, columns, slopes = pieces.frame[e], pieces.ends[e], paths.columns[e], pieces.slopes
     dy, moved, point = work.vectors[0], work.vectors[1], work.centre
-    call_shape(paths.slopes[e], pieces.local_points[e], paths.parameters[e], slopes)
+    call_shape(paths.slopes[e], pieces.local_points[e], geometry.shapes[e], slopes)
     turn_out(rotation, pieces.out[e], GAP_OUT.point, point)
     for r in range(3):
         point[r] += pieces.origin[e, r]
@@ -90,9 +90,9 @@ def _slopes_of_piece(paths: Paths, e: int, work: Work) -> None:
 
 
 @njit_always_inline
-def _add_turns(tables: Tables, work: Work, linear: Linear, index: int) -> None:
+def _add_turns(structure: Structure, work: Work, linear: Linear, index: int) -> None:
     """Add the derivatives of the angle by which a row's path turns."""
-    paths, pieces = tables.paths, work.paths
+    paths, pieces = structure.paths, work.paths
     k, gather = paths.rows[index], pieces.gather
     for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
         e = paths.piece[leg]
@@ -115,20 +115,20 @@ def _add_turns(tables: Tables, work: Work, linear: Linear, index: int) -> None:
             change = pieces.wrench_slope[s, 0]
             for r in range(3):
                 gather[paths.at[s]] += inverse * change[9 + r] * outgoing[r]
-    for b in range(tables.bend_start[k], tables.bend_start[k + 1]):
-        linear.bend[b] += gather[tables.bend_at[b]]
+    for b in range(structure.bend_start[k], structure.bend_start[k + 1]):
+        linear.bend[b] += gather[structure.bend_at[b]]
     for j in range(gather.size):
         gather[j] = 0.0
 
 
 @njit_always_inline
-def _turn_pushes(tables: Tables, work: Work, k: int, by_position: Vector) -> None:
+def _turn_pushes(structure: Structure, work: Work, k: int, by_position: Vector) -> None:
     """Add to a pin's load the change from contacts that turn with the posture at constant forces."""
-    paths, pieces = tables.paths, work.paths
+    paths, pieces = structure.paths, work.paths
     size = max(work.rows[ROW.load, k], 1e-100)
     for index in range(pieces.closed_count[0]):
         e = pieces.closed[index]
-        share = passes(paths, e, tables.joint_pin[k]) / size
+        share = passes(paths, e, structure.joint_pin[k]) / size
         if share == 0.0:
             continue
         for s in range(paths.start[e], paths.start[e + 1]):
@@ -142,23 +142,29 @@ def _turn_pushes(tables: Tables, work: Work, k: int, by_position: Vector) -> Non
 def linearise_paths(address: int, _time: float) -> int:
     """Fill the derivatives of arms, turns and loads by contacts; subtract those of A^T phi from by_position."""
     model = unpack(address, MODEL)
-    tables, work, linear = model.tables, model.work, model.linear
+    structure, parameters, work, linear = model.structure, model.parameters, model.work, model.linear
     velocity = model.state[work.torque.size : 2 * work.torque.size]
-    paths, pieces, touching, arms = tables.paths, work.paths, tables.contact_rows, tables.contact_arms
+    paths, geometry, pieces, touching, arms = (
+        structure.paths,
+        parameters.paths,
+        work.paths,
+        structure.contact_rows,
+        structure.contact_arms,
+    )
     closed = arms * pieces.closed_count[0]
     for index in range(pieces.closed_count[0]):
-        _slopes_of_piece(paths, pieces.closed[index], work)
+        _slopes_of_piece(paths, geometry, pieces.closed[index], work)
     for e in range(touching // arms, paths.columns.size):
-        _slopes_of_piece(paths, e, work)
+        _slopes_of_piece(paths, geometry, e, work)
     axes, gather, net, crossed = work.spatial.axis, pieces.gather, work.vectors[0], work.vectors[1]
     for at in range(closed + paths.rows.size - touching):
         index = paths.row[pieces.closed[at // arms]] + at % arms if at < closed else at - closed + touching
         k = paths.rows[index]
         if k >= touching:
-            _add_turns(tables, work, linear, index)
+            _add_turns(structure, work, linear, index)
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
-            weight = paths.arm_weight[leg]
+            weight = geometry.arm_weight[leg]
             force = weight * work.rows[ROW.force, k]
             begin, end = paths.start[e], paths.start[e + 1]
             for r in range(begin, end):
@@ -175,13 +181,13 @@ def linearise_paths(address: int, _time: float) -> int:
                     linear.by_position[j, i] -= force * slope
                     turning += slope * velocity[j]
                 gather[i] += weight * turning
-        for a in range(tables.arm_start[k], tables.arm_start[k + 1]):
+        for a in range(structure.arm_start[k], structure.arm_start[k + 1]):
             linear.arm[a], linear.measure[a] = work.arm[a], work.gradient[a]
-            linear.turning[a] = gather[tables.arm_at[a]]
-            gather[tables.arm_at[a]] = 0.0
-    if tables.contact_rows:
-        for k in range(tables.joint_pin.size):
-            if tables.joint_pin[k] >= 0:
-                _turn_pushes(tables, work, k, linear.load_by_position[k])
-        partition(tables, work, linear.blocks, linear.gain)
+            linear.turning[a] = gather[structure.arm_at[a]]
+            gather[structure.arm_at[a]] = 0.0
+    if structure.contact_rows:
+        for k in range(structure.joint_pin.size):
+            if structure.joint_pin[k] >= 0:
+                _turn_pushes(structure, work, k, linear.load_by_position[k])
+        partition(structure, work, linear.blocks, linear.gain)
     return 1

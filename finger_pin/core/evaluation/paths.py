@@ -20,8 +20,9 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import PIECE, WRENCH, Paths
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.path_tables import PIECE, WRENCH, PathParameters, PathStructure
+from finger_pin.core.structure import Structure
 
 
 @njit_inline
@@ -33,7 +34,7 @@ def add_moment(point: Vector, force: Vector, out: Vector) -> None:
 
 
 @njit_always_inline
-def _frame(paths: Paths, e: int, work: Work) -> None:
+def _frame(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -> None:
     """Place a piece's frame and its points, and express its points in the frame."""
     pieces = work.paths
     rotation, origin, ends = pieces.frame[e], pieces.origin[e], pieces.ends[e]
@@ -43,20 +44,20 @@ def _frame(paths: Paths, e: int, work: Work) -> None:
         for r in range(3):
             origin[r] = work.origin[body, r]
             for i in range(3):
-                origin[r] += above[r, i] * paths.origin[e, i]
+                origin[r] += above[r, i] * geometry.origin[e, i]
             for c in range(3):
                 rotation[r, c] = 0.0
                 for i in range(3):
-                    rotation[r, c] += above[r, i] * paths.rotation[e, i, c]
+                    rotation[r, c] += above[r, i] * geometry.rotation[e, i, c]
     for p in range(2 + paths.thirds[e]):
         body = paths.bodies[e, PIECE.third if p == 2 else p]
         for r in range(3):
-            ends[3 * p + r] = paths.points[e, 3 * p + r]
+            ends[3 * p + r] = geometry.points[e, 3 * p + r]
         if body >= 0:
             for r in range(3):
                 ends[3 * p + r] = work.origin[body, r]
                 for i in range(3):
-                    ends[3 * p + r] += work.rotation[body, r, i] * paths.points[e, 3 * p + i]
+                    ends[3 * p + r] += work.rotation[body, r, i] * geometry.points[e, 3 * p + i]
         for c in range(3):
             pieces.local_points[e, 3 * p + c] = 0.0
             for r in range(3):
@@ -71,28 +72,28 @@ def turn_out(rotation: Matrix, out: Vector, first: int, vector: Vector) -> None:
 
 
 @njit_inline
-def _look(paths: Paths, e: int, work: Work) -> bool:
+def _look(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -> bool:
     """Fill value and wrenches of a piece between placed bodies; return false if it is out of reach."""
     pieces = work.paths
-    _frame(paths, e, work)
+    _frame(paths, geometry, e, work)
     out, y = pieces.out[e], pieces.local_points[e]
     beyond = 0.0
     for c in range(3):
         middle = 0.5 * (y[c] + y[3 + c])
         beyond += middle * middle
-    beyond = np.sqrt(beyond) - paths.reach[e]
+    beyond = np.sqrt(beyond) - geometry.reach[e]
     if beyond > 0.0:
         out[GAP_OUT.gap] = beyond
     else:
-        call_shape(paths.value[e], y, paths.parameters[e], out)
+        call_shape(paths.value[e], y, geometry.shapes[e], out)
     return not beyond > 0.0
 
 
 @njit_inline
-def _measure(paths: Paths, e: int, work: Work) -> None:
+def _measure(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -> None:
     """Fill the value of a piece, and its wrenches."""
     pieces = work.paths
-    _look(paths, e, work)
+    _look(paths, geometry, e, work)
     out, columns = pieces.out[e], paths.columns[e]
     pieces.active[e] = 1 if columns == 1 or out[GAP_OUT.gap] < 0.0 or work.rows[ROW.side, paths.row[e]] > 0.0 else 0
     rotation, ends, point = pieces.frame[e], pieces.ends[e], work.centre
@@ -142,18 +143,24 @@ def look(address: int, piece: float) -> int:
     """Place all bodies, and fill value and wrenches of a piece; return 0 if it is out of reach, else 1."""
     model = unpack(address, MODEL)
     work, width = model.work, model.work.torque.size
-    move(model.tables, model.state[:width], model.state[width : 2 * width], work)
-    return 1 if _look(model.tables.paths, int(piece), work) else 0
+    move(model.structure, model.parameters, model.state[:width], model.state[width : 2 * width], work)
+    return 1 if _look(model.structure.paths, model.parameters.paths, int(piece), work) else 0
 
 
 @njit_always_inline
-def measure_paths(tables: Tables, work: Work) -> None:
+def measure_paths(structure: Structure, parameters: Parameters, work: Work) -> None:
     """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if active."""
-    paths, pieces, first, arms = tables.paths, work.paths, tables.contact_rows, tables.contact_arms
+    paths, geometry, pieces, first, arms = (
+        structure.paths,
+        parameters.paths,
+        work.paths,
+        structure.contact_rows,
+        structure.contact_arms,
+    )
     closed = 0
     for index in range(pieces.active_pair_count[0]):
         e = pieces.active_pairs[index]
-        _measure(paths, e, work)
+        _measure(paths, geometry, e, work)
         if pieces.active[e]:
             pieces.closed[closed] = e
             closed += 1
@@ -161,7 +168,7 @@ def measure_paths(tables: Tables, work: Work) -> None:
             pieces.length[paths.row[e]] = pieces.out[e, GAP_OUT.gap]
     pieces.closed_count[0] = closed
     for e in range(first // arms, paths.columns.size):
-        _measure(paths, e, work)
+        _measure(paths, geometry, e, work)
     axes, gather, net = work.spatial.axis, pieces.gather, work.vectors[0]
     for at in range(arms * closed + paths.rows.size - first):
         # The rows of contacts are their places, too.
@@ -170,14 +177,14 @@ def measure_paths(tables: Tables, work: Work) -> None:
             index = paths.row[pieces.closed[at // arms]] + at % arms
         k = paths.rows[index]
         length, turn = 0.0, 0.0
-        begin, end = tables.arm_start[k], tables.arm_start[k + 1]
+        begin, end = structure.arm_start[k], structure.arm_start[k + 1]
         for a in range(begin, end):
-            work.arm[a] = tables.arm[a]
-            work.gradient[a] = tables.measure[a]
+            work.arm[a] = parameters.arm[a]
+            work.gradient[a] = parameters.measure[a]
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
             if m == 0:
-                length += paths.length_weight[leg] * pieces.out[e, SPAN_OUT.length]
+                length += geometry.length_weight[leg] * pieces.out[e, SPAN_OUT.length]
             if pieces.active[e] == 0:
                 continue
             if paths.bends[leg] and paths.columns[e] == 1:
@@ -190,17 +197,17 @@ def measure_paths(tables: Tables, work: Work) -> None:
                 net_wrench(paths.moves[r], pieces.wrench[e, m], net)
                 gather[paths.at[r]] = dot(axes[paths.at[r]], net)
             for a in range(begin, end):
-                j = tables.arm_at[a]
-                work.arm[a] += paths.arm_weight[leg] * gather[j]
-                work.gradient[a] += paths.length_weight[leg] * gather[j]
+                j = structure.arm_at[a]
+                work.arm[a] += geometry.arm_weight[leg] * gather[j]
+                work.gradient[a] += geometry.length_weight[leg] * gather[j]
                 gather[j] = 0.0
         pieces.length[k], pieces.turn[k] = length, turn
 
 
 @njit_always_inline
-def push(tables: Tables, work: Work) -> None:
+def push(structure: Structure, work: Work) -> None:
     """Fill the forces of all contacts, after their law."""
-    paths, pieces = tables.paths, work.paths
+    paths, pieces = structure.paths, work.paths
     for index in range(pieces.closed_count[0]):
         e = pieces.closed[index]
         for r in range(3):
@@ -210,7 +217,7 @@ def push(tables: Tables, work: Work) -> None:
 
 
 @njit_inline
-def passes(paths: Paths, e: int, body: int) -> float:
+def passes(paths: PathStructure, e: int, body: int) -> float:
     """Return the count of passages of a contact's force, less its reaction, through the pin of a body."""
     first, second = paths.bodies[e, PIECE.first], paths.bodies[e, PIECE.frame]
     beyond = 0.0

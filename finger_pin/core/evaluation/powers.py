@@ -20,8 +20,9 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL
+from finger_pin.core.parameters import Parameters
 from finger_pin.core.stepping.interpolation import Between, step_at, within
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 
 
 class Powers(NamedTuple):
@@ -50,14 +51,16 @@ def _attitude(b: Any, step: int) -> Any:
 
 
 @njit_always_inline
-def _keep(tables: Tables, work: Work, state: Vector, energy_terms: Any, out: Vector) -> None:
+def _keep(
+    structure: Structure, parameters: Parameters, work: Work, state: Vector, energy_terms: Any, out: Vector
+) -> None:
     """Fill the powers of the rows and of the forces at the tips."""
     count, width = out.size - 1, work.torque.size
     for i in range(count):
         out[i] = energy_terms[energy_terms.size - count + i]
     out[count] = 0.0
-    if tables.has_tip_force:
-        for j in range(tables.parents.size):
+    if parameters.has_tip_force:
+        for j in range(structure.parents.size):
             out[count] += work.external[j] * state[width + j]
 
 
@@ -66,28 +69,28 @@ def power_many(address: int, _time: float) -> int:
     """Fill the `Powers` at an address."""
     asked = unpack(address, POWERS)
     b, model = asked.between, unpack(asked.model, MODEL)
-    tables, work, state = model.tables, model.work, model.state
+    structure, parameters, work, state = model.structure, model.parameters, model.work, model.state
     width, step, last = work.torque.size, -1, -1
     moving = model.base_power != 0 or work.guide.size > 0
-    activate_all_pairs(tables, work)
+    activate_all_pairs(structure, work)
     for k in range(b.times.size):
         time, last = b.times[k], step
         step = step_at(b, time, step)
         within(b, step, time, state)
         if step != last:
-            place_bodies(tables, _attitude(b, step))
+            place_bodies(structure, parameters, _attitude(b, step))
         if moving:
             call_at(model.evaluate, asked.model, time)
         else:
             # Contacts far apart are culled from state to state; what is left in ``rate`` is the state before.
-            if tables.contact_rows > 0 and k > 0:
-                activate_since(tables, work, _attitude(b, last), _attitude(b, step), model.rate, state)
+            if structure.contact_rows > 0 and k > 0:
+                activate_since(structure, parameters, work, _attitude(b, last), _attitude(b, step), model.rate, state)
             inputs(model.control, time, state[:width], state[width : 2 * width], work.command)
             exert_alone(model, asked.model, time)
-        fill_energy_terms(tables, work, asked.energy_terms)
+        fill_energy_terms(structure, parameters, work, asked.energy_terms)
         if moving:
             fill_base_power(model, asked.model, True, asked.energy_terms)
-        elif tables.contact_rows > 0:
-            cull_distant(tables, work, state, model.rate)
-        _keep(tables, work, state, asked.energy_terms, asked.powers[k])
+        elif structure.contact_rows > 0:
+            cull_distant(structure, parameters, work, state, model.rate)
+        _keep(structure, parameters, work, state, asked.energy_terms, asked.powers[k])
     return 1

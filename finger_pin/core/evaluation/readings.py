@@ -7,26 +7,27 @@ import numpy as np
 from finger_pin.core.evaluation.blocks import factorise, substitute
 from finger_pin.core.jit import Vector, njit_inline
 from finger_pin.core.linear_systems import Linear
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.structure import Structure
 
 
 @njit_inline
-def add_readings(tables: Tables, k: int, slope: float, wide: int, out: Vector) -> None:
+def add_readings(structure: Structure, parameters: Parameters, k: int, slope: float, wide: int, out: Vector) -> None:
     """Add a slope by a row's readings of states."""
-    for e in range(tables.read_start[k], tables.read_start[k + 1]):
-        out[wide + tables.read_place[tables.read_at[e]]] += slope * tables.read_weight[e]
+    for e in range(structure.read_start[k], structure.read_start[k + 1]):
+        out[wide + structure.read_place[structure.read_at[e]]] += slope * parameters.read_weight[e]
 
 
 @njit_inline
-def resolve_readings(tables: Tables, linear: Linear, b: int, width: int, wide: int) -> bool:
+def resolve_readings(structure: Structure, linear: Linear, b: int, width: int, wide: int) -> bool:
     """Solve for the changes of the states that rows of a block read, and put them into its gains; false if singular."""
-    blocks, matrix, solved, reads = linear.blocks, linear.read_matrix, linear.read_gain, tables.read_states.size
+    blocks, matrix, solved, reads = linear.blocks, linear.read_matrix, linear.read_gain, structure.read_states.size
     states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
     matrix[:, :] = np.eye(reads)
     solved[:, :wide] = 0.0
     for s in states:
-        if tables.read_place[s] >= 0:
-            p, state_gain = tables.read_place[s], linear.state_gain[s]
+        if structure.read_place[s] >= 0:
+            p, state_gain = structure.read_place[s], linear.state_gain[s]
             for c in range(reads):
                 matrix[p, c] -= state_gain[wide + c]
             for c in range(wide):

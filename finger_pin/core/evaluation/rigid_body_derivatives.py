@@ -9,7 +9,7 @@ from __future__ import annotations
 from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 
 
 @njit_always_inline
@@ -48,15 +48,15 @@ def _coriolis_block(inertia: Vector, motion: Vector, out: Vector) -> None:
 
 
 @njit_inline
-def inverse_dynamics_derivatives(tables: Tables, velocity: Vector, work: Work) -> None:
+def inverse_dynamics_derivatives(structure: Structure, velocity: Vector, work: Work) -> None:
     """Fill the derivatives of inverse dynamics by position and velocity after `inverse_dynamics` and `mass_matrix`.
 
     Of bodies that neither carries the other they are zero from the start.
     """
-    size = tables.parents.size
+    size = structure.parents.size
     by_position, by_velocity = work.by_position, work.by_velocity
     for i in range(size):
-        parent = tables.parents[i]
+        parent = structure.parents[i]
         _coriolis_block(work.inertia[i], work.spatial.motion[i], work.coriolis[i])
         # axis_curve = a_parent x S + v_parent x (v_parent x S)
         above = work.base_acceleration if parent < 0 else work.spatial.acceleration[parent]
@@ -100,8 +100,8 @@ def inverse_dynamics_derivatives(tables: Tables, velocity: Vector, work: Work) -
             if j != i:
                 by_position[j, i] = dot(above, by_q)
                 by_velocity[j, i] = dot(above, by_v)
-            j = tables.parents[j]
-        parent = tables.parents[i]
+            j = structure.parents[j]
+        parent = structure.parents[i]
         if parent >= 0:
             for k in range(12):
                 work.coriolis[parent, k] += block[k]

@@ -15,18 +15,19 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.chains import BODY, PRISMATIC
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.structure import Structure
 
 
 @njit_always_inline
-def _place(tables: Tables, i: int, angle: float, work: Work) -> None:
+def _place(structure: Structure, parameters: Parameters, i: int, angle: float, work: Work) -> None:
     """Place body i: rotation, origin and joint axis in the base frame."""
-    body, parent, rotation, origin = tables.bodies[i], tables.parents[i], work.rotation[i], work.origin[i]
+    body, parent, rotation, origin = parameters.bodies[i], structure.parents[i], work.rotation[i], work.origin[i]
     ax, ay, az = body[BODY.rotation], body[BODY.rotation + 1], body[BODY.rotation + 2]
     bx, by, bz = body[BODY.rotation + 3], body[BODY.rotation + 4], body[BODY.rotation + 5]
     cx, cy, cz = body[BODY.rotation + 6], body[BODY.rotation + 7], body[BODY.rotation + 8]
     x, y, z = body[BODY.translation], body[BODY.translation + 1], body[BODY.translation + 2]
-    prismatic = tables.kinds[i] == PRISMATIC
+    prismatic = structure.kinds[i] == PRISMATIC
     sine, cosine = (0.0, 1.0) if prismatic else sine_cosine(angle)
     slid = angle if prismatic else 0.0
     for r in range(3):
@@ -41,9 +42,9 @@ def _place(tables: Tables, i: int, angle: float, work: Work) -> None:
 
 
 @njit_inline
-def _massless(tables: Tables, i: int) -> bool:
+def _massless(parameters: Parameters, i: int) -> bool:
     """Return whether a body has no inertia."""
-    body = tables.bodies[i]
+    body = parameters.bodies[i]
     return (
         body[BODY.mass] == 0.0
         and body[BODY.inertia] == 0.0
@@ -53,10 +54,10 @@ def _massless(tables: Tables, i: int) -> bool:
 
 
 @njit_always_inline
-def _inertia_about_origin(tables: Tables, i: int, work: Work) -> None:
+def _inertia_about_origin(parameters: Parameters, i: int, work: Work) -> None:
     """Express the inertia of body i about O in base axes."""
-    body, rotation, origin, out = tables.bodies[i], work.rotation[i], work.origin[i], work.inertia[i]
-    if _massless(tables, i):
+    body, rotation, origin, out = parameters.bodies[i], work.rotation[i], work.origin[i], work.inertia[i]
+    if _massless(parameters, i):
         out[:] = 0.0
         return
     mass, x, y, z = body[BODY.mass], body[BODY.centre], body[BODY.centre + 1], body[BODY.centre + 2]
@@ -82,15 +83,15 @@ def _inertia_about_origin(tables: Tables, i: int, work: Work) -> None:
 
 
 @njit_inline
-def move(tables: Tables, position: Vector, velocity: Vector, work: Work) -> None:
+def move(structure: Structure, parameters: Parameters, position: Vector, velocity: Vector, work: Work) -> None:
     """Fill axes, velocities and composite inertias of all bodies."""
-    for i in range(tables.parents.size):
-        parent = tables.parents[i]
-        _place(tables, i, position[i], work)
-        _inertia_about_origin(tables, i, work)
+    for i in range(structure.parents.size):
+        parent = structure.parents[i]
+        _place(structure, parameters, i, position[i], work)
+        _inertia_about_origin(parameters, i, work)
         axis, rotation, origin = work.spatial.axis[i], work.rotation[i], work.origin[i]
         x, y, z = rotation[0, 2], rotation[1, 2], rotation[2, 2]
-        if tables.kinds[i] == PRISMATIC:
+        if structure.kinds[i] == PRISMATIC:
             axis[0], axis[1], axis[2], axis[3], axis[4], axis[5] = 0.0, 0.0, 0.0, x, y, z
         else:
             axis[0], axis[1], axis[2] = x, y, z
@@ -103,30 +104,36 @@ def move(tables: Tables, position: Vector, velocity: Vector, work: Work) -> None
             work.spatial.motion[i, k] = above[k] + axis[k] * velocity[i]
         for k in range(10):
             work.composite[i, k] = work.inertia[i, k]
-    for i in range(tables.parents.size - 1, -1, -1):
-        if tables.parents[i] >= 0:
+    for i in range(structure.parents.size - 1, -1, -1):
+        if structure.parents[i] >= 0:
             for k in range(10):
-                work.composite[tables.parents[i], k] += work.composite[i, k]
+                work.composite[structure.parents[i], k] += work.composite[i, k]
 
 
 @njit_inline
 def inverse_dynamics(
-    tables: Tables, velocity: Vector, acceleration: Vector, work: Work, torque: Vector, moving: bool
+    structure: Structure,
+    parameters: Parameters,
+    velocity: Vector,
+    acceleration: Vector,
+    work: Work,
+    torque: Vector,
+    moving: bool,
 ) -> None:
     """Fill torque = M a + C v + G after `move`, and the accelerations and composite forces of the bodies.
 
     Without ``moving`` the acceleration is taken as zero: the bias forces.
     """
-    size = tables.parents.size
+    size = structure.parents.size
     for i in range(size):
-        parent = tables.parents[i]
+        parent = structure.parents[i]
         joint_acceleration = acceleration[i] if moving else 0.0
         for k in range(6):
             above = work.base_acceleration[k] if parent < 0 else work.spatial.acceleration[parent, k]
             work.spatial.acceleration[i, k] = (
                 above + work.spatial.axis[i, k] * joint_acceleration + work.spatial.axis_rate[i, k] * velocity[i]
             )
-        if _massless(tables, i):
+        if _massless(parameters, i):
             work.spatial.force[i] = 0.0
             continue
         apply_inertia(work.inertia[i], work.spatial.acceleration[i], work.spatial.force[i])
@@ -135,17 +142,17 @@ def inverse_dynamics(
     for i in range(size - 1, -1, -1):
         joint_acceleration = acceleration[i] if moving else 0.0
         torque[i] = (
-            dot(work.spatial.axis[i], work.spatial.force[i]) + tables.bodies[i, BODY.armature] * joint_acceleration
+            dot(work.spatial.axis[i], work.spatial.force[i]) + parameters.bodies[i, BODY.armature] * joint_acceleration
         )
-        if tables.parents[i] >= 0:
+        if structure.parents[i] >= 0:
             for k in range(6):
-                work.spatial.force[tables.parents[i], k] += work.spatial.force[i, k]
+                work.spatial.force[structure.parents[i], k] += work.spatial.force[i, k]
 
 
 @njit_always_inline
-def mass_matrix(tables: Tables, work: Work) -> None:
+def mass_matrix(structure: Structure, parameters: Parameters, work: Work) -> None:
     """Fill work.mass_matrix = M after `move`; entries between trees are zero from the start."""
-    size = tables.parents.size
+    size = structure.parents.size
     for i in range(size):
         momentum = work.spatial.momentum[i]
         apply_inertia(work.composite[i], work.spatial.axis[i], momentum)
@@ -154,32 +161,32 @@ def mass_matrix(tables: Tables, work: Work) -> None:
             value = dot(work.spatial.axis[j], momentum)
             work.mass_matrix[i, j] = value
             work.mass_matrix[j, i] = value
-            j = tables.parents[j]
-        work.mass_matrix[i, i] += tables.bodies[i, BODY.armature]
+            j = structure.parents[j]
+        work.mass_matrix[i, i] += parameters.bodies[i, BODY.armature]
 
 
 @njit_always_inline
-def factorise_mass(tables: Tables, size: int, work: Work) -> None:
+def factorise_mass(structure: Structure, size: int, work: Work) -> None:
     """Fill work.cholesky with the Cholesky factor of M, its diagonal inverted, tree by tree."""
     factor = work.cholesky
     for i in range(size):
-        for j in range(tables.roots[i], i + 1):
+        for j in range(structure.roots[i], i + 1):
             value = work.mass_matrix[i, j]
-            for k in range(tables.roots[i], j):
+            for k in range(structure.roots[i], j):
                 value -= factor[i, k] * factor[j, k]
             factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
 
 
 @njit_always_inline
-def solve_mass(tables: Tables, size: int, work: Work, vector: Vector) -> None:
+def solve_mass(structure: Structure, size: int, work: Work, vector: Vector) -> None:
     """Replace a vector by M^-1 vector after `factorise_mass`."""
     factor = work.cholesky
     for i in range(size):
         value = vector[i]
-        for k in range(tables.roots[i], i):
+        for k in range(structure.roots[i], i):
             value -= factor[i, k] * vector[k]
         vector[i] = value * factor[i, i]
     for i in range(size - 1, -1, -1):
         vector[i] *= factor[i, i]
-        for k in range(tables.roots[i], i):
+        for k in range(structure.roots[i], i):
             vector[k] -= factor[i, k] * vector[i]

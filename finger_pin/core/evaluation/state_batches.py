@@ -26,7 +26,8 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.tables import Tables
+from finger_pin.core.parameters import Parameters
+from finger_pin.core.structure import Structure
 
 
 class States(NamedTuple):
@@ -97,26 +98,31 @@ STATES, MOTIONS = StructType(States), StructType(Motions)
 
 
 @njit_inline
-def fill_energy_terms(tables: Tables, work: Work, totals: Vector) -> None:
+def fill_energy_terms(structure: Structure, parameters: Parameters, work: Work, totals: Vector) -> None:
     """Sum up stored energies and powers of all rows after an evaluation."""
     for c in range(totals.size):
         totals[c] = 0.0
-    for g in range(tables.groups.first.size):
-        begin, end = tables.groups.first[g], tables.groups.end[g]
-        if begin < tables.contact_rows:
+    for g in range(structure.groups.first.size):
+        begin, end = structure.groups.first[g], structure.groups.end[g]
+        if begin < structure.contact_rows:
             for index in range(work.paths.active_pair_count[0]):
-                k = tables.paths.row[work.paths.active_pairs[index]]
+                k = structure.paths.row[work.paths.active_pairs[index]]
                 if begin <= k < end:
                     call_filling(
-                        tables.groups.account[g], work.rows, tables.parameters, work.powers, k, k + tables.contact_arms
+                        structure.groups.account[g],
+                        work.rows,
+                        parameters.laws,
+                        work.powers,
+                        k,
+                        k + structure.contact_arms,
                     )
-                    for i in range(tables.energies.shape[1]):
-                        if tables.energies[g, i] >= 0:
-                            totals[tables.energies[g, i]] += work.powers[i, k]
+                    for i in range(structure.energies.shape[1]):
+                        if structure.energies[g, i] >= 0:
+                            totals[structure.energies[g, i]] += work.powers[i, k]
             continue
-        call_filling(tables.groups.account[g], work.rows, tables.parameters, work.powers, begin, end)
-        for i in range(tables.energies.shape[1]):
-            entry = tables.energies[g, i]
+        call_filling(structure.groups.account[g], work.rows, parameters.laws, work.powers, begin, end)
+        for i in range(structure.energies.shape[1]):
+            entry = structure.energies[g, i]
             if entry >= 0:
                 total = totals[entry]
                 for k in range(begin, end):
@@ -125,16 +131,16 @@ def fill_energy_terms(tables: Tables, work: Work, totals: Vector) -> None:
 
 
 @njit_always_inline
-def _touch(tables: Tables, work: Work, out: Matrix) -> None:
+def _touch(structure: Structure, work: Work, out: Matrix) -> None:
     """Fill the forces of contacts on the second body, the points, and the normals; zero for open ones."""
-    paths, pieces = tables.paths, work.paths
+    paths, pieces = structure.paths, work.paths
     for index in range(pieces.closed_count[0]):
         e = pieces.closed[index]
         k = paths.row[e]
         if work.rows[ROW.force, k] == 0.0:
             continue
         # Contacts come before all other rows.
-        touch = out[k // tables.contact_arms]
+        touch = out[k // structure.contact_arms]
         turn_out(pieces.frame[e], pieces.out[e], GAP_OUT.point, touch[3:6])
         for r in range(3):
             touch[3 + r] += pieces.origin[e, r]
@@ -150,7 +156,7 @@ def _set(many: States, model: Model, m: int) -> None:
         model.control.tension[i] = many.commands[m, i]
     for t in range(many.forces.shape[1]):
         for r in range(3):
-            model.tables.tip_force[t, r] = many.forces[m, t, r]
+            model.parameters.tip_force[t, r] = many.forces[m, t, r]
     copy(many.states[m], model.state)
 
 
@@ -167,17 +173,17 @@ def _evaluate(many: States, model: Model, m: int) -> None:
 @njit_inline
 def exert_alone(model: Model, address: int, time: float) -> None:
     """Fill the rows' forces and rates under known inputs, without accelerations."""
-    tables, width = model.tables, model.work.torque.size
+    structure, parameters, width = model.structure, model.parameters, model.work.torque.size
     # Only some rows need to know where bodies are.
-    if tables.has_tip_force or tables.paths.columns.size > 0:
-        move(tables, model.state[:width], model.state[width : 2 * width], model.work)
+    if parameters.has_tip_force or structure.paths.columns.size > 0:
+        move(structure, parameters, model.state[:width], model.state[width : 2 * width], model.work)
     call_at(model.exert, address, time)
 
 
 @njit_always_inline
 def _keep(many: States, model: Model, m: int) -> None:
     """Fill the m-th place with the latest evaluation."""
-    tables, work, rates, rows = model.tables, model.work, many.rates, many.rows
+    structure, parameters, work, rates, rows = model.structure, model.parameters, model.work, many.rates, many.rows
     if rates.shape[0] > 0:
         for c in range(many.states.shape[1]):
             rates[m, c] = model.rate[c]
@@ -185,13 +191,13 @@ def _keep(many: States, model: Model, m: int) -> None:
         for c in range(rows.shape[0]):
             for k in range(rows.shape[2]):
                 rows[c, many.first + m, k] = work.rows[many.column + c, k]
-    if many.touches.shape[0] > 0 and tables.contact_rows:
-        _touch(tables, work, many.touches[m])
+    if many.touches.shape[0] > 0 and structure.contact_rows:
+        _touch(structure, work, many.touches[m])
     if many.energy_terms.shape[0] > 0:
         for j in range(many.torques.shape[1]):
             many.torques[m, j] = work.torque[j]
             many.externals[m, j] = work.external[j]
-        fill_energy_terms(tables, work, many.energy_terms[m])
+        fill_energy_terms(structure, parameters, work, many.energy_terms[m])
         fill_base_power(model, many.model, many.bases.shape[0] > 0, many.energy_terms[m])
 
 
@@ -204,7 +210,7 @@ def fill_base_power(model: Model, address: int, moving: bool, totals: Vector) ->
         totals[last] = work.base_power[0]
     if work.guide.size > 0:
         for j in range(width):
-            if model.tables.prescribed[j] >= 0:
+            if model.structure.prescribed[j] >= 0:
                 totals[last] -= work.torque[j] * model.state[width + j]
 
 
@@ -213,30 +219,30 @@ def evaluate_many(address: int, _time: float) -> int:
     """Evaluate the `States` at an address."""
     many = unpack(address, STATES)
     model = unpack(many.model, MODEL)
-    tables, work, before = model.tables, model.work, model.rate
+    structure, parameters, work, before = model.structure, model.parameters, model.work, model.rate
     # Signals have the gaps of all contacts; for powers alone those far apart are culled from state to state.
-    culling = tables.contact_rows > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
-    activate_all_pairs(tables, work)
+    culling = structure.contact_rows > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
+    activate_all_pairs(structure, work)
     for m in range(many.states.shape[0]):
         _set(many, model, m)
         if culling and m > 0:
-            activate_since(tables, work, many.attitudes[m - 1], many.attitudes[m], before, model.state)
-        _set_base(many.bases, m, tables, work)
-        place_bodies(tables, many.attitudes[m])
+            activate_since(structure, parameters, work, many.attitudes[m - 1], many.attitudes[m], before, model.state)
+        _set_base(many.bases, m, parameters, work)
+        place_bodies(structure, parameters, many.attitudes[m])
         _evaluate(many, model, m)
         _keep(many, model, m)
         if culling:
-            cull_distant(tables, work, model.state, before)
+            cull_distant(structure, parameters, work, model.state, before)
     return 1
 
 
 @njit_inline
-def _set_base(bases: Matrix, m: int, tables: Tables, work: Work) -> None:
+def _set_base(bases: Matrix, m: int, parameters: Parameters, work: Work) -> None:
     """Set the motion of the base to the m-th, or to rest."""
     for k in range(6):
         moved = bases.shape[0] > 0
         work.base_velocity[k] = bases[m, k] if moved else 0.0
-        rest = -tables.gravity[k - 3] if k >= 3 else 0.0
+        rest = -parameters.gravity[k - 3] if k >= 3 else 0.0
         work.base_acceleration[k] = bases[m, 6 + k] if moved else rest
     for i in range(work.guide.size):
         work.guide[i] = bases[m, 15 + i] if bases.shape[0] > 0 else 0.0
@@ -248,21 +254,21 @@ def motion_many(address: int, _time: float) -> int:
     many = unpack(address, MOTIONS)
     positions, velocities, tips, bases = many.positions, many.velocities, many.tips, many.bases
     model = unpack(many.model, MODEL)
-    tables, work = model.tables, model.work
+    structure, parameters, work = model.structure, model.parameters, model.work
     for m in range(positions.shape[0]):
-        _set_base(bases, m, tables, work)
-        move(tables, positions[m], velocities[m], work)
+        _set_base(bases, m, parameters, work)
+        move(structure, parameters, positions[m], velocities[m], work)
         for t in range(tips.shape[1]):
-            body = tables.tip_body[t]
+            body = structure.tip_body[t]
             for r in range(3):
-                value = tables.tip_offset[t, r]
+                value = parameters.tip_offset[t, r]
                 if body >= 0:
                     value = work.origin[body, r]
                     for c in range(3):
-                        value += work.rotation[body, r, c] * tables.tip_offset[t, c]
+                        value += work.rotation[body, r, c] * parameters.tip_offset[t, c]
                 tips[m, t, r] = value
         moving, lifted = 0.0, 0.0
-        for i in range(tables.parents.size):
+        for i in range(structure.parents.size):
             inertia, v = work.inertia[i], work.spatial.motion[i]
             # v . I v, with I = (mass, first moment, second moment about O).
             moving += inertia[0] * (v[3] * v[3] + v[4] * v[4] + v[5] * v[5])
@@ -271,9 +277,9 @@ def motion_many(address: int, _time: float) -> int:
             moving += 2.0 * v[3] * (v[1] * inertia[3] - v[2] * inertia[2])
             moving += 2.0 * v[4] * (v[2] * inertia[1] - v[0] * inertia[3])
             moving += 2.0 * v[5] * (v[0] * inertia[2] - v[1] * inertia[1])
-            moving += tables.bodies[i, BODY.armature] * velocities[m, i] * velocities[m, i]
+            moving += parameters.bodies[i, BODY.armature] * velocities[m, i] * velocities[m, i]
             for r in range(3):
-                weight = bases[m, 12 + r] if bases.shape[0] > 0 else tables.gravity[r]
+                weight = bases[m, 12 + r] if bases.shape[0] > 0 else parameters.gravity[r]
                 lifted -= weight * inertia[1 + r]
         many.kinetic[m] = 0.5 * moving
         many.potential[m] = lifted

@@ -15,7 +15,7 @@ from finger_pin.core.stepping.error_norm import step_error
 from finger_pin.core.stepping.integration import INTEGRATION, Integration
 from finger_pin.core.stepping.interpolation import between, cut
 from finger_pin.core.stepping.tableaus import Tableau
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Safety factor of the maximum step after an event, 1: a rejected step costs as much as the two in which it grows back.
@@ -35,10 +35,10 @@ def release(address: int, _time: float) -> int:
     """Let the branches of all rows follow the motion, or freeze them on the kinks of a repeated `Integration`."""
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
-    tables, rows, frozen = model.tables, model.work.rows, integration.memory.frozen[0] > 0.0
-    for g in range(tables.groups.first.size):
-        if tables.groups.kink[g] >= 0:
-            for k in range(tables.groups.first[g], tables.groups.end[g]):
+    structure, rows, frozen = model.structure, model.work.rows, integration.memory.frozen[0] > 0.0
+    for g in range(structure.groups.first.size):
+        if structure.groups.kink[g] >= 0:
+            for k in range(structure.groups.first[g], structure.groups.end[g]):
                 rows[ROW.side, k] = np.sign(integration.kinks[k]) if frozen else 0.0
     return 1
 
@@ -48,30 +48,30 @@ def freeze(address: int, _time: float) -> int:
     """Freeze all rows on the present branches of their laws, unless others are given, and record gaps."""
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
-    tables, rows, kinks = model.tables, model.work.rows, integration.kinks
+    structure, parameters, rows, kinks = model.structure, model.parameters, model.work.rows, integration.kinks
     if integration.memory.frozen[0] == 0.0:
-        for g in range(tables.groups.first.size):
-            column = tables.groups.kink[g]
+        for g in range(structure.groups.first.size):
+            column = structure.groups.kink[g]
             if column >= 0:
-                for k in range(tables.groups.first[g], tables.groups.end[g]):
+                for k in range(structure.groups.first[g], structure.groups.end[g]):
                     kinks[k] = rows[column, k]
                     rows[ROW.side, k] = np.sign(kinks[k])
-    if tables.contact_rows:
-        record_start_gaps(tables, model.work.paths)
+    if structure.contact_rows:
+        record_start_gaps(structure, parameters, model.work.paths)
     return 1
 
 
 @njit_inline
-def leaving_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
+def leaving_share(structure: Structure, rows: Matrix, kinks: Vector) -> float:
     """Return the earliest share of a step at which a frozen row leaves its branch, above 1 if none has.
 
     It is taken to go on at its mean rate.
     """
     share = np.inf
-    for g in range(tables.groups.first.size):
-        column = tables.groups.kink[g]
+    for g in range(structure.groups.first.size):
+        column = structure.groups.kink[g]
         if column > ROW.speed:
-            for k in range(tables.groups.first[g], tables.groups.end[g]):
+            for k in range(structure.groups.first[g], structure.groups.end[g]):
                 nearer = kinks[k] - rows[column, k]
                 if kinks[k] * nearer > 0.0:
                     share = min(share, kinks[k] / nearer)
@@ -83,22 +83,22 @@ def left(address: int, _time: float) -> int:
     """Return 1 if a frozen row of an `Integration`'s model has left its branch, else 0."""
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
-    return 1 if left_share(model.tables, model.work.rows, integration.kinks) < 1.0 else 0
+    return 1 if left_share(model.structure, model.work.rows, integration.kinks) < 1.0 else 0
 
 
 @njit_inline
-def left_share(tables: Tables, rows: Matrix, kinks: Vector) -> float:
+def left_share(structure: Structure, rows: Matrix, kinks: Vector) -> float:
     """Return the least share of the step after which a frozen row has left its branch, 1 if none has."""
-    return min(1.0, leaving_share(tables, rows, kinks))
+    return min(1.0, leaving_share(structure, rows, kinks))
 
 
 @njit_inline
-def switch_left_branches(tables: Tables, rows: Matrix, kinks: Vector) -> None:
+def switch_left_branches(structure: Structure, rows: Matrix, kinks: Vector) -> None:
     """Switch the branch of the frozen rows that have left theirs."""
-    for g in range(tables.groups.first.size):
-        column = tables.groups.kink[g]
+    for g in range(structure.groups.first.size):
+        column = structure.groups.kink[g]
         if column > ROW.speed:
-            for k in range(tables.groups.first[g], tables.groups.end[g]):
+            for k in range(structure.groups.first[g], structure.groups.end[g]):
                 if kinks[k] * rows[column, k] < 0.0:
                     rows[ROW.side, k] = -rows[ROW.side, k]
 
@@ -106,14 +106,14 @@ def switch_left_branches(tables: Tables, rows: Matrix, kinks: Vector) -> None:
 @njit_inline
 def branch_error(integration: Integration, model: Model, time: float, h: float) -> float:
     """Return the error of rows frozen on a branch already left, in tolerances."""
-    tables, rows, kinks, size = model.tables, model.work.rows, integration.kinks, integration.x.size
+    structure, rows, kinks, size = model.structure, model.work.rows, integration.kinks, integration.x.size
     r = integration.r
     call_at(model.evaluate, integration.model, time)
-    switch_left_branches(tables, rows, kinks)
+    switch_left_branches(structure, rows, kinks)
     for c in range(size):
         r[c] = model.rate[c]
     call_at(model.evaluate, integration.model, time)
-    switch_left_branches(tables, rows, kinks)
+    switch_left_branches(structure, rows, kinks)
     for c in range(size):
         r[c] = h * (model.rate[c] - r[c])
     return step_error(integration.x, model.state, r, integration.rtol, integration.atol)
@@ -144,7 +144,7 @@ def midpoint_violation(integration: Integration, model: Model, time: float, h: f
     copy(state, end)
     between(x, end, integration.dense, 0.5, state)
     call_at(model.evaluate, integration.model, time + 0.5 * h)
-    share = left_share(model.tables, model.work.rows, integration.kinks)
+    share = left_share(model.structure, model.work.rows, integration.kinks)
     if share < 1.0 and branch_error(integration, model, time + 0.5 * h, h) <= 1.0:
         share = 1.0
     copy(end, state)
@@ -178,7 +178,7 @@ def locate_event(
         between(x, end, integration.dense, at, state)
         call_at(model.evaluate, integration.model, time + at * h)
         count += 1
-        share = leaving_share(model.tables, model.work.rows, integration.kinks)
+        share = leaving_share(model.structure, model.work.rows, integration.kinks)
         if share < 1.0:
             count += 2
             cost = branch_error(integration, model, time + at * h, at * h)

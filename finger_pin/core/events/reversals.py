@@ -17,8 +17,9 @@ import numpy as np
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.jit import Matrix, call_value, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
+from finger_pin.core.parameters import Parameters
 from finger_pin.core.stepping.integration import Integration
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Greatest reversal error of a step that is taken as a whole, in tolerances: beside an error of 1 it adds 1.6 %.
@@ -66,18 +67,19 @@ def before_reversal(integration: Integration, model: Model, h: float) -> float:
 @njit_always_inline
 def _misled(integration: Integration, model: Model, h: float, share: float) -> tuple[float, float]:
     """Return the error of bristles misled in a share of a step, in tolerances, and the share at which that begins."""
-    tables, rows, off, total, first = model.tables, model.work.rows, integration.end, 0.0, 1.0
+    structure, parameters = model.structure, model.parameters
+    rows, off, total, first = model.work.rows, integration.end, 0.0, 1.0
     size, width = integration.x.size, model.linear.mass.shape[0]
     for c in range(2 * width, size):
         off[c] = 0.0
-    for g in range(tables.groups.first.size):
-        if tables.groups.kink[g] != ROW.speed:
+    for g in range(structure.groups.first.size):
+        if structure.groups.kink[g] != ROW.speed:
             continue
-        for k in range(tables.groups.first[g], tables.groups.end[g]):
+        for k in range(structure.groups.first[g], structure.groups.end[g]):
             way, fastest, turned = _way_back(integration, model, k, share)
             if way > 0.0:
-                c = 2 * width + tables.state[k]
-                off[c] = share * h * way * _more(tables, rows, g, k, fastest) / abs(fastest)
+                c = 2 * width + structure.state[k]
+                off[c] = share * h * way * _more(structure, parameters, rows, g, k, fastest) / abs(fastest)
                 scale = integration.atol[c] + integration.rtol * max(abs(integration.x[c]), abs(model.state[c]))
                 total += (off[c] / scale) ** 2
                 first = min(first, turned)
@@ -87,11 +89,11 @@ def _misled(integration: Integration, model: Model, h: float, share: float) -> t
 @njit_always_inline
 def _way_back(integration: Integration, model: Model, k: int, share: float) -> Any:
     """Return the mean speed of a row against its side in a share of a step, the fastest, and the share at its begin."""
-    tables, dense, branch = model.tables, integration.dense, model.work.rows[ROW.side, k]
+    structure, dense, branch = model.structure, integration.dense, model.work.rows[ROW.side, k]
     start, end = branch * integration.kinks[k], branch * model.work.rows[ROW.speed, k]
     width, one, two, three = model.linear.mass.shape[0], 0.0, 0.0, 0.0
-    for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-        arm, c = branch * model.work.arm[e], width + tables.arm_at[e]
+    for e in range(structure.arm_start[k], structure.arm_start[k + 1]):
+        arm, c = branch * model.work.arm[e], width + structure.arm_at[e]
         one += arm * dense[0, c]
         two += arm * dense[1, c]
         if dense.shape[0] > 2:
@@ -114,14 +116,14 @@ def _way_back(integration: Integration, model: Model, k: int, share: float) -> A
 
 
 @njit_always_inline
-def _more(tables: Tables, rows: Matrix, g: int, k: int, speed: float) -> float:
+def _more(structure: Structure, parameters: Parameters, rows: Matrix, g: int, k: int, speed: float) -> float:
     """Return the jump of a state's rate at a speed between the two sides of its kink."""
     branch, row_speed, more = rows[ROW.side, k], rows[ROW.speed, k], 0.0
     # As it is held, on the other side, and at last as it was.
     for weight in (-1.0, 1.0, 0.0):
         rows[ROW.side, k] = -branch if weight > 0.0 else branch
         rows[ROW.speed, k] = speed if weight != 0.0 else row_speed
-        call_value(tables.groups.value[g], rows, tables.parameters, k, k + 1)
+        call_value(structure.groups.value[g], rows, parameters.laws, k, k + 1)
         more += weight * rows[ROW.rate, k]
     return more
 
@@ -133,11 +135,11 @@ def bristles_over_limit(integration: Integration, model: Model) -> bool:
     No motion does that: by (9a) |F^s|' <= sigma_0 |v| (1 - |F^s| / level), and `Law.kink` asks the like of any law.
     But implicit methods damp what grows, too.
     """
-    tables, x, state, width = model.tables, integration.x, model.state, model.linear.mass.shape[0]
-    for g in range(tables.groups.first.size):
-        if tables.groups.kink[g] == ROW.speed:
-            for k in range(tables.groups.first[g], tables.groups.end[g]):
-                c = 2 * width + tables.state[k]
+    structure, x, state, width = model.structure, integration.x, model.state, model.linear.mass.shape[0]
+    for g in range(structure.groups.first.size):
+        if structure.groups.kink[g] == ROW.speed:
+            for k in range(structure.groups.first[g], structure.groups.end[g]):
+                c = 2 * width + structure.state[k]
                 more = abs(state[c]) - abs(x[c])
                 if (
                     more > _MAX_OVERLOAD_GROWTH * (integration.atol[c] + integration.rtol * abs(state[c]))
@@ -151,7 +153,7 @@ def bristles_over_limit(integration: Integration, model: Model) -> bool:
 @njit_inline
 def bristle_load_ratio(model: Model, g: int, k: int, way: float) -> float:
     """Return the ratio of a row's bristle deflection to its limit at its speed in a direction of sliding."""
-    rows, parameters, law = model.work.rows, model.tables.parameters, model.tables.groups.value[g]
+    rows, parameters, law = model.work.rows, model.parameters.laws, model.structure.groups.value[g]
     branch, speed, bent = rows[ROW.side, k], rows[ROW.speed, k], rows[ROW.state, k]
     rows[ROW.side, k], rows[ROW.speed, k] = way, way * max(abs(speed), _MIN_SLIDING_SPEED)
     call_value(law, rows, parameters, k, k + 1)

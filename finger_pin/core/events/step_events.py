@@ -66,7 +66,7 @@ def find_missed_contacts(address: int, _h: float) -> int:
     model, memory = unpack(integration.model, MODEL), integration.memory
     touch = detect_missed_contacts(integration, model)
     if touch == MISSED_BY_CULLING:
-        list_active_pairs(model.tables, model.work.paths)
+        list_active_pairs(model.structure, model.work.paths)
         memory.stale[0] = 1.0
     elif touch < NOTHING:
         # Of a touch nothing has seen the next step's end is inside, and sees it.
@@ -79,13 +79,13 @@ def cull_contacts(address: int, _time: float) -> int:
     """Cull and activate contact pairs at the end of a step; clear the states of culled ones in all vectors."""
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
-    tables, paths, first = model.tables, model.work.paths, 2 * model.linear.mass.shape[0]
-    if update_culling(tables, model.work.rows, paths, model.state[first:]):
-        list_active_pairs(tables, paths)
-        forget_culled(tables, paths, first, integration.start)
-        forget_culled(tables, paths, first, model.rate)
+    structure, paths, first = model.structure, model.work.paths, 2 * model.linear.mass.shape[0]
+    if update_culling(structure, model.work.rows, paths, model.state[first:]):
+        list_active_pairs(structure, paths)
+        forget_culled(structure, paths, first, integration.start)
+        forget_culled(structure, paths, first, model.rate)
         for j in range(integration.k.shape[0]):
-            forget_culled(tables, paths, first, integration.k[j])
+            forget_culled(structure, paths, first, integration.k[j])
     return 1
 
 
@@ -93,7 +93,7 @@ def cull_contacts(address: int, _time: float) -> int:
 def activate_contacts(address: int, _time: float) -> int:
     """Make all contact pairs of an `Integration`'s model active: what another run could cull may be close in it."""
     model = unpack(unpack(address, INTEGRATION).model, MODEL)
-    activate_all_pairs(model.tables, model.work)
+    activate_all_pairs(model.structure, model.work)
     return 1
 
 
@@ -106,7 +106,7 @@ def _kept_at_kinks(integration: Integration, model: Model, h: float, outcome: in
         after which a row has left its side, or 1.
     """
     memory, time = integration.memory, integration.memory.time[0]
-    share, dear, part = left_share(model.tables, model.work.rows, integration.kinks), False, 1.0
+    share, dear, part = left_share(model.structure, model.work.rows, integration.kinks), False, 1.0
     # Of a step as short as this nothing can be cut, but the next one must still not be too long.
     long = h > _MIN_CUT_STEP * max(1.0, abs(time))
     if share < 1.0:
@@ -135,7 +135,7 @@ def _part_before_reversal(integration: Integration, model: Model, h: float) -> f
     memory, part = integration.memory, before_reversal(integration, model, h)
     if part < 1.0:
         cut(integration.x, model.state, integration.dense, part)
-        if model.tables.contact_rows:
+        if model.structure.contact_rows:
             # Gaps are looked for from those at its end.
             memory.evaluations[0] += 1
             call_at(model.evaluate, integration.model, memory.time[0] + part * h)

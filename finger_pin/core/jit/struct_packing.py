@@ -79,17 +79,6 @@ def nothing(table: type[_Table]) -> _Table:
     return table(*fields)
 
 
-def indices(table: tuple[Any, ...]) -> bytes:
-    """Return all arrays of integers of a table, one after the other."""
-    chunks = []
-    for value in table:
-        if isinstance(value, tuple):
-            chunks.append(indices(value))
-        elif isinstance(value, np.ndarray) and value.dtype == np.int64:
-            chunks.append(value.tobytes())
-    return b"".join(chunks)
-
-
 def _copied(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.copy()

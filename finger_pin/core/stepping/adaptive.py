@@ -136,7 +136,7 @@ def accept_step(args: AdvanceArgs, integration: Integration, model: Model, time:
         copy(x, args.states[row])
         copy(integration.kinks, args.branches[row])
         args.shares[row] = integration.memory.taken_share[0]
-    rechart(model.tables, x, attitude)
+    rechart(model.structure, model.parameters, x, attitude)
     if row < args.times.size:
         for f in range(attitude.shape[0]):
             for c in range(4):

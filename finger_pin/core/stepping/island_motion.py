@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.core.bound_models import FEW, BoundModel
-from finger_pin.core.buffers import build_work
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.powers import POWERS, Powers, power_many
 from finger_pin.core.jit import call, copied
@@ -56,7 +55,7 @@ class IslandMotion:
 
     def _between(self, times: Array, kept: int = 0) -> Between:
         """Return the steps and times with a buffer for m states."""
-        record, tables = self.record, self.part.tables
+        record, structure = self.record, self.part.structure
         return Between(
             begin=self.begin,
             start=self.start,
@@ -65,8 +64,8 @@ class IslandMotion:
             states=record.states,
             attitudes=record.attitudes,
             dense=record.dense,
-            charts=tables.charts,
-            width=len(tables.prescribed),
+            charts=structure.charts,
+            width=len(structure.prescribed),
             before=np.zeros_like(self.start),
             times=times,
             interpolated=np.empty((kept, len(self.start))),
@@ -99,8 +98,7 @@ class IslandMotion:
     def _bound(self) -> BoundModel:
         """Return a further model of the island with its inputs."""
         part = self.part
-        work = build_work(part.tables, part.laws, len(part.control.tension))
-        return BoundModel(copied(part.tables), copied(part.control), work, linearised=False)
+        return BoundModel(part.structure, part.parameters.separate(), part.laws, copied(part.control), linearised=False)
 
     @cached_property
     def _models(self) -> list[BoundModel]:

@@ -9,19 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.core.bound_models import BoundModel
-from finger_pin.core.buffers import build_work
 from finger_pin.core.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.events.step_events import activate_contacts, step_events
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.islands import Island
 from finger_pin.core.jit import Block, CompiledFunction, copied, pack
+from finger_pin.core.parameters import Parameters
 from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.adaptive import advance
 from finger_pin.core.stepping.knots import ADVANCE_KNOTTED_ARGS, AdvanceKnottedArgs, advance_knotted
 from finger_pin.core.stepping.repetition import REPEAT_STEPS_ARGS, RepeatStepsArgs, Steps, repeat_steps
 from finger_pin.core.stepping.tableaus import Tableau
-from finger_pin.core.tables import Tables
+from finger_pin.core.structure import Structure
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.typing import Array
 
@@ -69,7 +69,8 @@ class IslandIntegrator:
     Attributes:
         island: Its indices in the whole.
         laws: Of its groups of rows.
-        tables: Its tables.
+        structure: Its structure.
+        parameters: Its parameters.
         control: Its inputs.
         tableau: The method.
         x: Its packed state, shape (size,); the angles of free bodies since the last step.
@@ -89,7 +90,8 @@ class IslandIntegrator:
         self,
         island: Island,
         laws: Sequence[Law | ContactLaw],
-        tables: Tables,
+        structure: Structure,
+        parameters: Parameters,
         control: InputTable,
         x: Array,
         attitude: Array,
@@ -101,8 +103,8 @@ class IslandIntegrator:
         """Bind everything; arrays are taken as they are, not copied."""
         self.island, self.laws = island, laws
         # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
-        self.work = build_work(tables, laws, len(control.tension))
-        self.model = BoundModel(tables, control, self.work)
+        self.model = BoundModel(structure, parameters, laws, control)
+        self.work = self.model.model.work
         if not len(x) == len(atol) == len(self.model.model.state):
             raise RuntimeError(f"an island of {len(self.model.model.state)} numbers starts from {len(x)}")
         self._bound = core.Integration(
@@ -118,13 +120,13 @@ class IslandIntegrator:
             r=np.zeros(len(x) + 1),
             end=np.zeros(len(x)),
             dense=np.zeros((len(tableau.dense), len(x))),
-            kinks=np.zeros(len(tables.state)),
-            reevaluate=bool(tables.has_tip_force or tables.contact_rows),
-            events=step_events(tables.contact_rows > 0),
+            kinks=np.zeros(len(structure.state)),
+            reevaluate=bool(parameters.has_tip_force or structure.contact_rows),
+            events=step_events(structure.contact_rows > 0),
         )
         self._block = pack(self._bound, core.INTEGRATION)
-        place_all(tables, attitude)
-        self.tables, self.control, self.tableau = tables, control, tableau
+        place_all(structure, parameters, attitude)
+        self.structure, self.parameters, self.control, self.tableau = structure, parameters, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, self._bound.memory
         self._memory = memory
         self._nothing, self._record_range = self.room(0), np.zeros(2, dtype=np.int64)
@@ -188,7 +190,7 @@ class IslandIntegrator:
         """Continue from another state, at the same time or another one, s, with no memory of earlier steps."""
         self.x[:], self.attitude[:] = x, attitude
         self.forget()
-        place_all(self.tables, self.attitude)
+        place_all(self.structure, self.parameters, self.attitude)
         memory = self.memory
         for entry in (memory.last_step_size, memory.last_error, memory.rejected, memory.limiting_state):
             entry[0] = 0.0
@@ -202,7 +204,7 @@ class IslandIntegrator:
 
     def forget(self) -> None:
         """Activate all contact pairs, as for a new state."""
-        if self.tables.contact_rows:
+        if self.structure.contact_rows:
             activate_contacts(self._block.address)
 
     def with_loads(self, loaded: bool) -> IslandIntegrator:
@@ -211,7 +213,8 @@ class IslandIntegrator:
         return IslandIntegrator(
             self.island,
             self.laws,
-            self.tables._replace(has_tip_force=loaded),
+            self.structure,
+            self.parameters._replace(has_tip_force=loaded),
             self.control,
             pack.x,
             pack.attitude,
@@ -224,7 +227,8 @@ class IslandIntegrator:
     @property
     def state_snapshot(self) -> tuple[Array, ...]:
         """The arrays that later steps depend on; no copies, they may be filled."""
-        return self.x, self.attitude, self._memory, self.control.tension, self.tables.tip_force, self.tables.bodies
+        changing = self.control.tension, self.parameters.tip_force, self.parameters.bodies
+        return self.x, self.attitude, self._memory, *changing
 
     def repeat(self, steps: Steps) -> None:
         """Repeat given steps from now on, regardless of errors."""
@@ -238,7 +242,8 @@ class IslandIntegrator:
         return IslandIntegrator(
             self.island,
             self.laws,
-            copied(self.tables),
+            self.structure,
+            self.parameters.separate(),
             copied(self.control),
             pack.x.copy(),
             pack.attitude.copy(),

@@ -13,11 +13,11 @@ from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.inputs import HELD, InputTable
 from finger_pin.core.islands import Island, selections
 from finger_pin.core.jit import copied
+from finger_pin.core.parameters import compile_mechanism
 from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, failure
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
-from finger_pin.core.tables import build_tables
 from finger_pin.core.threads import in_threads
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.mechanism import Mechanism
@@ -60,10 +60,10 @@ class Stepper:
             force: At the tips, shape (3,) or (t, 3), N, base frame.
             time: When, s.
         """
-        tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
+        (structure, parameters), laws = compile_mechanism(mechanism), [table.law for table in mechanism.rows]
         self._charts, self._width = Charts.from_mechanism(mechanism), mechanism.coordinates
-        selected = selections(tables, control)
-        self._free = [np.isin(tables.charts, selection.island.coordinates) for selection in selected]
+        selected = selections(structure, control)
+        self._free = [np.isin(structure.charts, selection.island.coordinates) for selection in selected]
         self._made_of = mechanism, control, x, tableau, rtol, atol, force, time
         self.mechanism, self.parts = mechanism, list[IslandIntegrator]()
         forces = np.zeros((len(mechanism.body.tips), 3))
@@ -78,10 +78,10 @@ class Stepper:
             at = self._places(selection.island)
             # An island that nothing pushes computes as it does alone.
             loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
-            island_tables = copied(selection.tables(tables)._replace(tip_force=pushed, has_tip_force=loaded))
+            numbers = selection.parameters(parameters)._replace(tip_force=pushed, has_tip_force=loaded)
             begun = inputs, start[at], attitude[free], tableau, float(rtol), tolerances[at], memory
-            followed = [laws[group] for group in selection.of_groups]
-            self.parts.append(IslandIntegrator(selection.island, followed, island_tables, *begun))
+            followed = [laws[group] for group in selection.groups]
+            self.parts.append(IslandIntegrator(selection.island, followed, selection.structure, numbers, *begun))
 
     @classmethod
     def from_finger(
@@ -195,8 +195,8 @@ class Stepper:
         """Set the forces at the tips, shape (3,) or (t, 3), N, base frame."""
         forces = np.broadcast_to(force, (len(self.mechanism.body.tips), 3))
         for index, part in enumerate(self.parts):
-            part.tables.tip_force[:] = forces[part.island.tips]
-            if np.any(part.tables.tip_force) and not part.tables.has_tip_force:
+            part.parameters.tip_force[:] = forces[part.island.tips]
+            if np.any(part.parameters.tip_force) and not part.parameters.has_tip_force:
                 self.parts[index] = part.with_loads(True)
 
     def advance(self, end: float) -> int:
@@ -224,14 +224,14 @@ class Stepper:
     def state_snapshot(self) -> Snapshot:
         """Snapshot of all that later steps depend on; a copy."""
         return [
-            (part.tables.has_tip_force, part.drives, part.knots, tuple(each.copy() for each in part.state_snapshot))
+            (part.parameters.has_tip_force, part.drives, part.knots, tuple(each.copy() for each in part.state_snapshot))
             for part in self.parts
         ]
 
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a snapshot of this stepper or of one with the same arguments."""
         for index, (loaded, drives, knots, arrays) in enumerate(snapshot):
-            if loaded != self.parts[index].tables.has_tip_force:
+            if loaded != self.parts[index].parameters.has_tip_force:
                 self.parts[index] = self.parts[index].with_loads(loaded)
             part = self.parts[index]
             part.drives, part.knots = drives, knots

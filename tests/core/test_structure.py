@@ -1,0 +1,53 @@
+"""Structure and parameters of a mechanism: which numbers keep the one, and that both make the whole."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_mechanisms import random_mechanism, random_states
+from test_any_mechanism import assert_same
+
+import finger_pin as fp
+from finger_pin.core.compiled_finger import CompiledMechanism
+from finger_pin.core.inputs import held_control
+from finger_pin.core.islands import Selection, selections
+from finger_pin.core.parameters import compile_mechanism
+from finger_pin.mechanism.mechanism import Mechanism
+
+
+def leaves(table):
+    return [leaf for each in table for leaf in (leaves(each) if isinstance(each, tuple) else [each])]
+
+
+def test_a_mechanism_with_other_numbers_has_the_structure_and_islands_of_the_first():
+    keys = ("tendon_friction.coulomb", "joint_friction.stiction", "joints.medial.link.mass")
+    more = {f"hand.fingers.index.finger.{key}": value for key, value in zip(keys, (0.07, 0.03, 0.041), strict=True)}
+    one, other = (fp.Finger(fp.load_scenario("hand", each)).mechanism for each in ({}, more))
+    (structure, numbers), (same, changed) = compile_mechanism(one), compile_mechanism(other)
+    assert same is structure
+    control = held_control(one.channels, one.coordinates)
+    islands = selections(structure, control)
+    assert len(islands) > 1 and selections(same, control) is islands
+    for island in islands:
+        anew = Selection.from_island(structure, island.island)
+        assert all(map(np.array_equal, leaves(island.structure), leaves(anew.structure)))
+        assert all(map(np.array_equal, leaves(island.parameters(changed)), leaves(anew.parameters(changed))))
+    pairs = [(leaves(island.parameters(numbers)), leaves(island.parameters(changed))) for island in islands]
+    assert sum(not all(map(np.array_equal, *pair)) for pair in pairs) == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_arms_are_parameters_but_one_that_becomes_zero_changes_the_structure(seed):
+    rng = np.random.default_rng(300 + seed)
+    mechanism = random_mechanism(rng)
+    structure, _ = compile_mechanism(mechanism)
+
+    def with_arms(change):
+        rows = [replace(table, arm=change(table.arm), measure=change(table.measure)) for table in mechanism.listed]
+        return Mechanism(mechanism.body, rows, mechanism.lumps, mechanism.inertia, mechanism.channels)
+
+    x, command = random_states(mechanism, rng, 5), rng.uniform(-0.5, 3.0, mechanism.channels)
+    for change, kept in ((lambda arm: 1.3 * arm, True), (lambda arm: arm * (np.arange(arm.shape[1]) > 0), False)):
+        other = with_arms(change)
+        assert (compile_mechanism(other)[0] is structure) == kept
+        assert_same(CompiledMechanism(other).evaluate(x, command), other.evaluate(x, command), other)
