@@ -76,8 +76,13 @@ class Scenario(Description):
             environment = self.environment.updated(objects={**around, **(self.environment.objects or {})})
             object.__setattr__(self, "environment", environment)
         self._choose_kind()
-        self._check_effects()
-        self._check_parts()
+        parts = self.parts()
+        self._check_effects(parts)
+        for name, part in parts.items():
+            try:
+                part._check()
+            except PydanticCustomError as error:
+                raise error_of_hand(name, error) from None
         return self
 
     def _choose_kind(self) -> None:
@@ -109,11 +114,9 @@ class Scenario(Description):
             return False
         return not routing.force_closure().holds and not self._tautness(routing).holds
 
-    def _check_effects(self) -> None:
+    def _check_effects(self, parts: Mapping[str, Scenario]) -> None:
         """Refuse entries without effect on any finger of a hand, or, in a finger's own table, on that one."""
-        ineffective = {
-            name: {entry: rest for entry, *rest in idle(part, OF_SCENARIO)} for name, part in self.parts().items()
-        }
+        ineffective = {name: {entry: rest for entry, *rest in idle(part, OF_SCENARIO)} for name, part in parts.items()}
         for name, entries in ineffective.items():
             settings = (self.controller.fingers or {}).get(name)
             for entry, (value, says) in entries.items():
@@ -122,14 +125,6 @@ class Scenario(Description):
                     raise problem(f"{table}.fingers.{name}.{key}", says, shown(value))
                 if all(entry in each for each in ineffective.values()):
                     raise problem(entry, says, shown(value))
-
-    def _check_parts(self) -> None:
-        """Refuse tables that do not fit each other, finger by finger."""
-        for name, part in self.parts().items():
-            try:
-                part._check()
-            except PydanticCustomError as error:
-                raise error_of_hand(name, error) from None
 
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
