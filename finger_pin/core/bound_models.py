@@ -18,7 +18,7 @@ from finger_pin.core.evaluation.path_derivatives import linearise_paths
 from finger_pin.core.evaluation.paths import look
 from finger_pin.core.evaluation.state_batches import STATES, States, evaluate_many
 from finger_pin.core.inputs import InputTable, held_control
-from finger_pin.core.jit import call, nothing, pack
+from finger_pin.core.jit import call, empty_table, pack
 from finger_pin.core.linear_systems import Linear, build_linear
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.parameters import Parameters
@@ -29,7 +29,7 @@ from finger_pin.mechanism.mechanism import GUIDES
 from finger_pin.typing import Array
 
 #: Fewer states than this are not worth a second thread.
-FEW = 1000
+MIN_STATES_PER_THREAD = 1000
 
 
 class SignalBuffer(NamedTuple):
@@ -80,7 +80,7 @@ class SignalBuffer(NamedTuple):
 
 
 # Of models that only evaluate.
-_NO_LINEAR = nothing(Linear)
+_NO_LINEAR = empty_table(Linear)
 # In the order of the addresses of a `Model`.
 _THROUGH_SPACE = (measure, linearise_paths, fill_contact_gains, add_pushes, look)
 _MOVED = (move_base, bias_rate, base_power)
@@ -194,7 +194,7 @@ def fill(
         asked = buffer.states(part, model.address, states, commands, forces, bases, attitudes)
         call(evaluate_many, asked, STATES)
 
-    if count < FEW or threads() < 2:
+    if count < MIN_STATES_PER_THREAD or threads() < 2:
         fill_part(models.model(loaded), slice(None))
     else:
         half = count // 2
@@ -207,9 +207,9 @@ def path_motions(base: Array | None, count: int, prescribed: int) -> Array:
     if base is None:
         return np.zeros((0, 15 + prescribed))
     motions = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + prescribed]], axis=-1)
-    return rows_of(motions, (count, 15 + prescribed))
+    return as_core_array(motions, (count, 15 + prescribed))
 
 
-def rows_of(values: ArrayLike, shape: tuple[int, ...]) -> Array:
+def as_core_array(values: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Return a writable, contiguous copy of floats, the one array type that the core is compiled for."""
     return np.array(np.broadcast_to(values, shape), dtype=float, order="C")

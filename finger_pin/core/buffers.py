@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.evaluation.law_code import SLOPE_COLUMNS, widest
+from finger_pin.core.evaluation.law_code import SLOPE_COLUMNS, column_counts
 from finger_pin.core.jit import Layers, Matrix, Vector
 from finger_pin.core.path_tables import PathWork, build_path_work
 from finger_pin.core.structure import Structure
@@ -100,7 +100,7 @@ def build_work(structure: Structure, laws: Sequence[Law | ContactLaw], channels:
     """Allocate the memory for a structure whose rows follow some laws."""
     size, count, width = len(structure.parents), len(structure.state), len(structure.prescribed)
     tips = len(structure.tip_body)
-    columns, powers = widest(laws)
+    columns, powers = column_counts(laws)
     return Work(
         rotation=np.zeros((size, 3, 3)),
         origin=np.zeros((size, 3)),

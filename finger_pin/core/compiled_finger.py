@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from finger_pin.core.bound_models import FEW, Models, SignalBuffer, fill, path_motions, rows_of
+from finger_pin.core.bound_models import MIN_STATES_PER_THREAD, Models, SignalBuffer, as_core_array, fill, path_motions
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.state_batches import MOTIONS, Motions, motion_many
@@ -139,7 +139,7 @@ class CompiledMechanism:
         mechanism.split(np.asarray(x))
         buffer.packed[:] = x
         count, tips = len(buffer.packed), len(self.structure.tip_body)
-        commands = rows_of(command, (count, mechanism.channels))
+        commands = as_core_array(command, (count, mechanism.channels))
         loaded = force is not None and bool(np.any(force))
         forces = np.zeros((count, tips, 3))
         if loaded:
@@ -158,7 +158,7 @@ class CompiledMechanism:
         alone = position.ndim == 1
         count = 1 if alone else len(position)
         # A few postures after the other are asked for in loops: what is bound once serves them all.
-        kept = count < FEW and base is None
+        kept = count < MIN_STATES_PER_THREAD and base is None
         buffers = self._motions.get(count) if kept else None
         motions, tips, block = buffers or self._bound_motions(count, base)
         if kept:
@@ -214,10 +214,10 @@ class CompiledFinger:
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""
-        return self._alone.motion(position, velocity, base)
+        return self._without_surroundings.motion(position, velocity, base)
 
     @cached_property
-    def _alone(self) -> CompiledMechanism:
+    def _without_surroundings(self) -> CompiledMechanism:
         """The mechanism of the finger without its surroundings, for fingertip and energies."""
         if self.finger.scene is None:
             return self.mechanism

@@ -33,18 +33,18 @@ class Island:
     tips: Indices
 
 
-def _reads(control: InputTable) -> NDArray[np.bool_]:
+def _read_coordinates(control: InputTable) -> NDArray[np.bool_]:
     """Return a mask of the coordinates that every planned tension depends on, shape (T, N)."""
     return np.asarray((control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0)))
 
 
-def _wires(structure: Structure, control: InputTable, *more: bool) -> tuple[object, ...]:
+def _island_key(structure: Structure, control: InputTable, *more: bool) -> tuple[object, ...]:
     """Return all that islands depend on."""
-    wires = control.loop.tobytes(), control.channel.tobytes(), _reads(control).tobytes()
+    wires = control.loop.tobytes(), control.channel.tobytes(), _read_coordinates(control).tobytes()
     return (structure, *wires, control.kind, len(control.tension), len(control.minimum), *more)
 
 
-@memoised(_wires)
+@memoised(_island_key)
 def find_islands(structure: Structure, control: InputTable, touching: bool = True) -> list[Island]:
     """Return the islands of a mechanism under its inputs, coupled by possible contacts or apart from them."""
     count, bodies = len(structure.state), len(structure.parents)
@@ -65,7 +65,7 @@ def find_islands(structure: Structure, control: InputTable, touching: bool = Tru
         links.append((row_at + owners, row_at + structure.terms[start[0] : start[-1]]))
     links.append((row_at + structure.read_row, row_at + structure.state_row[structure.read_at]))
     if planned:
-        tensions, read = np.nonzero(_reads(control))
+        tensions, read = np.nonzero(_read_coordinates(control))
         links.append((loop_at + control.loop[tensions], read))
         loop_of = np.full(channels, -1)
         driven = control.channel >= 0
@@ -172,7 +172,7 @@ class Selection:
         return part.select(control)._replace(schedule=schedule, force=force)
 
 
-@memoised(_wires)
+@memoised(_island_key)
 def selections(structure: Structure, control: InputTable) -> list[Selection]:
     """Return the islands of a mechanism under its inputs, with their structures."""
     islands = find_islands(structure, control)

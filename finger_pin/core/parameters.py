@@ -10,7 +10,7 @@ import numpy as np
 from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains, read_chains, tree_arrays, weighed
 from finger_pin.core.jit import Layers, Matrix, Vector
-from finger_pin.core.path_tables import PathParameters, reached, read_paths
+from finger_pin.core.path_tables import PathParameters, coordinates_of_paths, read_paths
 from finger_pin.core.row_tables import row_arrays, stacked, term_weights
 from finger_pin.core.structure import Structure
 from finger_pin.description.caching import memoised
@@ -114,7 +114,7 @@ def _structure(mechanism: Mechanism) -> tuple[Chains, Structure, dict[str, Any]]
     """Return the chains and the structure of a mechanism, and the parameters that follow from its bodies' places."""
     rows, chains = mechanism.rows, read_chains(mechanism.body.model)
     paths, path_parameters = read_paths([path for table in rows for path in table.paths], chains)
-    routed = reached(paths, sum(table.count for table in rows), mechanism.coordinates)
+    routed = coordinates_of_paths(paths, sum(table.count for table in rows), mechanism.coordinates)
     tree, places = tree_arrays(mechanism.body, chains)
     structure = Structure(paths=paths, prescribed=mechanism.prescribed, **tree, **row_arrays(mechanism, routed))
     return chains, structure, {"paths": path_parameters, **places}

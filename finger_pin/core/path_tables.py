@@ -41,7 +41,7 @@ PIECE = PieceBodies(*range(len(PieceBodies._fields)))
 # Numbers of a wrench on the first body, then on the second: (moment, force) each.
 WRENCH = 12
 # A step is halved so often at most, less two, to look for touches.
-LOOKS = 60
+MAX_LOOKS = 60
 
 
 class PathStructure(NamedTuple):
@@ -237,7 +237,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> tuple[Pat
     )
 
 
-def reached(paths: PathStructure, count: int, width: int) -> NDArray[np.bool_]:
+def coordinates_of_paths(paths: PathStructure, count: int, width: int) -> NDArray[np.bool_]:
     """Return a mask of the coordinates that the paths of every row depend on, shape (K, N)."""
     mask = np.zeros((count, width), dtype=bool)
     for k, begin, end in zip(paths.rows, paths.leg_start[:-1], paths.leg_start[1:], strict=True):
@@ -275,7 +275,7 @@ def build_path_work(paths: PathStructure, count: int, width: int) -> PathWork:
         far=np.zeros(pieces),
         travel=np.zeros(width),
         control=np.zeros((width, 5)),
-        looks=np.zeros((LOOKS, len(LOOK))),
+        looks=np.zeros((MAX_LOOKS, len(LOOK))),
         frame=np.zeros((pieces, 3, 3)),
         origin=np.zeros((pieces, 3)),
         ends=np.zeros((pieces, 9)),

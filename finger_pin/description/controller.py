@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, field_serializer, field_validator
 
 from finger_pin.description.fields import flatten, unflatten
 from finger_pin.description.finger import FingerDescription
-from finger_pin.description.signals import ForceSignal, InputSignal, SpoolAngle, VoltageSignal, WoundLength, of_axes
+from finger_pin.description.signals import ForceSignal, InputSignal, SpoolAngle, VoltageSignal, WoundLength, check_axes
 from finger_pin.description.tables import dump_set_fields
 from finger_pin.description.validation import (
     Description,
@@ -153,7 +153,7 @@ class ControllerSettings(Description):
         0.0, unit="N m s/rad", source="the paper has none", doc="K_D, one number or one per joint."
     )
     gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
-    fingertip_force: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
+    fingertip_force: Annotated[dict[Name, ForceSignal] | None, AfterValidator(check_axes)] = Field(
         None, description="Force that the fingertip is to exert besides, J^T F added to tau^d, by axis of the base."
     )
     spring_compensation: bool = Field(

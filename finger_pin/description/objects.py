@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, field_serializer, field_validator, model_validator
 
 from finger_pin.description.placement import PathSignal
-from finger_pin.description.signals import ForceSignal, of_axes
+from finger_pin.description.signals import ForceSignal, check_axes
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
 from finger_pin.description.tables import dump_set_fields
 from finger_pin.description.validation import Description, FullName, Name, choice, problem, quantity, real, vector
@@ -180,7 +180,7 @@ class EnvironmentSettings(Description):
     fingertip_force: Annotated[tuple[float, float, float], vector(3, -1e6, 1e6)] = quantity(
         (0.0, 0.0, 0.0), unit="N", source="(6)", doc="F, constant, base frame."
     )
-    fingertip_force_signal: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
+    fingertip_force_signal: Annotated[dict[Name, ForceSignal] | None, AfterValidator(check_axes)] = Field(
         None, description="Varying part of F, added to the constant, by axis x, y, z of the base frame."
     )
     fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, entries that differ there.")

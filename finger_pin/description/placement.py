@@ -102,7 +102,7 @@ def joined_table(parts: Mapping[str, Any], group: str, table: type[_Table]) -> _
 
 
 def _joined(table: Any, tables: Sequence[Any], kinds: list[tuple[str, ...]]) -> Any:
-    return table.model_construct(**_lists(tables, kinds))
+    return table.model_construct(**_joined_lists(tables, kinds))
 
 
 def _kinds(part: Any, group: str) -> tuple[str, ...]:
@@ -112,14 +112,14 @@ def _kinds(part: Any, group: str) -> tuple[str, ...]:
     return ("",) * len(part.passive_names if group == "passive_tendon" else part.joints)
 
 
-def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dict[str, Any]:
+def _joined_lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dict[str, Any]:
     of_all = [kind for of_table in kinds for kind in of_table]
     order = sorted(range(len(of_all)), key=of_all.__getitem__)
     lists: dict[str, Any] = {}
     for entry in type(tables[0]).model_fields:
         if entry in ("law", "place"):
             group = "joint_friction" if entry == "law" else "tendon_friction"
-            lists[entry] = _one(f"{group}.{entry}", [getattr(table, entry) for table in tables])
+            lists[entry] = _common_value(f"{group}.{entry}", [getattr(table, entry) for table in tables])
             continue
         pairs = zip(tables, kinds, strict=True)
         numbers = [
@@ -129,7 +129,7 @@ def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dic
     return lists
 
 
-def _one(key: str, values: Sequence[str]) -> str:
+def _common_value(key: str, values: Sequence[str]) -> str:
     """Return the value of all fingers.
 
     Raises:

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, get_origin
 
 from finger_pin.description.effects import without_unread
 from finger_pin.description.fields import find_field
-from finger_pin.description.recordings.signal_files import fingers_of, resolve_signals
+from finger_pin.description.recordings.signal_files import placed_fingers, resolve_signals
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import (
     NONE,
@@ -100,7 +100,7 @@ def read_scenario_file(name: str, folder: Path, opened: _Opened = (), bench: boo
         if other in table or _replaces(table.get(kind)):
             parent.pop(kind, None)
     if "hand" in parent and "hand" in table:
-        table["hand"] = _on_top(parent.pop("hand"), table["hand"], folder)
+        table["hand"] = _merge_hand(parent.pop("hand"), table["hand"], folder)
     return merge(parent, table), folder
 
 
@@ -132,7 +132,7 @@ def resolve(kind: str, value: Any, folder: Path, opened: _Opened = (), entry: st
             raise InputError(f"{kind}.base", f"must be the name or path of a {kind}", base)
         base = as_table(resolve(kind, base, folder, opened, entry))
     if kind == "hand":
-        return _on_top(base, top, folder)
+        return _merge_hand(base, top, folder)
     return with_motors(merge(base, top), folder) if kind == "finger" else merge(base, top)
 
 
@@ -150,7 +150,7 @@ def with_motors(finger: Table, folder: Path) -> Table:
     return finger
 
 
-def _on_top(base: Table, hand: Table, folder: Path) -> Table:
+def _merge_hand(base: Table, hand: Table, folder: Path) -> Table:
     """Return the table of a hand merged with another on top.
 
     What is the name or path of a finger, and no table, is that finger where its place is the base's.
@@ -194,7 +194,7 @@ def override(table: Table, overrides: Mapping[str, Any] | None, folder: Path = P
     first = (".kind", ".motor", ".law", ".drive")
     for early in (True, False):
         _apply({key: value for key, value in entries.items() if key.endswith(first) == early}, table)
-        for owner in fingers_of(table).values() or [table]:
+        for owner in placed_fingers(table).values() or [table]:
             with_motors(as_table(as_table(owner).get("finger")), Path())
 
 
@@ -241,7 +241,7 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
     if name in siblings:
         return
     finger = as_table(table.get("finger"))
-    hand = {key: as_table(each).get("finger") for key, each in fingers_of(table).items()}
+    hand = {key: as_table(each).get("finger") for key, each in placed_fingers(table).items()}
     # A signal for a joint or a tendon that is there may have no entry of its own yet.
     present: dict[tuple[str, ...], tuple[str, Iterable[str]]] = {}
     for place, what in _BY_NAME.items():

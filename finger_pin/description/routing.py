@@ -216,7 +216,7 @@ class ForceClosure:
             # Where signs are mixed, any multiple but zero would make some tendon push.
             tension = vector if vector.min() >= -_SLACK else np.zeros(len(tendons))
         elif count > 1:
-            tension = _tautest(null_space)
+            tension = _tautest_tensions(null_space)
         return cls(null_space, tension, tendons)
 
     @property
@@ -248,7 +248,7 @@ def _largest_one(vector: Array) -> Array:
     return np.asarray(vector / vector[np.argmax(np.abs(vector))])
 
 
-def _tautest(null_space: Array) -> Array:
+def _tautest_tensions(null_space: Array) -> Array:
     """Return the internal tensions N y whose least entry is largest, or that leave the fewest tendons slack."""
     size, count = null_space.shape
     # The largest least entry e of N y subject to N y <= 1 is a linear programme in (y, e).

@@ -213,7 +213,7 @@ class ForceSignal(SignalSettings):
     )
 
 
-def of_axes(signals: dict[str, ForceSignal] | None) -> dict[str, ForceSignal] | None:
+def check_axes(signals: dict[str, ForceSignal] | None) -> dict[str, ForceSignal] | None:
     """Return signals by axis as they are; raise the error of a name that is no axis."""
     for name in signals or {}:
         if name not in AXES:

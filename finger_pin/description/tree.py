@@ -233,7 +233,9 @@ class Tree(Description):
 
         A sum of joint positions is a cord where it winds about hinges at radii; else it is a transmission.
         """
-        return tuple(name for name in self.tendons if self._is_cord(name) and (self._pulled(name) or self.linked(name)))
+        return tuple(
+            name for name in self.tendons if self._is_cord(name) and (self._is_pulled(name) or self.linked(name))
+        )
 
     def _is_cord(self, name: str) -> bool:
         around = self.tendons[name].wound
@@ -241,7 +243,7 @@ class Tree(Description):
             self.joints[joint].kind == "hinge" and abs(radius) <= LARGEST_RADIUS for joint, radius in around.items()
         )
 
-    def _pulled(self, name: str) -> bool:
+    def _is_pulled(self, name: str) -> bool:
         tendon = self.tendons[name]
         driven = any(each.tendon == name for each in self.actuators.values())
         return driven or tendon.stiffness > 0.0 or tendon.range is not None

@@ -25,7 +25,7 @@ from finger_pin.mechanism.state import BLOCKS, Layout
 from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree_mechanism import along_paths, tree_rows
-from finger_pin.mechanism.wiring import replaced
+from finger_pin.mechanism.wiring import replace_tables
 from finger_pin.typing import Array
 
 
@@ -126,7 +126,7 @@ def assemble(
     ]
     alone = Mechanism(
         body,
-        replaced(tables, args.tables),
+        replace_tables(tables, args.tables),
         (*routing.passive_names, *(f"{name}.spool" for name in actuators.loose_names), *actuators.names),
         np.concatenate([tendons.mass, actuators.inertias]),
         # Also where a tendon's input goes nowhere: the second one of a spool has none.

@@ -22,7 +22,7 @@ from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
 from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
 from finger_pin.mechanism.tendons import BRISTLES, LOSSES, SLACK, SOURCES, Tendons
-from finger_pin.mechanism.tree_mechanism import ELASTIC, table_of
+from finger_pin.mechanism.tree_mechanism import ELASTIC, actuator_table
 from finger_pin.typing import Array
 
 #: The tables, in the order of evaluation; those of further wraps have a number, from 2, at the end.
@@ -96,50 +96,60 @@ class Canals:
         self.wraps: dict[str, Array] = {}
         self._description, self._tree, self._tendons = description, description.tree, tendons
         self._joints, self._width = tuple(description.joints), width
-        self._known = {table.group: table for table in rows}
+        self._tables_by_group = {table.group: table for table in rows}
         # They load the pins by themselves.
-        self._pressing = {"driven_tendons", *drive_matrices}
+        self._loading = {"driven_tendons", *drive_matrices}
         actuated = [
             self._actuated(index, name, routes, drive_matrices) for index, name in enumerate(description.actuated_names)
         ]
-        left = {each.name: {("driven_tendons", each.name): 1.0} for each in actuated}
-        self._rub(WRAPS, actuated, left, 2)
+        tension_terms = {each.name: {("driven_tendons", each.name): 1.0} for each in actuated}
+        self._add_wraps(WRAPS, actuated, tension_terms, 2)
         for table in self.tables:
-            tendon = {row: index for index, each in enumerate(actuated) for _, row in left[each.name]}
+            tendon = {row: index for index, each in enumerate(actuated) for _, row in tension_terms[each.name]}
             self.wraps[table.group] = np.eye(len(tendons.routing.tendons))[:, [tendon[name] for name in table.names]]
         cords = {name: shares for name in self._tree.rubbing if (shares := self._tree.linked(name))}
         if cords:
-            self._known[CORDS] = self._cords(cords)
-            self.tables.append(self._known[CORDS])
+            self._tables_by_group[CORDS] = self._cords(cords)
+            self.tables.append(self._tables_by_group[CORDS])
         trunks = [self._trunk(name, routes) for name in self._tree.rubbing]
-        left |= {each.name: {} for each in trunks}
-        self._rub(CANALS, trunks, left)
-        branches = [branch for each in (*trunks, *actuated) for branch in self._behind(each, left[each.name])]
-        self._rub(BRANCHES, branches, {each.name: {} for each in branches})
+        tension_terms |= {each.name: {} for each in trunks}
+        self._add_wraps(CANALS, trunks, tension_terms)
+        branches = [
+            branch
+            for each in (*trunks, *actuated)
+            for branch in self._branches_behind_pulley(each, tension_terms[each.name])
+        ]
+        self._add_wraps(BRANCHES, branches, {each.name: {} for each in branches})
 
-    def _rub(
-        self, group: str, canals: Sequence[_Canal], left: dict[str, dict[tuple[str, str], float]], first: int = 1
+    def _add_wraps(
+        self,
+        group: str,
+        canals: Sequence[_Canal],
+        tension_terms: dict[str, dict[tuple[str, str], float]],
+        first: int = 1,
     ) -> None:
         """Add the tables of friction at wraps, first to last, and note how each changes its canal's tension.
 
         Args:
             group: Name of the tables.
             canals: Canals.
-            left: By canal, rows that change its tension by their forces; those of wraps are added.
+            tension_terms: By canal, rows that change its tension by their forces; those of wraps are added.
             first: Which wrap is the first, from 1.
         """
         for level in range(first, 1 + max((len(each.wraps) for each in canals), default=0)):
             wrap_group = f"{group}_{level}" if level > 1 else group
             wrapped_canals = [
-                (each, self._at(each, level, left[each.name])) for each in canals if len(each.wraps) >= level
+                (each, self._canal_at_wrap(each, level, tension_terms[each.name]))
+                for each in canals
+                if len(each.wraps) >= level
             ]
-            self._known[wrap_group] = self._table(wrap_group, [wrapped for _, wrapped in wrapped_canals])
-            self.tables.append(self._known[wrap_group])
-            self._press(wrap_group, [wrapped for _, wrapped in wrapped_canals], whole=level == 1)
+            self._tables_by_group[wrap_group] = self._table(wrap_group, [wrapped for _, wrapped in wrapped_canals])
+            self.tables.append(self._tables_by_group[wrap_group])
+            self._record_joint_loads(wrap_group, [wrapped for _, wrapped in wrapped_canals], whole=level == 1)
             for canal, wrapped in wrapped_canals:
-                left[canal.name][wrap_group, wrapped.name] = 1.0
+                tension_terms[canal.name][wrap_group, wrapped.name] = 1.0
 
-    def _at(self, canal: _Canal, level: int, left: dict[tuple[str, str], float]) -> _Canal:
+    def _canal_at_wrap(self, canal: _Canal, level: int, tension_terms: dict[tuple[str, str], float]) -> _Canal:
         """Return a canal at one of its wraps, from 1."""
         wrap = canal.wraps[level - 1]
         beyond = canal.wraps[level].crossed if level < len(canal.wraps) else frozenset()
@@ -150,7 +160,7 @@ class Canals:
             name=canal.name if level == 1 else f"{canal.name}.{wrap.name}",
             route=canal.route.beyond(wrap, coefficients),
             crossed=canal.crossed if level == 1 else wrap.crossed,
-            sources=canal.sources | left,
+            sources=canal.sources | tension_terms,
             offset=wrap.offset,
             bends=canal.bends * here if canal.bends.size else canal.bends,
             drag=canal.drag * wrap.share,
@@ -160,7 +170,7 @@ class Canals:
     def _actuated(self, index: int, name: str, routes: TendonPaths, drive_matrices: Mapping[str, Array]) -> _Canal:
         """Return the canal of an actuated tendon, with all rows that pull it."""
         drives = {
-            (group, self._known[group].names[k]): float(weights[index, k])
+            (group, self._tables_by_group[group].names[k]): float(weights[index, k])
             for group, weights in drive_matrices.items()
             for k in np.flatnonzero(weights[index])
         }
@@ -183,7 +193,7 @@ class Canals:
             one_way &= tendon.joints is None and tendon.range[0] <= 0.0
         for key, actuator in tree.actuators.items():
             if actuator.tendon == name:
-                sources[table_of(actuator), key] = -actuator.gear
+                sources[actuator_table(actuator), key] = -actuator.gear
                 one_way &= actuator.only_pulls
         if tree.linked(name):
             sources[CORDS, name] = 1.0
@@ -195,7 +205,7 @@ class Canals:
         route = routes.routes[name]
         return _Canal(name, index, route, one_way, crossed, sources, 0.0, bends, tendon.friction, wraps)
 
-    def _behind(self, trunk: _Canal, friction: dict[tuple[str, str], float]) -> list[_Canal]:
+    def _branches_behind_pulley(self, trunk: _Canal, friction: dict[tuple[str, str], float]) -> list[_Canal]:
         """Return the branches of a tendon behind a pulley, pulled by the trunk's tension after friction, divided."""
         parts = self._description.cord(trunk.name).parts[1:]
         branches, behind = [], zip(trunk.route.branches, parts, strict=True)
@@ -211,14 +221,16 @@ class Canals:
     def _cords(self, cords: Mapping[str, Mapping[str, float]]) -> Rows:
         """Return the tensions of cords that turn joints."""
         tree, actuators = self._tree, self._tree.actuators
-        shares = [{(table_of(actuators[key]), key): share for key, share in each.items()} for each in cords.values()]
+        shares = [
+            {(actuator_table(actuators[key]), key): share for key, share in each.items()} for each in cords.values()
+        ]
         return Rows(
             group=CORDS,
             law=CORD_TENSION,
             names=tuple(cords),
             parameters=np.array([[float(not tree.opposed(name)) for name in cords]]),
             arm=np.zeros((len(cords), self._width)),
-            inputs=_wired(shares, self._known),
+            inputs=_input_weights(shares, self._tables_by_group),
             powers=(SOURCES,),
         )
 
@@ -239,7 +251,7 @@ class Canals:
             names=tuple(canal.name for canal in canals),
             parameters=np.vstack([numbers, one_way]),
             arm=arm,
-            inputs=_wired([canal.sources for canal in canals], self._known),
+            inputs=_input_weights([canal.sources for canal in canals], self._tables_by_group),
             bends=bends,
             curvature_offset=np.array([canal.offset for canal in canals]),
             paths=tuple(route.legs for route in routes),
@@ -247,7 +259,7 @@ class Canals:
             powers=(*LOSSES, SLACK),
         )
 
-    def _press(self, wrap_group: str, canals: Sequence[_Canal], *, whole: bool) -> None:
+    def _record_joint_loads(self, wrap_group: str, canals: Sequence[_Canal], *, whole: bool) -> None:
         """Record how tensions and friction of canals load the joints that they cross."""
         for joint, (name, rubs) in enumerate(zip(self._joints, self._description.bearings, strict=True)):
             if not rubs:
@@ -255,12 +267,14 @@ class Canals:
             for canal in canals:
                 pressing = canal.sources if whole else {}
                 for (group, row), weight in (pressing | {(wrap_group, canal.name): 1.0}).items():
-                    if name in canal.crossed and group not in self._pressing:
-                        press = self.loads.setdefault(group, np.zeros((len(self._joints), self._known[group].count)))
-                        press[joint, self._known[group].names.index(row)] += weight
+                    if name in canal.crossed and group not in self._loading:
+                        press = self.loads.setdefault(
+                            group, np.zeros((len(self._joints), self._tables_by_group[group].count))
+                        )
+                        press[joint, self._tables_by_group[group].names.index(row)] += weight
 
 
-def _wired(sources: Sequence[Mapping[tuple[str, str], float]], known: Mapping[str, Rows]) -> dict[str, Array]:
+def _input_weights(sources: Sequence[Mapping[tuple[str, str], float]], known: Mapping[str, Rows]) -> dict[str, Array]:
     """Return the weights of earlier rows in the inputs of some, by table."""
     inputs: dict[str, Array] = {}
     for k, source in enumerate(sources):

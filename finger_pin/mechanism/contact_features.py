@@ -64,7 +64,7 @@ def fillet(solid: Solid) -> float:
     return min(_SHARE * float(min(halves)), _LARGEST)
 
 
-def contacts_of(one: Solid, other: Solid) -> Iterator[tuple[Solid, ContactPart, Solid, tuple[float, ...]]]:
+def solid_contacts(one: Solid, other: Solid) -> Iterator[tuple[Solid, ContactPart, Solid, tuple[float, ...]]]:
     """Yield all contacts of two solids: the body whose part touches, the part, the other body and its prism.
 
     An ellipsoid, the first one if both are, touches as a whole; of two the other one has no prism. A

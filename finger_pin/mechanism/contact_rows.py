@@ -10,7 +10,7 @@ import numpy as np
 from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact_law import CONTACT, TORSIONAL_CONTACT
-from finger_pin.mechanism.contact_features import ContactPart, contacts_of
+from finger_pin.mechanism.contact_features import ContactPart, solid_contacts
 from finger_pin.mechanism.gaps import ELLIPSOIDS, PRISM
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -49,7 +49,7 @@ def contact_rows(
         apart = pair in never or (one.group == other.group and pair not in within)
         if apart or (one.prescribed and other.prescribed) or one.never_meets(other):
             continue
-        touches = list(contacts_of(one, other))
+        touches = list(solid_contacts(one, other))
         for index, (a, part, w, prism) in enumerate(touches):
             piece = _piece(a, part, w, prism)
             names.append(f"{a.name}-{w.name}" + (f".{index}" if len(touches) > 1 else ""))

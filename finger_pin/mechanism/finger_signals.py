@@ -12,7 +12,7 @@ from finger_pin.description.caching import cached_property
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.canals import CANALS
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.rows import RowSignals, combined
+from finger_pin.mechanism.rows import RowSignals, weighted_sum
 from finger_pin.mechanism.state import State
 from finger_pin.typing import Array
 
@@ -35,16 +35,18 @@ class TendonForces:
     passive_acceleration: Array
     beyond: Sequence[tuple[RowSignals, Array]] = ()
 
-    def _both(self, of: Callable[[RowSignals], Array]) -> Array:
+    def _of_all_tendons(self, of: Callable[[RowSignals], Array]) -> Array:
         return np.concatenate([of(self.driven), of(self.passive)], axis=-1)
 
     def _sum(self, of: Callable[[RowSignals], Array]) -> Array:
         """Return the sum over all places where a tendon rubs."""
-        return sum((combined(of(wraps), weights.T) for wraps, weights in self.beyond), self._both(of))
+        return sum((weighted_sum(of(wraps), weights.T) for wraps, weights in self.beyond), self._of_all_tendons(of))
 
     def at_wraps(self, of: Callable[[RowSignals], Array]) -> Array:
         """Return a signal at every place of the tendons that rub at several, in the order of `Finger.wrap_names`."""
-        return np.concatenate([of(self.driven)[..., self._first()], *(of(wraps) for wraps, _ in self.beyond)], axis=-1)
+        return np.concatenate(
+            [of(self.driven)[..., self._wrapped_tendons()], *(of(wraps) for wraps, _ in self.beyond)], axis=-1
+        )
 
     @property
     def wrap_tension(self) -> Array:
@@ -52,10 +54,10 @@ class TendonForces:
         acting = self.driven.rows.parameters[self.driven.rows.law.parameters.index("acting")]
         first = self.driven.force + acting * self.driven.row.command
         behind = (wraps.row.command + wraps.force for wraps, _ in self.beyond)
-        return np.concatenate([first[..., self._first()], *behind], axis=-1)
+        return np.concatenate([first[..., self._wrapped_tendons()], *behind], axis=-1)
 
-    def _first(self) -> NDArray[np.intp]:
-        return np.flatnonzero(self._several()[: self.driven.rows.count])
+    def _wrapped_tendons(self) -> NDArray[np.intp]:
+        return np.flatnonzero(self._has_several_wraps()[: self.driven.rows.count])
 
     @property
     def curvature(self) -> Array:
@@ -65,13 +67,13 @@ class TendonForces:
     @property
     def coefficient(self) -> Array:
         """mu^d, (16), of all curvature together."""
-        whole = self._both(lambda tendons: tendons["coefficient"])
+        whole = self._of_all_tendons(lambda tendons: tendons["coefficient"])
         if not self.beyond:
             return whole
         surface = np.concatenate([self.driven.rows.parameters[0], self.passive.rows.parameters[0]])
-        return np.where(self._several(), capstan_coefficient(surface, self.curvature), whole)
+        return np.where(self._has_several_wraps(), capstan_coefficient(surface, self.curvature), whole)
 
-    def _several(self) -> NDArray[np.bool_]:
+    def _has_several_wraps(self) -> NDArray[np.bool_]:
         """Return whether each tendon rubs at several places, shape (t,)."""
         several = np.zeros(self.driven.rows.count + self.passive.rows.count, dtype=bool)
         for _, weights in self.beyond:
@@ -81,7 +83,7 @@ class TendonForces:
     @property
     def velocity(self) -> Array:
         """v, m/s, at the first place; (H_c theta')_i, and p_5' for a passive tendon."""
-        return self._both(lambda tendons: tendons.row.speed)
+        return self._of_all_tendons(lambda tendons: tendons.row.speed)
 
     @property
     def friction(self) -> Array:
@@ -91,12 +93,12 @@ class TendonForces:
     @property
     def normal(self) -> Array:
         """F^n = |f| + |f^a|, N, (14), with f before micro-damping."""
-        of_first = self._both(lambda tendons: tendons["normal_force"])
+        of_first = self._of_all_tendons(lambda tendons: tendons["normal_force"])
         if not self.beyond:
             return of_first
         actuated = self.driven.rows.count
         ends = np.abs(self.strands[..., :actuated]) + np.abs(self.driven.row.command)
-        return np.where(self._several(), np.concatenate([ends, of_first[..., actuated:]], axis=-1), of_first)
+        return np.where(self._has_several_wraps(), np.concatenate([ends, of_first[..., actuated:]], axis=-1), of_first)
 
     @property
     def level(self) -> Array:
@@ -106,7 +108,7 @@ class TendonForces:
     @property
     def stiction_rate(self) -> Array:
         """F^s', N/s, (9a), at the first place."""
-        return self._both(lambda tendons: tendons.rate)
+        return self._of_all_tendons(lambda tendons: tendons.rate)
 
     @property
     def entering(self) -> Array:
@@ -181,10 +183,10 @@ class FingerSignals:
         driven, passive = evaluation.rows["driven_tendons"], evaluation.rows["passive_tendons"]
         strands = np.concatenate([driven.force, evaluation.rows["passive_halves"].force], axis=-1)
         for table, weights in self.drive_matrices.items():
-            strands = strands + combined(evaluation.rows[table].force, weights.T)
+            strands = strands + weighted_sum(evaluation.rows[table].force, weights.T)
         beyond = [(evaluation.rows[table], weights) for table, weights in self.wraps.items()]
         for wraps, weights in beyond:
-            strands = strands + combined(wraps.force, weights.T @ np.eye(len(weights), strands.shape[-1]))
+            strands = strands + weighted_sum(wraps.force, weights.T @ np.eye(len(weights), strands.shape[-1]))
         acceleration = evaluation.acceleration[..., self.bodies : self.bodies + masses]
         return TendonForces(driven, passive, strands, acceleration, beyond)
 
@@ -223,7 +225,7 @@ class FingerSignals:
     def spring_torque(self) -> Array:
         """tau^k of the joints' springs, shape (..., n), N m."""
         springs = self.mechanism.rows["joint_springs"]
-        return self._of_joints(-combined(springs.force, springs.rows.arm))
+        return self._at_joints(-weighted_sum(springs.force, springs.rows.arm))
 
     @cached_property
     def tendon_torque(self) -> Array:
@@ -233,17 +235,17 @@ class FingerSignals:
     @property
     def external_torque(self) -> Array:
         """J^T F, shape (..., n), N m, (6)."""
-        return self._of_joints(self.mechanism.external)
+        return self._at_joints(self.mechanism.external)
 
     @property
     def acceleration(self) -> Array:
         """theta'', shape (..., n), rad/s2, (18)."""
-        return self._of_joints(self.mechanism.acceleration)
+        return self._at_joints(self.mechanism.acceleration)
 
     @property
     def rate(self) -> Array:
         """Time derivative of the packed state, shape (..., size)."""
         return self.mechanism.rate
 
-    def _of_joints(self, values: Array) -> Array:
+    def _at_joints(self, values: Array) -> Array:
         return values[..., : self.state.position.shape[-1]]

@@ -103,7 +103,7 @@ def turned_model(body: RigidBody, slides: bool = False) -> tuple[pin.Model, list
         slide = bool(np.any(subspace[:3]))
         if joint.nv != 1 or (slide and not slides):
             raise InputError(f"joint {original.names[index]}", "the viewer shows tendons around joints that turn")
-        turn = _frame(subspace[:3] if slide else subspace[3:], _onwards(body, index))
+        turn = _frame(subspace[:3] if slide else subspace[3:], _next_place(body, index))
         above = pin.SE3(turns[parent], np.zeros(3)).inverse()
         kind = pin.JointModelPZ() if slide else pin.JointModelRZ()
         at = model.addJoint(parent, kind, above * placement * pin.SE3(turn, np.zeros(3)), original.names[index])
@@ -123,7 +123,7 @@ def chain(model: pin.Model, first: int, count: int) -> pin.Model:
     return branch
 
 
-def width_of(description: FingerDescription) -> float:
+def finger_width(description: FingerDescription) -> float:
     """Return the width of a finger, m, about, from the radii of its tendons."""
     return _WIDTH * max(
         abs(each.radius) for tendon in description.tendons.values() for each in tendon.crossings.values()
@@ -136,7 +136,7 @@ def placed_solids(solids: pin.GeometryModel, turns: list[Array]) -> Iterator[tup
         yield solid, pin.SE3(turns[solid.parentJoint], np.zeros(3)).inverse() * solid.placement
 
 
-def _onwards(body: RigidBody, index: int) -> Array:
+def _next_place(body: RigidBody, index: int) -> Array:
     """Return the next place of the finger after a joint, in its frame: the next joint, or the tip."""
     model = body.model
     after = [joint for joint in range(index + 1, model.njoints) if int(model.parents[joint]) == index]

@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 
 from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.path_elements import PathKinematics, Paths, moved, path_kinematics
+from finger_pin.mechanism.path_elements import PathKinematics, Paths, path_kinematics, shift_joints
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energies, Rows, RowSignals
 from finger_pin.mechanism.urdf import join_bodies
-from finger_pin.mechanism.wiring import in_order
+from finger_pin.mechanism.wiring import sort_tables
 from finger_pin.typing import Array
 
 #: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `base_motion`.
@@ -71,7 +71,7 @@ class Mechanism:
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         # The core evaluates contacts before all else.
         self.listed = tuple(sorted(rows, key=lambda table: table.law.arms == 1))
-        self.rows = in_order(self.listed)
+        self.rows = sort_tables(self.listed)
         self.moved = moved
         self.prescribed = np.full(self.coordinates, -1) if prescribed is None else prescribed
         self.energies = Energies.from_rows(self.rows, moved, not moved and bool(np.any(self.prescribed >= 0)))
@@ -104,7 +104,7 @@ class Mechanism:
                         group=f"{name}.{table.group}",
                         channels=np.where(table.channels >= 0, table.channels + channel, -1),
                         pins=np.where(table.pins >= 0, table.pins + joint, -1),
-                        paths=moved(table.paths, joint),
+                        paths=shift_joints(table.paths, joint),
                         inputs={f"{name}.{group}": weights for group, weights in table.inputs.items()},
                         loads={f"{name}.{group}": weights for group, weights in table.loads.items()},
                         readings={f"{name}.{group}": weights for group, weights in table.readings.items()},

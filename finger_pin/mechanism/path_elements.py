@@ -114,7 +114,7 @@ SPIN = 3
 Paths = Sequence[Sequence[PathTerm]]
 
 
-def moved(paths: Paths, shift: int) -> tuple[tuple[PathTerm, ...], ...]:
+def shift_joints(paths: Paths, shift: int) -> tuple[tuple[PathTerm, ...], ...]:
     """Return paths with the indices of all joints but the base shifted by a number."""
 
     @cache

@@ -107,7 +107,7 @@ class RigidBody:
             gravity: Shape (3,), m/s2.
         """
         twin = copy.copy(self)
-        vars(twin).pop("_afloat", None)
+        vars(twin).pop("_floating_model", None)
         twin.model = pin.Model(self.model)
         model_inertias = twin.model.inertias
         for joint, inertia in enumerate(inertias, start=1):
@@ -185,7 +185,7 @@ class RigidBody:
         if q.ndim > 1:
             return np.array([self.tip_position(each) for each in q])
         pin.framesForwardKinematics(self.model, self._data, q)
-        return self._of_tips([self._data.oMf[tip].translation for tip in self.tips], 3)
+        return self._per_tip([self._data.oMf[tip].translation for tip in self.tips], 3)
 
     def jacobian(self, q: Array) -> Array:
         """Return J = dp/dtheta of (6) at q of shape (nq,): shape (3, n), or (t, 3, n) of t tips."""
@@ -193,9 +193,9 @@ class RigidBody:
         reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobians = [pin.computeFrameJacobian(model, data, q, tip, reference) for tip in self.tips]
         # Of a single joint Pinocchio returns a vector.
-        return self._of_tips([np.reshape(each, (6, -1))[:3] for each in jacobians], 3, model.nv)
+        return self._per_tip([np.reshape(each, (6, -1))[:3] for each in jacobians], 3, model.nv)
 
-    def _of_tips(self, values: list[Array], *shape: int) -> Array:
+    def _per_tip(self, values: list[Array], *shape: int) -> Array:
         """Return values at the tips, of the given shape each; of a single tip without the dimension of tips."""
         return np.array(values).reshape(shape if len(values) == 1 else (len(values), *shape))
 
@@ -235,7 +235,7 @@ class RigidBody:
         Returns:
             Moment and force on the base about its origin, in its axes, shape (6,), and torques, shape (n,).
         """
-        model, data = self._afloat, self._afloat_data
+        model, data = self._floating_model, self._floating_data
         turned = np.r_[3:6, 0:3]
         pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         moving, speeding = np.append(base[:6][turned], v), np.append(base[6:12][turned], a)
@@ -243,7 +243,7 @@ class RigidBody:
         return efforts[:6][turned], efforts[6:]
 
     @cached_property
-    def _afloat(self) -> pin.Model:
+    def _floating_model(self) -> pin.Model:
         """The same joints on a base that floats free of gravity."""
         fixed, model = self.model, pin.Model()
         base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
@@ -255,9 +255,9 @@ class RigidBody:
         return model
 
     @property
-    def _afloat_data(self) -> pin.Data:
+    def _floating_data(self) -> pin.Data:
         if not hasattr(self._per_thread, "afloat"):
-            self._per_thread.afloat = self._afloat.createData()
+            self._per_thread.afloat = self._floating_model.createData()
         return self._per_thread.afloat
 
     def distal_weights(self) -> Array:
@@ -283,7 +283,7 @@ class RigidBody:
         directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
         if base is not None:
-            model, data = self._afloat, self._afloat_data
+            model, data = self._floating_model, self._floating_data
             pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
             moving = np.concatenate([base[3:6], base[:3], v])
             kinetic = pin.computeKineticEnergy(model, data, np.append(pose, q), moving)

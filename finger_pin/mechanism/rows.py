@@ -62,10 +62,12 @@ class Energies:
     def from_rows(cls, rows: Sequence[Rows], moved: bool = False, prescribed: bool = False) -> Energies:
         """Collect the energies and powers of tables, of moved coordinates and of a base that moves."""
         base = ((GUIDED,) if prescribed else ()) + ((BASE,) if moved else ())
-        return cls(_once(table.stored for table in rows), (*_once(p for table in rows for p in table.powers), *base))
+        return cls(
+            _unique(table.stored for table in rows), (*_unique(p for table in rows for p in table.powers), *base)
+        )
 
 
-def _once(energies: Iterable[Energy]) -> tuple[Energy, ...]:
+def _unique(energies: Iterable[Energy]) -> tuple[Energy, ...]:
     by_name: dict[str, Energy] = {}
     for entry in energies:
         by_name.setdefault(entry.name, entry)
@@ -234,7 +236,7 @@ class RowSignals:
         }
 
 
-def combined(force: Array, weights: Array) -> Array:
+def weighted_sum(force: Array, weights: Array) -> Array:
     """Return sums of forces, shape (..., k), by weights of shape (k, n): shape (..., n).
 
     Of one state they have the same bits as of many, which a product of matrices does not promise.

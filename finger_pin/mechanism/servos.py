@@ -121,15 +121,15 @@ class Actuators:
     @property
     def channels(self) -> NDArray[np.int64]:
         """The input of every motor, that of its first tendon: a tension, or a voltage in position drive; shape (m,)."""
-        return self.tendons[self._first] if self.names else np.zeros(0, dtype=np.int64)
+        return self.tendons[self._first_tendons] if self.names else np.zeros(0, dtype=np.int64)
 
     @property
     def radius(self) -> Array:
         """Radius of the spool that winds in the first tendon of every motor, shape (m,), m."""
-        return self.spools[self._first, np.arange(len(self.names))] if self.names else np.zeros(0)
+        return self.spools[self._first_tendons, np.arange(len(self.names))] if self.names else np.zeros(0)
 
     @property
-    def _first(self) -> NDArray[np.intp]:
+    def _first_tendons(self) -> NDArray[np.intp]:
         first: NDArray[np.intp] = np.argmax(self.spools != 0.0, axis=0)
         return first
 
@@ -187,9 +187,9 @@ class Actuators:
         # Of gears with play it is what their flanks carry.
         tight = np.where(self.backlash > 0.0, 0.0, weight)[:, None] * self.spools.T
         flanks = {"backlash": np.diag(weight)[:, self.loose]} if self.loose.size else {}
-        return {**flanks, **self._wired(tight)}
+        return {**flanks, **self._tendon_weights(tight)}
 
-    def _wired(self, weights: Array) -> dict[str, Array]:
+    def _tendon_weights(self, weights: Array) -> dict[str, Array]:
         """Return weights of the elastic tendons' tensions in later rows, by table, from weights of shape (..., k)."""
         tendons = self.hysteretic_tendons
         hysteresis = {"tendon_hysteresis": weights[..., tendons]} if tendons.size else {}

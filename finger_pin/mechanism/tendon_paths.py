@@ -15,7 +15,7 @@ from finger_pin.description.tree_parts import TreeJoint
 from finger_pin.description.waypoints import Waypoint
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import RowSignals, combined
+from finger_pin.mechanism.rows import RowSignals, weighted_sum
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
 from finger_pin.mechanism.spans.span import ELSEWHERE
 from finger_pin.mechanism.tendon_wraps import Wrap
@@ -228,7 +228,7 @@ class Excursions:
         """Return the torque of driven or elastic tendons at packed states, shape (..., size): shape (..., n), N m."""
         joints, rows = self._coupling.shape[1], tendons.rows
         if not rows.routed:
-            return combined(tendons.force, rows.arm)[..., :joints]
+            return weighted_sum(tendons.force, rows.arm)[..., :joints]
         body, width = self._paths.body, rows.arm.shape[1]
         torque = np.zeros((*x.shape[:-1], joints))
         for at in np.ndindex(x.shape[:-1]):

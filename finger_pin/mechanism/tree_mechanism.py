@@ -165,7 +165,7 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
         tables.append(table(ELASTIC, ELASTIC_TENDON, along, numbers, offset=offset, unit="m"))
     first = len(description.actuated_names)
     for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE), (MUSCLES, MUSCLE)):
-        actuators = {name: each for name, each in tree.actuators.items() if table_of(each) == group}
+        actuators = {name: each for name, each in tree.actuators.items() if actuator_table(each) == group}
         along = {
             name: (joints[each.joint] if each.joint else routes.routes[str(each.tendon)]).times(each.gear)
             for name, each in actuators.items()
@@ -239,7 +239,9 @@ def _loops(tree: Tree, routes: TendonPaths) -> _Described:
     for name, loop in tree.loops.items():
         first, second = routes.placed[loop.body], routes.placed[loop.other]
         for axis, unit in zip("xyz", np.eye(3), strict=True):
-            along[f"{name}.{axis}"] = _rise(first.place(loop.position), second.place(loop.other_position), unit)
+            along[f"{name}.{axis}"] = _height_difference(
+                first.place(loop.position), second.place(loop.other_position), unit
+            )
     numbers = [(loop.stiffness, 0.0, loop.damping) for loop in tree.loops.values() for _ in "xyz"]
     return "loop", JOINT_SPRING, along, numbers
 
@@ -254,12 +256,15 @@ def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
         if size and each.gravity_compensation and each.mass and routes.placed[name].joint
     }
     base, places = Place(0, np.zeros(3)), routes.placed
-    along = {name: _rise(base, places[name].place(each.centre), -gravity / size) for name, each in compensated.items()}
+    along = {
+        name: _height_difference(base, places[name].place(each.centre), -gravity / size)
+        for name, each in compensated.items()
+    }
     numbers = [(each.gravity_compensation * each.mass * size,) for each in compensated.values()]
     return "gravity_compensation", CONSTANT_FORCE, along, numbers
 
 
-def _rise(first: Place, second: Place, axis: Array) -> TendonPath:
+def _height_difference(first: Place, second: Place, axis: Array) -> TendonPath:
     """Return the height of one point above another along an axis of the base, a unit vector."""
     numbers = np.eye(len(RISE.parameters))[1]
     piece = PathElement(RISE, numbers, (first, second), 0, pin.SE3(_upright(axis), np.zeros(3)))
@@ -272,7 +277,7 @@ def _upright(axis: Array) -> Array:
     return turned
 
 
-def table_of(actuator: TreeActuator) -> str:
+def actuator_table(actuator: TreeActuator) -> str:
     """Return the name of the table that an actuator's row stands in."""
     if actuator.muscle is not None:
         return MUSCLES

@@ -91,14 +91,14 @@ def build_rigid_body(description: FingerDescription) -> RigidBody:
     return _build(description) if description.hand is None else build_hand(description.hand)
 
 
-def _linked(description: FingerDescription) -> tuple[object, ...]:
+def _body_key(description: FingerDescription) -> tuple[object, ...]:
     """Return all that a finger's body depends on, by value."""
     links = (joint.link for joint in description.joints.values())
     values = (link and tuple(getattr(link, name) for name in Link.model_fields) for link in links)
     return (description.name, description.gravity, *description.joints, *values)
 
 
-@memoised(_linked)
+@memoised(_body_key)
 def _build(description: FingerDescription) -> RigidBody:
     model = _read(to_urdf(description, drawn=False)).copy()
     model.gravity.linear[:] = description.gravity

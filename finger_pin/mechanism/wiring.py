@@ -12,7 +12,7 @@ from finger_pin.mechanism.rows import Rows
 from finger_pin.typing import Array
 
 
-def in_order(tables: Sequence[Rows]) -> tuple[Rows, ...]:
+def sort_tables(tables: Sequence[Rows]) -> tuple[Rows, ...]:
     """Return tables sorted so that every force is evaluated before it is read, stable otherwise.
 
     Raises:
@@ -40,7 +40,7 @@ def in_order(tables: Sequence[Rows]) -> tuple[Rows, ...]:
     return tuple(ordered)
 
 
-def replaced(tables: Sequence[Rows], replacements: Mapping[str, Callable[[Rows], Rows]]) -> list[Rows]:
+def replace_tables(tables: Sequence[Rows], replacements: Mapping[str, Callable[[Rows], Rows]]) -> list[Rows]:
     """Return tables with some in place of those of their groups.
 
     Raises:

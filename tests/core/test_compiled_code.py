@@ -142,9 +142,9 @@ def test_a_law_of_somebody_else_is_compiled_without_a_word_and_kept(folder, said
 def said(caplog):
     # A command that was run without a terminal has silenced it.
     caplog.set_level(logging.WARNING, logger="finger_pin")
-    functions._say.cache_clear()
+    functions._warn_once.cache_clear()
     yield lambda: [record.getMessage() for record in caplog.records]
-    functions._say.cache_clear()
+    functions._warn_once.cache_clear()
 
 
 def test_the_first_compilation_is_announced_once(folder, said):

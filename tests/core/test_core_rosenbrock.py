@@ -96,7 +96,7 @@ def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_nam
 
 def test_a_state_whose_error_is_no_number_is_named_before_any_that_is_only_large():
     """Wherever it stands; else the one with the largest error over its tolerance."""
-    x, atol, worst = np.ones(5), np.array([1.0, 1.0, 1e-3, 1.0, 1.0]), error_norm.worst.py_func
+    x, atol, worst = np.ones(5), np.array([1.0, 1.0, 1e-3, 1.0, 1.0]), error_norm.largest_error_state.py_func
     difference = np.array([3.0, 9.0, 0.1, 1.0, 2.0])
     assert worst(x, difference, 0.0, atol) == 2
     for place in range(5):

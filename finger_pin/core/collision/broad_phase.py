@@ -73,7 +73,7 @@ def bound_linear_motion(x: Vector, end: Vector, size: int, pieces: PathWork) -> 
 
 
 @njit_inline
-def path_of(structure: Structure, parameters: Parameters, e: int, pieces: PathWork) -> float:
+def bound_relative_path(structure: Structure, parameters: Parameters, e: int, pieces: PathWork) -> float:
     """Return a bound of the relative path of a contact's bodies in the bounded motion, m."""
     paths, geometry, control = structure.paths, parameters.paths, pieces.control
     endless = np.isinf(geometry.extents[e])
@@ -90,11 +90,11 @@ def path_of(structure: Structure, parameters: Parameters, e: int, pieces: PathWo
         total += lever * way
         if endless and paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and structure.kinds[j] == 0:
             turned += way
-    return widened(total, turned, pieces.far[e])
+    return add_turning(total, turned, pieces.far[e])
 
 
 @njit_inline
-def widened(path: float, turned: float, far: float) -> float:
+def add_turning(path: float, turned: float, far: float) -> float:
     """Return the longest path of a point that moves by a path and turns at a distance, m."""
     if turned == 0.0:
         return path
@@ -126,7 +126,7 @@ def activate_near(structure: Structure, parameters: Parameters, pieces: PathWork
     for e in range(paths.columns.size):
         k = paths.row[e]
         if paths.columns[e] > 1:
-            pieces.path[e] = path_of(structure, parameters, e, pieces)
+            pieces.path[e] = bound_relative_path(structure, parameters, e, pieces)
             if pieces.culled[k]:
                 pieces.ahead[e] = pieces.clear[e] - pieces.path[e]
                 if not pieces.ahead[e] > 0.0:

@@ -16,18 +16,18 @@ import numpy as np
 
 from finger_pin.core.collision.broad_phase import (
     GAP_ACCURACY,
+    add_turning,
+    bound_relative_path,
     bound_step_motion,
     distance,
-    path_of,
     set_culled,
-    widened,
 )
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
 from finger_pin.core.model import Model
 from finger_pin.core.parameters import Parameters
-from finger_pin.core.path_tables import LOOK, LOOKS, PIECE, PathWork
+from finger_pin.core.path_tables import LOOK, MAX_LOOKS, PIECE, PathWork
 from finger_pin.core.stepping.integration import Integration
 from finger_pin.core.structure import Structure
 
@@ -103,14 +103,14 @@ def _bounds(
             curl += curve
             if endless:
                 turned += way
-    path = widened(path, turned, far)
+    path = add_turning(path, turned, far)
     moves, bends = moves + swing * (far + path), bends + curl * (far + path)
     # The second derivative of a coordinate is at most 12 times the second differences, the first one 4 times the first.
     return path, 1.5 * bends + 4.0 * turns * moves
 
 
 @njit_always_inline
-def _clear(structure: Structure, parameters: Parameters, pieces: PathWork, e: int, one: Vector, two: Vector) -> bool:
+def _is_clear(structure: Structure, parameters: Parameters, pieces: PathWork, e: int, one: Vector, two: Vector) -> bool:
     """Return whether bodies surely neither touch nor part between two moments."""
     path, bend = _bounds(structure, parameters, pieces, e, one, two)
     if one[LOOK.gap] < 0.0 or two[LOOK.gap] < 0.0:
@@ -149,7 +149,7 @@ def _look(integration: Integration, model: Model, e: int, share: float, look: Ve
 def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: Vector) -> float:
     """Return the time just after two bodies have met, which are apart at one moment and touch at another."""
     looks = model.work.paths.looks
-    early, late, middle = one[LOOK.share], two[LOOK.share], looks[LOOKS - 1]
+    early, late, middle = one[LOOK.share], two[LOOK.share], looks[MAX_LOOKS - 1]
     for _ in range(_MEETING_BISECTIONS):
         _look(integration, model, e, 0.5 * (early + late), middle)
         if middle[LOOK.gap] < 0.0:
@@ -173,7 +173,7 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
     parted, met, depth = looks[0, LOOK.gap] >= 0.0, NOTHING, 1
     while depth > 0:
         one, two = looks[0], looks[depth]
-        if depth < LOOKS - 2 and not _clear(structure, parameters, pieces, e, one, two):
+        if depth < MAX_LOOKS - 2 and not _is_clear(structure, parameters, pieces, e, one, two):
             depth += 1
             _look(integration, model, e, 0.5 * (one[LOOK.share] + two[LOOK.share]), looks[depth])
             continue
@@ -190,7 +190,7 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
 
 
 @njit_always_inline
-def _pressed(structure: Structure, rows: Matrix, k: int) -> bool:
+def _is_pressed(structure: Structure, rows: Matrix, k: int) -> bool:
     """Return whether a contact presses, or would if it were not frozen open."""
     pressed = False
     for g in range(structure.groups.first.size):
@@ -212,7 +212,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
     for e in range(paths.columns.size):
         if paths.columns[e] == 1:
             continue
-        k, path = paths.row[e], path_of(structure, parameters, e, pieces)
+        k, path = paths.row[e], bound_relative_path(structure, parameters, e, pieces)
         pieces.path[e] = path
         if pieces.culled[k]:
             pieces.ahead[e] = pieces.clear[e] - path
@@ -231,7 +231,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
             if max(start, end) < 0.0 and rows[ROW.side, k] > 0.0:
                 continue
             ahead = pieces.ahead[e]
-            share = _scan(integration, model, e, _pressed(structure, rows, k))
+            share = _scan(integration, model, e, _is_pressed(structure, rows, k))
             pieces.ahead[e] = ahead
         first = min(first, share)
     for j in range(size):

@@ -1,6 +1,6 @@
 """Continuous collision detection in Python, for any integrator whose interpolants are polynomials.
 
-The way of each coordinate is that of its Bernstein coefficients; of a quaternion, twice that over its least length is
+The path of each coordinate is that of its Bernstein coefficients; of a quaternion, twice that over its least length is
 the angle. Only paths are compared with gaps, which costs more looks than the compiled core takes.
 """
 
@@ -63,7 +63,7 @@ class _Meetings:
         if start != self._time:
             # From another moment than that where the last step ended.
             self._clear[:] = 0.0
-        first, paths = np.inf, self._ways(start, end, interpolate)
+        first, paths = np.inf, self._path_bounds(start, end, interpolate)
         ahead = self._clear - paths
         for e, _ in self._pieces:
             if not ahead[e] > 0.0:
@@ -74,7 +74,7 @@ class _Meetings:
         self._clear, self._time = ahead, end
         return None
 
-    def _ways(self, start: float, end: float, interpolate: Interpolant) -> Array:
+    def _path_bounds(self, start: float, end: float, interpolate: Interpolant) -> Array:
         """Return bounds of the paths of each piece's bodies against each other, shape (E,), m."""
         paths, charts = self._paths, self._charts
         packed = self._to_control @ interpolate(start + (end - start) * self._nodes)
@@ -82,24 +82,24 @@ class _Meetings:
         kept = charts.cores < self._bodies
         control[:, charts.cores[kept]] = packed[:, charts.plain[kept]]
         steps = np.diff(control, axis=0)
-        way = np.abs(steps).sum(axis=0)
+        path = np.abs(steps).sum(axis=0)
         for at, i in zip(charts.quaternions, charts.angles, strict=True):
             turn = float(np.linalg.norm(np.diff(packed[:, at : at + 4], axis=0), axis=1).sum())
             least = float(np.linalg.norm(packed[0, at : at + 4])) - turn
-            way[i] = 2.0 * turn / least if least > 0.0 else np.inf
+            path[i] = 2.0 * turn / least if least > 0.0 else np.inf
         against = np.abs(
             steps[:, paths.at] - np.where(paths.opposing_coordinate >= 0, steps[:, paths.opposing_coordinate], 0.0)
         ).sum(axis=0)
-        ways = np.where(paths.opposing_coordinate >= 0, against, way[paths.at])
-        levers = np.where(ways > 0.0, self._geometry.motion_bounds, 0.0)
+        paths_of_coordinates = np.where(paths.opposing_coordinate >= 0, against, path[paths.at])
+        levers = np.where(paths_of_coordinates > 0.0, self._geometry.motion_bounds, 0.0)
         bounds = np.zeros(len(paths.columns))
         for e, _ in self._pieces:
             entries = slice(paths.start[e], paths.start[e + 1])
-            bounds[e] = float(levers[entries] @ np.where(levers[entries] > 0.0, ways[entries], 0.0))
+            bounds[e] = float(levers[entries] @ np.where(levers[entries] > 0.0, paths_of_coordinates[entries], 0.0))
             carries = (paths.moves[entries, PIECE.frame] > paths.moves[entries, PIECE.first]) & (
                 self._kinds[paths.at[entries]] == 0
             )
-            turned = float(ways[entries][carries].sum()) if np.isinf(self._geometry.extents[e]) else 0.0
+            turned = float(paths_of_coordinates[entries][carries].sum()) if np.isinf(self._geometry.extents[e]) else 0.0
             if turned > 0.0:
                 distance = self._gap_and_distance(e, interpolate(np.array([start]))[0])[1]
                 bounds[e] = (bounds[e] + turned * distance) / (1.0 - turned) if turned < 1.0 else np.inf
@@ -128,7 +128,7 @@ class _Meetings:
             return self._gap_and_distance(e, interpolate(np.array([time]))[0])[0]
 
         def clear(one: tuple[float, float], two: tuple[float, float]) -> bool:
-            path = self._ways(one[0], two[0], interpolate)[e]
+            path = self._path_bounds(one[0], two[0], interpolate)[e]
             if min(one[1], two[1]) < 0.0:
                 return bool(path < PARTING_PATH_PER_DEPTH * (abs(one[1]) + abs(two[1])) + MIN_PARTING_PATH)
             return bool(path < one[1] + two[1] + _GAP_ROUNDING)

@@ -48,7 +48,7 @@ def _terms(model: Model, begin: int, end: int, slope: float, wide: int, out: Vec
 
 
 @njit_always_inline
-def _outside(model: Model, address: int, g: float, b: int, width: int, wide: int) -> None:
+def _fill_external_forces(model: Model, address: int, g: float, b: int, width: int, wide: int) -> None:
     """Fill A^T d phi of a block by forces other than its rows': inertial forces, those at tips, and contacts."""
     structure, parameters = model.structure, model.parameters
     work, linear, force = model.work, model.linear, model.linear.force
@@ -123,7 +123,7 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
     load, command = linear.load, linear.command
     own_places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
     full = wide + structure.read_states.size
-    _outside(model, address, g, b, width, wide)
+    _fill_external_forces(model, address, g, b, width, wide)
     for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
         k = blocks.rows[index]
         row, state = linear.gain[k], structure.state[k]

@@ -24,12 +24,14 @@ def measure(address: int, _time: float) -> int:
     measure_paths(model.structure, model.parameters, model.work)
     if model.structure.contact_rows:
         width = model.work.torque.size
-        _exert(model.structure, model.parameters, model.state[width : 2 * width], model.state[2 * width :], model.work)
+        _evaluate_contacts(
+            model.structure, model.parameters, model.state[width : 2 * width], model.state[2 * width :], model.work
+        )
     return 1
 
 
 @njit_always_inline
-def _exert(structure: Structure, parameters: Parameters, v: Vector, z: Vector, work: Work) -> None:
+def _evaluate_contacts(structure: Structure, parameters: Parameters, v: Vector, z: Vector, work: Work) -> None:
     """Evaluate the contacts, which come before all other rows, but for those culled, and add to A^T phi."""
     rows, paths = work.rows, work.paths
     for g in range(structure.groups.first.size):

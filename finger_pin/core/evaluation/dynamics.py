@@ -23,7 +23,7 @@ from finger_pin.core.structure import Structure
 
 
 @njit_always_inline
-def _tips(structure: Structure, parameters: Parameters, work: Work) -> None:
+def _fill_tips(structure: Structure, parameters: Parameters, work: Work) -> None:
     """Fill positions and Jacobians of the tips, and J^T F, after `move`."""
     size = structure.parents.size
     for j in range(size):
@@ -86,7 +86,9 @@ def contact_states(structure: Structure) -> int:
 
 
 @njit_always_inline
-def _see(structure: Structure, parameters: Parameters, q: Vector, v: Vector, z: Vector, work: Work) -> None:
+def _fill_law_arguments(
+    structure: Structure, parameters: Parameters, q: Vector, v: Vector, z: Vector, work: Work
+) -> None:
     """Fill the arguments of all rows' laws but contacts': positions, velocities, states and inputs from outside.
 
     One entry after the other, whatever row it belongs to: short loops inside a long one would cost twice as much.
@@ -114,7 +116,7 @@ def _see(structure: Structure, parameters: Parameters, q: Vector, v: Vector, z: 
 
 
 @njit_always_inline
-def _act(structure: Structure, parameters: Parameters, work: Work) -> None:
+def _evaluate_laws(structure: Structure, parameters: Parameters, work: Work) -> None:
     """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
     rows = work.rows
     for g in range(structure.groups.first.size):
@@ -138,8 +140,8 @@ def _act(structure: Structure, parameters: Parameters, work: Work) -> None:
 
 
 @njit_always_inline
-def _drive(structure: Structure, work: Work, rate: Vector) -> None:
-    """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
+def _add_row_forces(structure: Structure, work: Work, rate: Vector) -> None:
+    """Add to A^T phi, and fill the rates of the rows' states, after `_evaluate_laws`."""
     rows, torque = work.rows, work.torque
     for e in range(structure.arm_start[structure.contact_rows], structure.arm_at.size):
         torque[structure.arm_at[e]] += work.arm[e] * rows[ROW.force, structure.arm_row[e]]
@@ -159,14 +161,14 @@ def exert(address: int, time: float) -> int:
     width = work.torque.size
     if parameters.has_tip_force:
         tip_forces(control, time, 0, parameters.tip_force)
-        _tips(structure, parameters, work)
+        _fill_tips(structure, parameters, work)
     for j in range(width):
         work.torque[j] = 0.0
     if model.measure != 0:
         call_at(model.measure, address, time)
-    _see(structure, parameters, x[:width], x[width : 2 * width], x[2 * width :], work)
-    _act(structure, parameters, work)
-    _drive(structure, work, model.rate[2 * width :])
+    _fill_law_arguments(structure, parameters, x[:width], x[width : 2 * width], x[2 * width :], work)
+    _evaluate_laws(structure, parameters, work)
+    _add_row_forces(structure, work, model.rate[2 * width :])
     return 1
 
 

@@ -113,7 +113,7 @@ def addresses(law: Law | ContactLaw) -> Addresses:
     )
 
 
-def widest(laws: Sequence[Law | ContactLaw]) -> tuple[int, int]:
+def column_counts(laws: Sequence[Law | ContactLaw]) -> tuple[int, int]:
     """Return the numbers of columns of the table of rows and of that of energies and powers."""
     powers = max((len(law.supplies) + len(law.losses) for law in laws), default=0)
     return ROW.signals + max((len(law.signals) for law in laws), default=0), 1 + powers

@@ -21,7 +21,7 @@ from finger_pin.core.jit import (
 )
 from finger_pin.core.model import MODEL
 from finger_pin.core.parameters import Parameters
-from finger_pin.core.stepping.interpolation import Between, step_at, within
+from finger_pin.core.stepping.interpolation import Between, interpolate_within, step_at
 from finger_pin.core.structure import Structure
 
 
@@ -51,7 +51,7 @@ def _attitude(b: Any, step: int) -> Any:
 
 
 @njit_always_inline
-def _keep(
+def _fill_powers(
     structure: Structure, parameters: Parameters, work: Work, state: Vector, energy_terms: Any, out: Vector
 ) -> None:
     """Fill the powers of the rows and of the forces at the tips."""
@@ -76,7 +76,7 @@ def power_many(address: int, _time: float) -> int:
     for k in range(b.times.size):
         time, last = b.times[k], step
         step = step_at(b, time, step)
-        within(b, step, time, state)
+        interpolate_within(b, step, time, state)
         if step != last:
             place_bodies(structure, parameters, _attitude(b, step))
         if moving:
@@ -92,5 +92,5 @@ def power_many(address: int, _time: float) -> int:
             fill_base_power(model, asked.model, True, asked.energy_terms)
         elif structure.contact_rows > 0:
             cull_distant(structure, parameters, work, state, model.rate)
-        _keep(structure, parameters, work, state, asked.energy_terms, asked.powers[k])
+        _fill_powers(structure, parameters, work, state, asked.energy_terms, asked.powers[k])
     return 1

@@ -131,7 +131,7 @@ def fill_energy_terms(structure: Structure, parameters: Parameters, work: Work, 
 
 
 @njit_always_inline
-def _touch(structure: Structure, work: Work, out: Matrix) -> None:
+def _fill_contact_points(structure: Structure, work: Work, out: Matrix) -> None:
     """Fill the forces of contacts on the second body, the points, and the normals; zero for open ones."""
     paths, pieces = structure.paths, work.paths
     for index in range(pieces.closed_count[0]):
@@ -150,7 +150,7 @@ def _touch(structure: Structure, work: Work, out: Matrix) -> None:
 
 
 @njit_always_inline
-def _set(many: States, model: Model, m: int) -> None:
+def _set_state(many: States, model: Model, m: int) -> None:
     """Set inputs, forces at the tips and state to the m-th."""
     for i in range(many.commands.shape[1]):
         model.control.tension[i] = many.commands[m, i]
@@ -181,7 +181,7 @@ def exert_alone(model: Model, address: int, time: float) -> None:
 
 
 @njit_always_inline
-def _keep(many: States, model: Model, m: int) -> None:
+def _store_signals(many: States, model: Model, m: int) -> None:
     """Fill the m-th place with the latest evaluation."""
     structure, parameters, work, rates, rows = model.structure, model.parameters, model.work, many.rates, many.rows
     if rates.shape[0] > 0:
@@ -192,7 +192,7 @@ def _keep(many: States, model: Model, m: int) -> None:
             for k in range(rows.shape[2]):
                 rows[c, many.first + m, k] = work.rows[many.column + c, k]
     if many.touches.shape[0] > 0 and structure.contact_rows:
-        _touch(structure, work, many.touches[m])
+        _fill_contact_points(structure, work, many.touches[m])
     if many.energy_terms.shape[0] > 0:
         for j in range(many.torques.shape[1]):
             many.torques[m, j] = work.torque[j]
@@ -224,13 +224,13 @@ def evaluate_many(address: int, _time: float) -> int:
     culling = structure.contact_rows > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
     activate_all_pairs(structure, work)
     for m in range(many.states.shape[0]):
-        _set(many, model, m)
+        _set_state(many, model, m)
         if culling and m > 0:
             activate_since(structure, parameters, work, many.attitudes[m - 1], many.attitudes[m], before, model.state)
         _set_base(many.bases, m, parameters, work)
         place_bodies(structure, parameters, many.attitudes[m])
         _evaluate(many, model, m)
-        _keep(many, model, m)
+        _store_signals(many, model, m)
         if culling:
             cull_distant(structure, parameters, work, model.state, before)
     return 1

@@ -13,7 +13,7 @@ from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_at, copy,
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping.error_norm import step_error
 from finger_pin.core.stepping.integration import INTEGRATION, Integration
-from finger_pin.core.stepping.interpolation import between, cut
+from finger_pin.core.stepping.interpolation import cut_to_share, interpolate_share
 from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.core.structure import Structure
 
@@ -142,7 +142,7 @@ def midpoint_violation(integration: Integration, model: Model, time: float, h: f
     """
     x, state, end = integration.x, model.state, integration.end
     copy(state, end)
-    between(x, end, integration.dense, 0.5, state)
+    interpolate_share(x, end, integration.dense, 0.5, state)
     call_at(model.evaluate, integration.model, time + 0.5 * h)
     share = left_share(model.structure, model.work.rows, integration.kinks)
     if share < 1.0 and branch_error(integration, model, time + 0.5 * h, h) <= 1.0:
@@ -175,7 +175,7 @@ def locate_event(
     low, behind = 0.0, min(_MAX_OVERSHOOT * share, _TARGET_BRANCH_ERROR * (1.0 - share) / cost)
     at = share + behind
     for _ in range(_MAX_END_TRIALS):
-        between(x, end, integration.dense, at, state)
+        interpolate_share(x, end, integration.dense, at, state)
         call_at(model.evaluate, integration.model, time + at * h)
         count += 1
         share = leaving_share(model.structure, model.work.rows, integration.kinks)
@@ -184,7 +184,7 @@ def locate_event(
             cost = branch_error(integration, model, time + at * h, at * h)
             if cost <= 1.0:
                 copy(end, state)
-                cut(x, state, integration.dense, at)
+                cut_to_share(x, state, integration.dense, at)
                 return at, share, cost, count
             behind = min(behind, _TARGET_BRANCH_ERROR * (1.0 - share) * at / cost)
         else:

@@ -52,7 +52,7 @@ def before_reversal(integration: Integration, model: Model, h: float) -> float:
             # Behind the first reversal it grows as the square, and more where others follow.
             way = np.sqrt((_TARGET_REVERSAL_ERROR - below) / (cost - below)) if trial <= _SQUARE_LAW_TRIALS else 0.5
             share = low + way * (high - low)
-        error, turned = _misled(integration, model, h, share)
+        error, turned = _reversal_error(integration, model, h, share)
         if error > _MAX_REVERSAL_ERROR:
             high, cost = share, error
             if trial == 0:
@@ -65,7 +65,7 @@ def before_reversal(integration: Integration, model: Model, h: float) -> float:
 
 
 @njit_always_inline
-def _misled(integration: Integration, model: Model, h: float, share: float) -> tuple[float, float]:
+def _reversal_error(integration: Integration, model: Model, h: float, share: float) -> tuple[float, float]:
     """Return the error of bristles misled in a share of a step, in tolerances, and the share at which that begins."""
     structure, parameters = model.structure, model.parameters
     rows, off, total, first = model.work.rows, integration.end, 0.0, 1.0
@@ -76,10 +76,10 @@ def _misled(integration: Integration, model: Model, h: float, share: float) -> t
         if structure.groups.kink[g] != ROW.speed:
             continue
         for k in range(structure.groups.first[g], structure.groups.end[g]):
-            way, fastest, turned = _way_back(integration, model, k, share)
+            way, fastest, turned = _speed_against_branch(integration, model, k, share)
             if way > 0.0:
                 c = 2 * width + structure.state[k]
-                off[c] = share * h * way * _more(structure, parameters, rows, g, k, fastest) / abs(fastest)
+                off[c] = share * h * way * _rate_jump(structure, parameters, rows, g, k, fastest) / abs(fastest)
                 scale = integration.atol[c] + integration.rtol * max(abs(integration.x[c]), abs(model.state[c]))
                 total += (off[c] / scale) ** 2
                 first = min(first, turned)
@@ -87,7 +87,7 @@ def _misled(integration: Integration, model: Model, h: float, share: float) -> t
 
 
 @njit_always_inline
-def _way_back(integration: Integration, model: Model, k: int, share: float) -> Any:
+def _speed_against_branch(integration: Integration, model: Model, k: int, share: float) -> Any:
     """Return the mean speed of a row against its side in a share of a step, the fastest, and the share at its begin."""
     structure, dense, branch = model.structure, integration.dense, model.work.rows[ROW.side, k]
     start, end = branch * integration.kinks[k], branch * model.work.rows[ROW.speed, k]
@@ -116,7 +116,7 @@ def _way_back(integration: Integration, model: Model, k: int, share: float) -> A
 
 
 @njit_always_inline
-def _more(structure: Structure, parameters: Parameters, rows: Matrix, g: int, k: int, speed: float) -> float:
+def _rate_jump(structure: Structure, parameters: Parameters, rows: Matrix, g: int, k: int, speed: float) -> float:
     """Return the jump of a state's rate at a speed between the two sides of its kink."""
     branch, row_speed, more = rows[ROW.side, k], rows[ROW.speed, k], 0.0
     # As it is held, on the other side, and at last as it was.

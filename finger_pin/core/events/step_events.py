@@ -20,7 +20,7 @@ from finger_pin.core.events.reversals import before_reversal, bristles_over_limi
 from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, unpack
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping.integration import INTEGRATION, LEFT_BRANCH, Events, Integration
-from finger_pin.core.stepping.interpolation import cut, interpolant
+from finger_pin.core.stepping.interpolation import cut_to_share, interpolant
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Least and greatest length of another try that is to end at a kink, in parts of the step.
@@ -45,7 +45,7 @@ def cut_step(address: int, h: float) -> int:
     integration = unpack(address, INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
     interpolant(integration.tableau, integration.k, integration.dense)
-    part, kept, share = _kept_at_kinks(integration, model, h, int(memory.outcome[0]))
+    part, kept, share = _accepted_shares(integration, model, h, int(memory.outcome[0]))
     if kept == 1.0:
         before = _part_before_reversal(integration, model, part * h)
         if before < share:
@@ -98,7 +98,7 @@ def activate_contacts(address: int, _time: float) -> int:
 
 
 @njit_always_inline
-def _kept_at_kinks(integration: Integration, model: Model, h: float, outcome: int) -> tuple[float, float, float]:
+def _accepted_shares(integration: Integration, model: Model, h: float, outcome: int) -> tuple[float, float, float]:
     """Return the shares of a step that is taken, for another try, and until a row leaves its branch.
 
     Returns:
@@ -134,7 +134,7 @@ def _part_before_reversal(integration: Integration, model: Model, h: float) -> f
     """End a step a little behind the first reversal of sliding; return the share that is taken, 1 without one."""
     memory, part = integration.memory, before_reversal(integration, model, h)
     if part < 1.0:
-        cut(integration.x, model.state, integration.dense, part)
+        cut_to_share(integration.x, model.state, integration.dense, part)
         if model.structure.contact_rows:
             # Gaps are looked for from those at its end.
             memory.evaluations[0] += 1

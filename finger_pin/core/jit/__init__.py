@@ -28,7 +28,7 @@ from finger_pin.core.jit.functions import (
     njit_inline,
     njit_reassociate,
 )
-from finger_pin.core.jit.struct_packing import Block, call, copied, nothing, pack, refuse_copy
+from finger_pin.core.jit.struct_packing import Block, call, copied, empty_table, pack, refuse_copy
 from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, Pointer, StructType, Vector, unpack
 
 __all__ = [
@@ -51,11 +51,11 @@ __all__ = [
     "copied",
     "copy",
     "copy_matrix",
+    "empty_table",
     "load",
     "njit_always_inline",
     "njit_inline",
     "njit_reassociate",
-    "nothing",
     "numbers",
     "pack",
     "put",

@@ -101,14 +101,16 @@ def _function(function: FunctionType, above: tuple[FunctionType, ...]) -> str:
     names = frozenset(_names(function.__code__))
     text = [function.__module__, function.__qualname__, _code(function.__code__)]
     for name, value in _values(function, names):
-        text.append(f"{name} = {_described(value, names, (*above, function))}")
+        text.append(f"{name} = {_constant_text(value, names, (*above, function))}")
     return _hashed("\n".join(text))
 
 
 def _code(code: CodeType) -> str:
     # Nobody loads the docstring, which is a constant all the same.
     loaded = [each.argval for each in dis.get_instructions(code) if each.opcode in dis.hasconst]
-    constants = [_code(each) if isinstance(each, CodeType) else _described(each, frozenset(), ()) for each in loaded]
+    constants = [
+        _code(each) if isinstance(each, CodeType) else _constant_text(each, frozenset(), ()) for each in loaded
+    ]
     signature = (code.co_argcount, code.co_flags, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return _hashed(f"{code.co_code.hex()} {signature} {constants}")
 
@@ -136,11 +138,11 @@ def _is_ours(value: object) -> bool:
     return (getattr(value, "__module__", None) or "").startswith(_OURS)
 
 
-def _described(value: Any, names: frozenset[str], above: tuple[FunctionType, ...]) -> str:
+def _constant_text(value: Any, names: frozenset[str], above: tuple[FunctionType, ...]) -> str:
     """Return a text that differs for constants that differ; of a module, for the attributes of some names."""
 
     def described(part: object) -> str:
-        return _described(part, names, above)
+        return _constant_text(part, names, above)
 
     if isinstance(value, _PLAIN):
         return repr(value)

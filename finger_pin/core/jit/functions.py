@@ -123,7 +123,7 @@ def address_of(signature: str, function: Callable[..., Any], announced: bool = T
                 made = numba.cfunc(signature, cache=named is not None, **_OPTIONS)(named or function)
         except (OSError, EOFError, UnpicklingError) as error:
             reason = getattr(error, "strerror", None) or repr(error)
-            _say(f"the compile cache {cache_root()} cannot be used: {reason}; the next run compiles again")
+            _warn_once(f"the compile cache {cache_root()} cannot be used: {reason}; the next run compiles again")
             made = numba.cfunc(signature, **_OPTIONS)(function)
         _living.append(made)
         return made.address  # type: ignore[no-any-return]
@@ -181,11 +181,11 @@ def _announce() -> None:
     lasting = cache_place() is not None
     often = "once for this version" if lasting else f"in every run, as {cache_root()} cannot be written"
     advice = "" if lasting else "; FINGER_PIN_CACHE_DIR may name another folder"
-    _say(f"Compiling the model, {often}: about a minute{advice} ...")
+    _warn_once(f"Compiling the model, {often}: about a minute{advice} ...")
 
 
 @cache
-def _say(text: str) -> None:
+def _warn_once(text: str) -> None:
     """Warn once in a process, and not in those that a process starts."""
     if multiprocessing.parent_process() is None:
         _LOGGER.warning(text)

@@ -69,13 +69,15 @@ def copied(table: _Table) -> _Table:
     return type(table)(*map(_copied, table))
 
 
-def nothing(table: type[_Table]) -> _Table:
+def empty_table(table: type[_Table]) -> _Table:
     """Return a table whose arrays are empty, and whose numbers are zero."""
     fields = []
     for hint in get_type_hints(table, include_extras=True).values():
         kind = getattr(hint, "__metadata__", (hint,))[0]
         shape = (0,) * getattr(kind, "dimensions", 0)
-        fields.append(nothing(hint) if hasattr(hint, "_fields") else np.zeros(shape, kind.dtype) if shape else kind())
+        fields.append(
+            empty_table(hint) if hasattr(hint, "_fields") else np.zeros(shape, kind.dtype) if shape else kind()
+        )
     return table(*fields)
 
 

@@ -9,7 +9,7 @@ from finger_pin.core.inputs import HELD
 from finger_pin.core.jit import CompiledFunction, call_at, copy, copy_matrix, njit_always_inline, njit_inline, unpack
 from finger_pin.core.model import MODEL, Model
 from finger_pin.core.stepping import integration as at
-from finger_pin.core.stepping.error_norm import step_error, worst
+from finger_pin.core.stepping.error_norm import largest_error_state, step_error
 from finger_pin.core.stepping.integration import AdvanceArgs, Integration
 from finger_pin.core.stepping.rosenbrock import try_step
 
@@ -53,7 +53,7 @@ def _stop_status(integration: Integration, width: int) -> int:
 def _note_limiting_state(integration: Integration) -> None:
     """Store the index of the state with the largest error."""
     k = integration.k
-    worst_state = worst(integration.x, k[k.shape[0] - 1], integration.rtol, integration.atol)
+    worst_state = largest_error_state(integration.x, k[k.shape[0] - 1], integration.rtol, integration.atol)
     integration.memory.limiting_state[0] = float(worst_state)
 
 

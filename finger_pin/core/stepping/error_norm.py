@@ -23,7 +23,7 @@ def step_error(x: Vector, end: Vector, difference: Vector, rtol: float, atol: Ve
 
 
 @njit_always_inline
-def worst(x: Vector, difference: Vector, rtol: float, atol: Vector) -> int:
+def largest_error_state(x: Vector, difference: Vector, rtol: float, atol: Vector) -> int:
     """Return the index of the first state whose error is no number, else of that with the largest error.
 
     Errors are compared as multiples of the tolerance.

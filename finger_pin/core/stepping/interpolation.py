@@ -63,7 +63,7 @@ def interpolate_many(address: int, _time: float) -> int:
     step = -1
     for k in range(b.times.size):
         step = step_at(b, b.times[k], step)
-        within(b, step, b.times[k], b.interpolated[k])
+        interpolate_within(b, step, b.times[k], b.interpolated[k])
         for f in range(b.charts.size):
             for c in range(4):
                 b.turned[k, f, c] = b.attitude[f, c] if step == 0 else b.attitudes[step - 1, f, c]
@@ -71,7 +71,7 @@ def interpolate_many(address: int, _time: float) -> int:
 
 
 @njit_inline
-def begin_of(b: Any, step: int) -> Any:
+def start_time(b: Any, step: int) -> Any:
     """Return the time at which a step begins."""
     return b.begin if step == 0 else b.ends[step - 1]
 
@@ -99,14 +99,14 @@ def begin_step(b: Any, step: int) -> None:
 
 
 @njit_inline
-def within(b: Any, step: int, time: float, out: Vector) -> None:
+def interpolate_within(b: Any, step: int, time: float, out: Vector) -> None:
     """Fill the state at a time within the current step."""
-    begin = begin_of(b, step)
-    between(b.before, b.states[step], b.dense[step], (time - begin) / (b.ends[step] - begin), out)
+    begin = start_time(b, step)
+    interpolate_share(b.before, b.states[step], b.dense[step], (time - begin) / (b.ends[step] - begin), out)
 
 
 @njit_inline
-def between(before: Vector, after: Vector, dense: Matrix, share: float, out: Vector) -> None:
+def interpolate_share(before: Vector, after: Vector, dense: Matrix, share: float, out: Vector) -> None:
     """Fill the state after a share of a step, from the states at its ends and its row of ``dense``."""
     last, rest = dense.shape[0] - 1, 1.0 - share
     # Whole rows at a time, so that the compiler can use vector instructions.
@@ -133,7 +133,7 @@ def interpolant(tableau: Any, k: Matrix, dense: Matrix) -> None:
 
 
 @njit_inline
-def cut(before: Vector, after: Vector, dense: Matrix, share: float) -> None:
+def cut_to_share(before: Vector, after: Vector, dense: Matrix, share: float) -> None:
     """Cut a step to a share: replace the state at its end and its row of ``dense`` by those of that part."""
     highest, inverse = share ** (dense.shape[0] + 1), 1.0 / share
     for c in range(before.size):

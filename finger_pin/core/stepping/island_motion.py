@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.core.bound_models import FEW, BoundModel
+from finger_pin.core.bound_models import MIN_STATES_PER_THREAD, BoundModel
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.powers import POWERS, Powers, power_many
 from finger_pin.core.jit import call, copied
@@ -82,7 +82,7 @@ class IslandMotion:
         """
         energies, count = self.mechanism.energies, len(times)
         powers = np.empty((count, len(energies.powers) + 1))
-        parts = 1 if count < FEW else min(2, threads())
+        parts = 1 if count < MIN_STATES_PER_THREAD else min(2, threads())
         while len(self._models) < parts:
             self._models.append(self._bound())
 

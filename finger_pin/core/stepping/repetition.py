@@ -10,7 +10,7 @@ from finger_pin.core.jit import CompiledFunction, Indices, Matrix, StructType, V
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import integration as at
 from finger_pin.core.stepping.adaptive import accept_step, try_counted
-from finger_pin.core.stepping.interpolation import cut, interpolant
+from finger_pin.core.stepping.interpolation import cut_to_share, interpolant
 from finger_pin.typing import Array
 
 
@@ -80,7 +80,7 @@ def repeat_steps(address: int, end: float) -> int:
             return at.UNDERFLOW
         interpolant(integration.tableau, integration.k, integration.dense)
         if share < 1.0:
-            cut(integration.x, model.state, integration.dense, share)
+            cut_to_share(integration.x, model.state, integration.dense, share)
         accept_step(args, integration, model, goal)
         memory.accepted_steps[0] += 1
     return at.DONE

@@ -45,7 +45,7 @@ def resolve_commands(table: Table) -> None:
     settings = table.get("controller")
     if not isinstance(settings, dict) or "file" not in settings:
         return
-    fingers = {f"{name}.": as_table(placed).get("finger") for name, placed in fingers_of(table).items()}
+    fingers = {f"{name}.": as_table(placed).get("finger") for name, placed in placed_fingers(table).items()}
     inputs = [
         prefix + name
         for prefix, finger in (fingers or {"": table.get("finger")}).items()
@@ -65,7 +65,7 @@ def _signals(settings: Table, section: str, key: str, group: str) -> Table:
     return as_table(settings.get(group))
 
 
-def fingers_of(table: Table) -> Table:
+def placed_fingers(table: Table) -> Table:
     """Return the placed fingers of a scenario's hand, by name; none without a hand."""
     return as_table(as_table(table.get("hand")).get("fingers"))
 

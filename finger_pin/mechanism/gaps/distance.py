@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 
 from finger_pin.mechanism.gaps.ellipsoid import is_inside, sliding
-from finger_pin.mechanism.gaps.nearest import EPSILON, INSIDE, SignedDistance, lowered, nearest
-from finger_pin.mechanism.gaps.prism import GAP, GapParameters, deepest, offset, surface
-from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_of, turned
+from finger_pin.mechanism.gaps.nearest import EPSILON, INSIDE, SignedDistance, nearest, regularisation
+from finger_pin.mechanism.gaps.prism import GAP, GapParameters, inradius, offset, surface
+from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_matrix, turned
 
 # Tangents are turned from those of one direction, (2, 3, 6) / 7, to those of the normal, the short way. They jump only
 # for its opposite, which is no normal of a face and lies on no plane of symmetry of a shape.
@@ -39,7 +39,7 @@ _LEAST = 1e-12
 _CLOSE, _MOST_STEPS = 1e-15, 40
 
 
-def _sinking(w: Any, p: Any) -> Any:
+def _offset_slopes(w: Any, p: Any) -> Any:
     """Return dw/dc, by the shrinking of the core, and its product with w / |w|."""
     a, b, c = np.sign(w[0]), np.sign(w[1]), np.sign(w[2])
     if p[GAP.rim] > 0.0:
@@ -58,7 +58,7 @@ def _nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
     size, far = (1.0, far) if far >= blunt else (far / blunt, 0.5 * (far * far / blunt + blunt))
     if p[GAP.third] > 0.0 and is_inside(y, p[GAP.third], (x, y_, z)):
         size, far = 0.0, 0.5 * blunt
-    return far + lowered(y, p, s, square), size, _sinking(w, p)[3], s, x, y_, z
+    return far + regularisation(y, p, s, square), size, _offset_slopes(w, p)[3], s, x, y_, z
 
 
 def _ramps(start: float, most: float) -> Any:
@@ -80,9 +80,9 @@ def _shrunk(u: float, start: float, most: float) -> Any:
     return most - 0.5 * peak * (end - u) * (end - u) / fall, peak * (end - u) / fall, -peak / fall
 
 
-def _level(y: Any, p: Any) -> Any:
+def _level_of_core(y: Any, p: Any) -> Any:
     """Return the level l; its slope by |w|; c; dc/du and d2c/du2; that slope's own where l is flat, else 0; s and r."""
-    start, most = 0.5 * (p[GAP.radius] + p[GAP.rounding]), deepest(p)
+    start, most = 0.5 * (p[GAP.radius] + p[GAP.rounding]), inradius(p)
     blunt = max((0.5 if most == 0.0 else 0.25) * start, INSIDE)
     far, size, spread, s, x, y_, z = _nearest(y, p, 0.0, blunt)
     if far >= start or most == 0.0 or start == 0.0:
@@ -129,7 +129,7 @@ def tangent_slope(n: Any, moved: Any, growing: float, of_pole: Any, out: Any, at
 
 
 def _value(y: Any, p: Any, out: Any) -> None:
-    level, size, sunk, _, _, _, s, r_x, r_y, r_z = _level(y, p)
+    level, size, sunk, _, _, _, s, r_x, r_y, r_z = _level_of_core(y, p)
     x_, y_, z_ = y[0] + s * (y[3] - y[0]) + r_x, y[1] + s * (y[4] - y[1]) + r_y, y[2] + s * (y[5] - y[2]) + r_z
     _, u, v, w, _, _, _, _, _, _ = surface(x_, y_, z_, p, sunk)
     out[0] = level - p[GAP.rounding] - p[GAP.radius]
@@ -142,7 +142,7 @@ def _value(y: Any, p: Any, out: Any) -> None:
     out[4], out[5], out[6] = x_ - back * out[1], y_ - back * out[2], z_ - back * out[3]
 
 
-def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
+def _free_directions(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
     """Return the directions in which the nearest point is free to move, and the inverse of its stiffness.
 
     The directions are e, a unit vector along r, and one across; those that are not free are zero.
@@ -177,7 +177,7 @@ def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
         turned(h, across[0], across[1], across[2]),
         turned(h, along[0], along[1], along[2]),
     )
-    inverse = inverse_of(
+    inverse = inverse_matrix(
         dot(out, h_out) + (1.0 if on_rim else stiff),
         dot(out, h_across),
         dot(out, h_along),
@@ -188,7 +188,7 @@ def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
     return along, out, across, inverse
 
 
-def _displaced(j: int, s: float, r: Any, n: Any, axis: Any, shorter: float, whole: bool) -> Any:
+def _nearest_point_motion(j: int, s: float, r: Any, n: Any, axis: Any, shorter: float, whole: bool) -> Any:
     """Return the motion of the nearest point by one component of y, at constant s, with r turned with the axis.
 
     An ellipsoid moves as a whole, and what turns it turns the normal as it sees it. That is returned too, and the sign
@@ -205,7 +205,7 @@ def _displaced(j: int, s: float, r: Any, n: Any, axis: Any, shorter: float, whol
 
 
 def _slopes(y: Any, p: Any, out: Any) -> None:
-    level, size, sunk, rate, bend, flat, s, r_x, r_y, r_z = _level(y, p)
+    level, size, sunk, rate, bend, flat, s, r_x, r_y, r_z = _level_of_core(y, p)
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
     x_, y_, z_ = y[0] + s * a + r_x, y[1] + s * b + r_y, y[2] + s * c + r_z
     far, u, v, w, xx, xy, xz, yy, yz, zz = surface(x_, y_, z_, p, sunk)
@@ -220,15 +220,15 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
     whole = p[GAP.third] > 0.0
     shorter = 1.0 / length if length > 0.0 and not whole else 0.0
     axis = (a * shorter, b * shorter, c * shorter)
-    along, radial, across, inverse = sliding(y, p[GAP.third], n, h) if whole else _moving(y, p, s, r, n, h)
+    along, radial, across, inverse = sliding(y, p[GAP.third], n, h) if whole else _free_directions(y, p, s, r, n, h)
     leaning = dot(axis, n) * shorter
     # The motion of the normal at one place, by c.
     sinking, turning, spread = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
     if rate > 0.0:
-        f, g, k, spread = _sinking(offset(x_, y_, z_, p, sunk), p)
+        f, g, k, spread = _offset_slopes(offset(x_, y_, z_, p, sunk), p)
         sinking, turning = (f, g, k), ((f - spread * u) / far, (g - spread * v) / far, (k - spread * w) / far)
     for j in range(6):
-        (dx, dy, dz), swung, sign, k, change = _displaced(j, s, r, n, axis, shorter, whole)
+        (dx, dy, dz), swung, sign, k, change = _nearest_point_motion(j, s, r, n, axis, shorter, whole)
         shrinks = -rate * size * change
         d = turned(h, dx, dy, dz)
         d = (d[0] + shrinks * turning[0], d[1] + shrinks * turning[1], d[2] + shrinks * turning[2])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.mechanism.gaps.vectors import across, cross, dot, inverse_of, size, turned
+from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_matrix, perpendicular_vectors, size, turned
 
 _MOST_STEPS = 60
 # Weight, in parts of a quadratic function's own, of the way from where one is: what is undetermined stays there.
@@ -30,7 +30,7 @@ def on_ball(h: Any, start: Any) -> Any:
     k = _LEAST * (h[0] + h[3] + h[5])
     xx, yy, zz = h[0] + k, h[3] + k, h[5] + k
     for _ in range(_MOST_STEPS):
-        inverse = inverse_of(xx + pull, h[1], h[2], yy + pull, h[4], zz + pull)
+        inverse = inverse_matrix(xx + pull, h[1], h[2], yy + pull, h[4], zz + pull)
         u = turned(inverse, k * start[0] - h[6], k * start[1] - h[7], k * start[2] - h[8])
         far = size(u)
         if far <= 1.0 + (1e-15 if pull > 0.0 else 0.0):
@@ -60,14 +60,14 @@ def sliding(y: Any, third: float, n: Any, h: Any) -> Any:
     held = size(push)
     if held == 0.0:
         return zero, zero, zero, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-    s, t = across(-push[0] / held, -push[1] / held, -push[2] / held)
-    one, two = drawn(f, g, e, s), drawn(f, g, e, t)
+    s, t = perpendicular_vectors(-push[0] / held, -push[1] / held, -push[2] / held)
+    one, two = apply_matrix(f, g, e, s), apply_matrix(f, g, e, t)
     by_one, by_two = turned(h, one[0], one[1], one[2]), turned(h, two[0], two[1], two[2])
-    stiff = inverse_of(dot(one, by_one) + held, dot(one, by_two), 0.0, dot(two, by_two) + held, 0.0, 1.0)
+    stiff = inverse_matrix(dot(one, by_one) + held, dot(one, by_two), 0.0, dot(two, by_two) + held, 0.0, 1.0)
     return zero, one, two, stiff
 
 
-def drawn(f: Any, g: Any, e: Any, u: Any) -> Any:
+def apply_matrix(f: Any, g: Any, e: Any, u: Any) -> Any:
     """Return M u."""
     return (
         u[0] * f[0] + u[1] * g[0] + u[2] * e[0],

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from finger_pin.mechanism.gaps.distance import FIRST, SECOND, tangent, tangent_slope
 from finger_pin.mechanism.gaps.ellipsoid import semi_axes
 from finger_pin.mechanism.gaps.nearest import SignedDistance
-from finger_pin.mechanism.gaps.vectors import across, cross, dot, inverse_of, size, turned
+from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_matrix, perpendicular_vectors, size, turned
 
 _MOST_STEPS, _MOST_HALVINGS = 60, 40
 # Newton's steps end below this angle, rad; and where the maximum is not sharp, they go as if it were by this part.
@@ -86,12 +86,12 @@ def _normal(y: Any, p: Any) -> Any:
     f, g, e = semi_axes(y, p[_P.third])
     one, centre = _squared(f, g, e), (y[0], y[1], y[2])
     two = (p[_P.x] * p[_P.x], 0.0, 0.0, p[_P.y] * p[_P.y], 0.0, p[_P.z] * p[_P.z])
-    both = inverse_of(one[0] + two[0], one[1], one[2], one[3] + two[3], one[4], one[5] + two[5])
+    both = inverse_matrix(one[0] + two[0], one[1], one[2], one[3] + two[3], one[4], one[5] + two[5])
     x, y_, z = turned(both, y[0], y[1], y[2])
     n = _unit(x, y_, z)
     gap = _between(centre, one, two, n)
     for _ in range(_MOST_STEPS):
-        s, t = across(n[0], n[1], n[2])
+        s, t = perpendicular_vectors(n[0], n[1], n[2])
         _, here, slope = _support(one, n)
         _, there, other = _support(two, n)
         way = (centre[0] - here[0] - there[0], centre[1] - here[1] - there[1], centre[2] - here[2] - there[2])
@@ -134,7 +134,7 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
     far, here, by_n = _support(one, n)
     near, _, by_other = _support(two, n)
     gap = dot(n, (y[0], y[1], y[2])) - far - near
-    s, t = across(n[0], n[1], n[2])
+    s, t = perpendicular_vectors(n[0], n[1], n[2])
     ss, st, tt = _bent(s, t, by_n, by_other, gap)
     whole = 1.0 / (ss * tt - st * st)
     for j in range(6):

@@ -22,9 +22,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from finger_pin.mechanism.gaps.ellipsoid import drawn, on_ball, semi_axes
+from finger_pin.mechanism.gaps.ellipsoid import apply_matrix, on_ball, semi_axes
 from finger_pin.mechanism.gaps.prism import GAP, offset
-from finger_pin.mechanism.gaps.vectors import across
+from finger_pin.mechanism.gaps.vectors import perpendicular_vectors
 
 # Radians within which a part lies along a face.
 EPSILON = 1e-5
@@ -36,7 +36,7 @@ _ENOUGH = 0.1
 _ROUNDING = 1e-9
 
 
-def lowered(y: Any, p: Any, s: float, square: float) -> Any:
+def regularisation(y: Any, p: Any, s: float, square: float) -> Any:
     """Return the regularisation that pulls to the middle in |w|, less its maximum; ``square`` is |r / R|^2."""
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
     along = EPSILON * np.sqrt(a * a + b * b + c * c)
@@ -130,7 +130,7 @@ def _minimum(h: Any, along: float) -> Any:
     return u, v, 0.0
 
 
-def _through(f: Any, g: Any, d: Any) -> Any:
+def _bilinear_form(f: Any, g: Any, d: Any) -> Any:
     """Return f^T D g, D as xx, xy, yy, zz."""
     return f[0] * (d[0] * g[0] + d[1] * g[1]) + f[1] * (d[1] * g[0] + d[2] * g[1]) + f[2] * d[3] * g[2]
 
@@ -144,15 +144,17 @@ def _place(y: Any, frame: Any, u: float, v: float, s: float) -> Any:
     )
 
 
-def _expanded(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, u: float, v: float, s: float) -> Any:
+def _quadratic_expansion(
+    y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, u: float, v: float, s: float
+) -> Any:
     """Return F |w| about a point of a part as a quadratic function: its second slopes, then its first ones at 0."""
     f, g, e = frame
     x, y_, z = _place(y, frame, u, v, s)
     w = offset(x, y_, z, p, sunk)
     d = (w[3], w[4], w[5], w[6])
     far = max(np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), blunt)
-    fd, gd, ed = _through(f, f, d), _through(g, g, d), _through(e, e, d)
-    fg, fe, ge = _through(f, g, d), _through(f, e, d), _through(g, e, d)
+    fd, gd, ed = _bilinear_form(f, f, d), _bilinear_form(g, g, d), _bilinear_form(e, e, d)
+    fg, fe, ge = _bilinear_form(f, g, d), _bilinear_form(f, e, d), _bilinear_form(g, e, d)
     return (
         fd + pulls[1] * far,
         fg,
@@ -166,7 +168,7 @@ def _expanded(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any,
     )
 
 
-def _along(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, start: Any, step: Any) -> Any:
+def _line_search(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, start: Any, step: Any) -> Any:
     """Return the share of a step at which F is about least: of a small rising slope, or the whole step."""
     f, g, e = frame
     x, y_, z = (
@@ -223,24 +225,24 @@ def nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
     else:
         e, big = (y[3] - y[0], y[4] - y[1], y[5] - y[2]), p[GAP.disc]
         length = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-        f, g = across(e[0] / length, e[1] / length, e[2] / length)
+        f, g = perpendicular_vectors(e[0] / length, e[1] / length, e[2] / length)
         f, g = (big * f[0], big * f[1], big * f[2]), (big * g[0], big * g[1], big * g[2])
         pulls = (2.0 * EPSILON * length, EPSILON * big)
     u, v, s, size = 0.0, 0.0, 0.5 * along, 1.0
     for _ in range(_MOST_STEPS):
         if whole and _is_in_core(_place(y, (f, g, e), u, v, s), p, sunk, blunt):
             break
-        h = _expanded(y, p, sunk, blunt, (f, g, e), pulls, u, v, s)
+        h = _quadratic_expansion(y, p, sunk, blunt, (f, g, e), pulls, u, v, s)
         d_u, d_v, d_s = on_ball(h, (u, v, s)) if whole else _minimum(h, along)
         d_u, d_v, d_s = d_u - u, d_v - v, d_s - s
         before, size = size, abs(d_u) + abs(d_v) + abs(d_s)
         # Steps that no longer shrink are those of rounding.
         if size < 1e-14 or (size < _ROUNDING and size > 0.5 * before):
             break
-        share = _along(y, p, sunk, blunt, (f, g, e), pulls, (u, v, s), (d_u, d_v, d_s))
+        share = _line_search(y, p, sunk, blunt, (f, g, e), pulls, (u, v, s), (d_u, d_v, d_s))
         u, v, s = u + share * d_u, v + share * d_v, s + share * d_s
     if whole:
-        x, y_, z = drawn(f, g, e, (u, v, s))
+        x, y_, z = apply_matrix(f, g, e, (u, v, s))
         return 0.0, x, y_, z
     return s, u * f[0] + v * g[0], u * f[1] + v * g[1], u * f[2] + v * g[2]
 

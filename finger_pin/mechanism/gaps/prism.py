@@ -56,7 +56,7 @@ def prism_parameters(shape: str, sizes: Any, fillet: float = 0.0) -> tuple[float
     return 0.0, 0.0, radius - fillet, fillet - length / 2.0, length / 2.0 - fillet, fillet
 
 
-def deepest(p: Any) -> Any:
+def inradius(p: Any) -> Any:
     """Return the inradius of a core, m; 0 without thickness or end."""
     side = p[GAP.rim] if p[GAP.rim] > 0.0 else min(p[GAP.half_x], p[GAP.half_y])
     least = min(side, 0.5 * (p[GAP.high] - p[GAP.low]))

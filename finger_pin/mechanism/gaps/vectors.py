@@ -22,14 +22,14 @@ def turned(h: Any, x: float, y: float, z: float) -> Any:
     return h[0] * x + h[1] * y + h[2] * z, h[1] * x + h[3] * y + h[4] * z, h[2] * x + h[4] * y + h[5] * z
 
 
-def inverse_of(a: float, b: float, c: float, d: float, e: float, f: float) -> Any:
+def inverse_matrix(a: float, b: float, c: float, d: float, e: float, f: float) -> Any:
     """Return the inverse of a matrix."""
     aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
     whole = 1.0 / (a * aa + b * ab + c * ac)
     return aa * whole, ab * whole, ac * whole, (a * f - c * c) * whole, (b * c - a * e) * whole, (a * d - b * b) * whole
 
 
-def across(a: float, b: float, c: float) -> Any:
+def perpendicular_vectors(a: float, b: float, c: float) -> Any:
     """Return two unit vectors across a unit vector (Duff et al., J. Computer Graphics Techniques 6(1), 2017)."""
     sign = 1.0 if c >= 0.0 else -1.0
     k = -1.0 / (sign + c)

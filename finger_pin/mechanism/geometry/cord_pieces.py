@@ -168,12 +168,12 @@ def _stretch(piece: PathElement, rotations: Array, places: Array) -> Array:
     piece.shape.value(np.concatenate([a, b, *sides]), piece.parameters, out)
     if out[1] == 0.0:
         return np.linspace(first, second, _POINTS)
-    start, end = _touch(piece, a, -out[2:5]), _touch(piece, b, out[5:8] * -1.0)
+    start, end = _tangent_point(piece, a, -out[2:5]), _tangent_point(piece, b, out[5:8] * -1.0)
     arc = _arc(piece, start, end, -out[2:5], out[1])
     return np.asarray(np.concatenate([[a], arc, [b]]) @ turned.T + origin)
 
 
-def _touch(piece: PathElement, point: Array, direction: Array) -> Array:
+def _tangent_point(piece: PathElement, point: Array, direction: Array) -> Array:
     """Return the meeting point of the straight part from a point with the wrap."""
     flat = np.array([1.0, 1.0, 0.0]) if piece.shape is CYLINDER else np.ones(3)
     a, d = point * flat, direction * flat

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.from_pinocchio import chain, placed_solids, turned_model, width_of
+from finger_pin.mechanism.from_pinocchio import chain, finger_width, placed_solids, turned_model
 from finger_pin.mechanism.geometry.cord_pieces import Arc, Leg, WoundSpan
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes, tendon_lanes
 from finger_pin.mechanism.geometry.wound_tendon import BASE_LEAD, joint_chains, wind
@@ -102,7 +102,7 @@ class WoundFinger:
     @classmethod
     def from_chain(cls, description: FingerDescription, model: pin.Model, resolution: int) -> WoundFinger:
         """Wind the tendons of a finger on the joints of a chain, which carries solids of its own."""
-        width = width_of(description)
+        width = finger_width(description)
         lengths = [float(np.linalg.norm(each.translation)) for each in list(model.jointPlacements)[2:]]
         size = BASE_LEAD * width + sum(lengths) + max(lengths, default=width)
         return cls._wound(description, model, (), (width,) * len(description.joints), size, resolution)
@@ -129,7 +129,7 @@ class WoundFinger:
             (radius,) = joint_chains(description.cord(name), indices, model)
             mass_link = _mass_link(description, name, list(arms[name]))
             pieces[name] = wind(radius, ranges, model, lanes, name, resolution, mass_link)
-        return cls(pieces, pulleys_of(arms, lanes), visuals, lanes, widths, size)
+        return cls(pieces, winding_surfaces(arms, lanes), visuals, lanes, widths, size)
 
     def placed(self, name: str, place: pin.SE3, first: int) -> WoundFinger:
         """Return the finger as part of a hand: under dotted names, at its place, after ``first`` other joints."""
@@ -200,7 +200,7 @@ def fingers_on_model(
     return model, fingers, tuple(_visual(each, placement) for each, placement in placed)
 
 
-def palm_of(hand: HandSettings | None) -> tuple[Visual, ...]:
+def palm_box(hand: HandSettings | None) -> tuple[Visual, ...]:
     """Return the box of a palm, if it has one."""
     if hand is None or not all(hand.palm.size):
         return ()
@@ -208,7 +208,7 @@ def palm_of(hand: HandSettings | None) -> tuple[Visual, ...]:
     return (Visual("palm", 0, coal.Box(*hand.palm.size), place, MATERIALS["palm"], framed=True),)
 
 
-def pulleys_of(arms: Mapping[str, Mapping[int, float]], lanes: Lanes) -> tuple[Pulley, ...]:
+def winding_surfaces(arms: Mapping[str, Mapping[int, float]], lanes: Lanes) -> tuple[Pulley, ...]:
     """Return the winding surfaces of tendons, by their arms, m, of each tendon by joint."""
     return tuple(
         Pulley(name, joint, radius, lanes.offset[name, joint])

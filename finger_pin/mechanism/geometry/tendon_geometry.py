@@ -12,7 +12,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.from_pinocchio import turned_model
 from finger_pin.mechanism.geometry.cord_pieces import LinkPoses, Piece, link_poses
-from finger_pin.mechanism.geometry.fingers import Visual, fingers_of_links, fingers_on_model, palm_of
+from finger_pin.mechanism.geometry.fingers import Visual, fingers_of_links, fingers_on_model, palm_box
 from finger_pin.mechanism.geometry.tree_geometry import finger_of_tree
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.urdf import build_rigid_body
@@ -75,7 +75,7 @@ class TendonGeometry:
             body, tree = finger_of_tree(description, resolution)
             self.model, fingers = body.model, [tree]
         elif body is None:
-            fingers, fixed = fingers_of_links(description, resolution), palm_of(description.hand)
+            fingers, fixed = fingers_of_links(description, resolution), palm_box(description.hand)
             body = build_rigid_body(description)
             self.model = body.model
         else:

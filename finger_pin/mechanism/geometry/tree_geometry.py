@@ -16,7 +16,7 @@ from finger_pin.description.tree import LARGEST_RADIUS, Tree
 from finger_pin.description.tree_parts import TreeSolid
 from finger_pin.mechanism.from_pinocchio import turned_model
 from finger_pin.mechanism.geometry.cord_pieces import Leg, link_poses
-from finger_pin.mechanism.geometry.fingers import Visual, WoundFinger, pulleys_of
+from finger_pin.mechanism.geometry.fingers import Visual, WoundFinger, winding_surfaces
 from finger_pin.mechanism.geometry.lateral_offsets import joint_axes, tendon_lanes
 from finger_pin.mechanism.geometry.wound_tendon import joint_chains, wind
 from finger_pin.mechanism.path_elements import PathTerm
@@ -65,7 +65,7 @@ def finger_of_tree(description: FingerDescription, resolution: int) -> tuple[Rig
     along = np.where(axes.any(axis=1), np.abs(axes @ np.array(description.gravity)), np.inf)
     return body, WoundFinger(
         pieces,
-        tuple(replace(pulley, frame=turns[pulley.joint]) for pulley in pulleys_of(arms, lanes)),
+        tuple(replace(pulley, frame=turns[pulley.joint]) for pulley in winding_surfaces(arms, lanes)),
         _solids(description.tree, routes.placed),
         replace(lanes, spacing=_SPACING * extent, families=((1 + int(np.argmin(along)),),)),
         (_WIDTH * extent,),
