@@ -25,7 +25,7 @@ from finger_pin.core.parameters import Parameters
 from finger_pin.core.structure import Structure
 from finger_pin.core.threads import in_threads, threads
 from finger_pin.laws.law import ContactLaw, Law
-from finger_pin.mechanism.mechanism import GUIDES
+from finger_pin.mechanism.mechanism import PRESCRIBED_ACCELERATIONS
 from finger_pin.typing import Array
 
 #: Fewer states than this are not worth a second thread.
@@ -80,10 +80,10 @@ class SignalBuffer(NamedTuple):
 
 
 # Of models that only evaluate.
-_NO_LINEAR = empty_table(Linear)
+_NO_LINEARISATION = empty_table(Linear)
 # In the order of the addresses of a `Model`.
-_THROUGH_SPACE = (measure, linearise_paths, fill_contact_gains, add_pushes, look)
-_MOVED = (move_base, bias_rate, base_power)
+_PATH_UNITS = (measure, linearise_paths, fill_contact_gains, add_pushes, look)
+_MOVING_BASE_UNITS = (move_base, bias_rate, base_power)
 
 
 class BoundModel:
@@ -118,10 +118,10 @@ class BoundModel:
         through_space = len(structure.paths.columns) > 0
         units = [unit.address for unit in (evaluate, exert, linearise, condense)]
         # Compiled only for mechanisms that need them: paths through space or contacts, and a base that moves.
-        units += [unit.address if through_space else 0 for unit in _THROUGH_SPACE]
-        units += [unit.address if moved else 0 for unit in _MOVED]
+        units += [unit.address if through_space else 0 for unit in _PATH_UNITS]
+        units += [unit.address if moved else 0 for unit in _MOVING_BASE_UNITS]
         work = build_work(structure, laws, len(control.tension))
-        linear = build_linear(structure, control) if linearised else _NO_LINEAR
+        linear = build_linear(structure, control) if linearised else _NO_LINEARISATION
         self.model = Model(structure, parameters, control, work, linear, np.zeros(size), np.zeros(size), *units)
         # No path and no moving body changes these.
         work.base_acceleration[3:] = -parameters.gravity
@@ -206,7 +206,9 @@ def path_motions(base: Array | None, count: int, prescribed: int) -> Array:
     """Return the motions of the base and of the prescribed coordinates, shape (count, 15 + g), or no rows at rest."""
     if base is None:
         return np.zeros((0, 15 + prescribed))
-    motions = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + prescribed]], axis=-1)
+    motions = np.concatenate(
+        [base[..., :15], base[..., PRESCRIBED_ACCELERATIONS : PRESCRIBED_ACCELERATIONS + prescribed]], axis=-1
+    )
     return as_core_array(motions, (count, 15 + prescribed))
 
 

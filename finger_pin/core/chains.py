@@ -32,10 +32,10 @@ BODY = BodyColumns(*accumulate(_WIDTHS[:-1], initial=0))
 PRISMATIC = 1
 
 # Less of a unit axis is rounding.
-_STILL = 1e-8
-_UPPER = np.triu_indices(3)
+_AXIS_ROUNDING = 1e-8
+_UPPER_TRIANGLE = np.triu_indices(3)
 # Farther than anything slides, m, but for what is moved along a path.
-_ANYWHERE = 1e3
+_LARGEST_SLIDE = 1e3
 
 
 class Chains(NamedTuple):
@@ -75,7 +75,7 @@ def read_chains(model: pin.Model) -> Chains:
     """
     size = int(model.nv)
     parents, kinds = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
-    bodies, slides, charts, frames = np.zeros((size, sum(_WIDTHS))), np.full(size, _ANYWHERE), [], []
+    bodies, slides, charts, frames = np.zeros((size, sum(_WIDTHS))), np.full(size, _LARGEST_SLIDE), [], []
     # Of every joint of the model, the base first: its last body, and how that one's frame is turned.
     last, turns = [-1], [np.eye(3)]
     for joint in range(1, model.njoints):
@@ -111,7 +111,7 @@ def weighed(chains: Chains, model: pin.Model) -> Array:
     for inertia, last, turn in zip(list(model.inertias)[1:], chains.last[1:], chains.turns[1:], strict=True):
         bodies[last, BODY.mass] = inertia.mass
         bodies[last, BODY.centre : BODY.centre + 3] = turn.T @ inertia.lever
-        bodies[last, BODY.inertia : BODY.inertia + 6] = (turn.T @ inertia.inertia @ turn)[_UPPER]
+        bodies[last, BODY.inertia : BODY.inertia + 6] = (turn.T @ inertia.inertia @ turn)[_UPPER_TRIANGLE]
     return bodies
 
 
@@ -125,9 +125,9 @@ def _coordinates(model: pin.Model, index: int) -> list[_Body]:
     joint.calc(data, np.zeros(1) if joint.nq == 1 else pin.neutral(model), np.zeros(1))
     subspace = np.asarray(data.S)[:, 0] if np.ndim(data.S) == 2 else np.asarray(data.S)
     linear, angular = subspace[:3], subspace[3:]
-    if np.max(np.abs(angular)) < _STILL:
+    if np.max(np.abs(angular)) < _AXIS_ROUNDING:
         return [_Body(PRISMATIC, linear)]
-    if np.max(np.abs(linear)) < _STILL:
+    if np.max(np.abs(linear)) < _AXIS_ROUNDING:
         return [_Body(0, angular)]
     raise InputError(f"joint {model.names[index]}", "must turn about or slide along a fixed axis", joint.shortname())
 

@@ -14,7 +14,7 @@ from finger_pin.core.evaluation.state_batches import STATES, evaluate_many
 from finger_pin.core.jit import Block, pack
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.mechanism import GUIDES
+from finger_pin.mechanism.mechanism import PRESCRIBED_ACCELERATIONS
 from finger_pin.mechanism.state import Motion
 from finger_pin.typing import Array
 
@@ -105,7 +105,10 @@ class CompiledFingers:
         # Of one tip, forces have no axis of their own for it.
         self._forces[:] = force if force.ndim == 1 or self._forces.shape[1] > 1 else force[:, None]
         if base is not None:
-            self._bases[:, :15], self._bases[:, 15:] = base[:, :15], base[:, GUIDES : GUIDES + self._prescribed]
+            self._bases[:, :15], self._bases[:, 15:] = (
+                base[:, :15],
+                base[:, PRESCRIBED_ACCELERATIONS : PRESCRIBED_ACCELERATIONS + self._prescribed],
+            )
         kind = loaded, base is not None
         if kind not in self._blocks:
             self._blocks[kind] = [self._bound(index, *kind) for index in range(len(self._fingers))]

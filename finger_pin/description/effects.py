@@ -31,11 +31,11 @@ class Rule(NamedTuple):
 _STRIBECK = ("stiction", "stribeck_velocity", "stribeck_exponent", "micro_damping")
 _BRISTLES = ("stiffness", "floor")
 # Entries beside a choice that one value of it does not read.
-_UNREAD = {
+_ENTRIES_NOT_READ = {
     "law": {"lugre": ("reversal_speed",), "dahl": (*_STRIBECK, "reversal_speed"), "coulomb": (*_STRIBECK, *_BRISTLES)},
     "drive": {"tension": ("position_loop",), "position": ("friction_compensation", "reversal_speed")},
 }
-_OPEN = 'has no effect with controller.kind = "tensions"'
+_WITHOUT_EFFECT_IN_OPEN_LOOP = 'has no effect with controller.kind = "tensions"'
 
 
 def wound_tendons(scenario: Any, controller: Any) -> set[str]:
@@ -169,7 +169,9 @@ _CORRECTIONS = ("tendon_friction_feedforward", "joint_friction_compensation", "p
 CLOSED_LOOP = ("gain", "damping", "gravity_compensation", "spring_compensation", "fingertip_force", *_CORRECTIONS)
 #: Of a scenario; of a hand, that of each of its fingers.
 OF_SCENARIO = (
-    Rule("controller", CLOSED_LOOP, lambda _, controller: controller.kind == "proportional", _OPEN),
+    Rule(
+        "controller", CLOSED_LOOP, lambda _, controller: controller.kind == "proportional", _WITHOUT_EFFECT_IN_OPEN_LOOP
+    ),
     Rule(
         "controller",
         _CORRECTIONS,
@@ -226,7 +228,7 @@ def without_unread(inherited: dict[str, Any], choices: dict[str, Any]) -> dict[s
         entry
         for choice, value in choices.items()
         if isinstance(value, str) and inherited.get(choice) != value
-        for entry in _UNREAD.get(choice, {}).get(value, ())
+        for entry in _ENTRIES_NOT_READ.get(choice, {}).get(value, ())
     }
     return {entry: value for entry, value in inherited.items() if entry not in unread}
 

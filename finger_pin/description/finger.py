@@ -25,7 +25,7 @@ from finger_pin.description.effects import OF_FINGER, OF_HAND, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.parameters import Joint, PassiveTendon, PerItem, StrokeLimiterSettings, Tendon, per_item
 from finger_pin.description.placement import (
-    PLACE,
+    PALM_POINT,
     Palm,
     actuator_of_hand,
     joined_table,
@@ -33,7 +33,7 @@ from finger_pin.description.placement import (
     rotation,
     tendon_of_hand,
 )
-from finger_pin.description.tree import EMPTY, Tree
+from finger_pin.description.tree import NO_TREE, Tree
 from finger_pin.description.validation import IN_RADIANS, Description, Name, check_size, problem, quantity, real, vector
 from finger_pin.typing import Array
 
@@ -71,7 +71,7 @@ class FingerDescription(Description):
     )
     _hand: HandSettings | None = PrivateAttr(None)
     _numbers: PerItem = PrivateAttr(default_factory=PerItem)
-    tree: Tree = Field(EMPTY, description="Bodies in place of links, with joints, tendons and actuators.")
+    tree: Tree = Field(NO_TREE, description="Bodies in place of links, with joints, tendons and actuators.")
 
     @model_serializer(mode="wrap")
     def _written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -202,7 +202,7 @@ class PlacedFinger(Description):
             raise problem("tree", "a tree of bodies cannot be placed on a palm; it is a hand of its own")
         return value
 
-    position: Annotated[tuple[float, float, float], PLACE] = quantity(
+    position: Annotated[tuple[float, float, float], PALM_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its base frame, in the palm's frame."
     )
     orientation: Annotated[tuple[float, float, float], vector(3, -2.0 * math.pi, 2.0 * math.pi, IN_RADIANS)] = quantity(

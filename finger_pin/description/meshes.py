@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from finger_pin.description.validation import Description, problem
 
 Array = NDArray[np.float64]
-_POINTS, _FACES = "<f4", "<i4"
+_POINT_DTYPE, _FACE_DTYPE = "<f4", "<i4"
 
 
 class Mesh(Description):
@@ -26,11 +26,11 @@ class Mesh(Description):
     @classmethod
     def packed(cls, points: Array, faces: NDArray[np.int32]) -> dict[str, str]:
         """Return the table of a mesh with corners, shape (m, 3), m, and triangles, shape (k, 3)."""
-        return {"points": _pack(points, _POINTS), "faces": _pack(faces, _FACES)}
+        return {"points": _pack(points, _POINT_DTYPE), "faces": _pack(faces, _FACE_DTYPE)}
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
-        points, faces = _unpack("points", self.points, _POINTS), _unpack("faces", self.faces, _FACES)
+        points, faces = _unpack("points", self.points, _POINT_DTYPE), _unpack("faces", self.faces, _FACE_DTYPE)
         if not np.all(np.abs(points) <= 10.0):
             raise problem("points", "must be finite and at most 10 m (is it in millimetres?)")
         if faces.min() < 0 or faces.max() >= len(points):
@@ -39,7 +39,7 @@ class Mesh(Description):
 
     def unpacked(self) -> tuple[Array, NDArray[np.int32]]:
         """Return corners, shape (m, 3), m, and triangles, shape (k, 3)."""
-        return _unpack("points", self.points, _POINTS).astype(float), _unpack("faces", self.faces, _FACES)
+        return _unpack("points", self.points, _POINT_DTYPE).astype(float), _unpack("faces", self.faces, _FACE_DTYPE)
 
 
 def _pack(values: Any, kind: str) -> str:

@@ -30,7 +30,7 @@ from finger_pin.typing import Array
 _MILLIMETRES = " m (is it in millimetres?)"
 # Osmium, kg/m3 (CRC Handbook of Chemistry and Physics), and the least mass, kg, that is asked about: in grams a link
 # has one or more.
-_DENSEST, _LEAST_ASKED = 22590.0, 1.0
+_LARGEST_DENSITY, _LEAST_DENSITY = 22590.0, 1.0
 _MOST_TENSION = 1e6
 
 
@@ -45,8 +45,8 @@ def check_density(mass: float, inertia: float) -> None:
     """
     if inertia < sys.float_info.min:
         raise problem("mass", "is too small: its moments of inertia are below 2.2e-308 kg m2", mass)
-    radius = (3.0 * mass / (4.0 * math.pi * _DENSEST)) ** (1.0 / 3.0)
-    if mass >= _LEAST_ASKED and inertia < 3.0 * 0.4 * mass * radius**2:
+    radius = (3.0 * mass / (4.0 * math.pi * _LARGEST_DENSITY)) ** (1.0 / 3.0)
+    if mass >= _LEAST_DENSITY and inertia < 3.0 * 0.4 * mass * radius**2:
         raise problem("mass", "makes it denser than osmium, 22590 kg/m3: masses are in kg (is it in grams?)", mass)
 
 

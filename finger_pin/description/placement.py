@@ -20,7 +20,7 @@ from finger_pin.typing import Array
 
 _MILLIMETRES = " m (is it in millimetres?)"
 #: A place on the palm.
-PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
+PALM_POINT = vector(3, -2.0, 2.0, _MILLIMETRES)
 #: The coordinates of a palm's path: place, m, and roll, pitch and yaw, rad, in the world.
 PATH = ("x", "y", "z", "roll", "pitch", "yaw")
 _COORDINATE = real(-12.5, 12.5)
@@ -176,7 +176,7 @@ class Palm(Description):
     size: Annotated[tuple[float, float, float], vector(3, 0.0, 2.0, _MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Sides of the box that is drawn; zero for none."
     )
-    centre: Annotated[tuple[float, float, float], PLACE] = quantity(
+    centre: Annotated[tuple[float, float, float], PALM_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the box, in the palm's frame."
     )
     path: dict[Name, PathSignal] | None = Field(

@@ -15,7 +15,7 @@ from finger_pin.description.fields import find_field
 from finger_pin.description.recordings.signal_files import placed_fingers, resolve_signals
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import (
-    NONE,
+    INHERIT_NOTHING,
     as_name,
     is_other_kind,
     is_path,
@@ -157,7 +157,7 @@ def _merge_hand(base: Table, hand: Table, folder: Path) -> Table:
     """
     fingers = as_table(as_table(hand).get("fingers"))
     for name, placed in fingers.items():
-        if isinstance(placed, str) and placed != NONE:
+        if isinstance(placed, str) and placed != INHERIT_NOTHING:
             placed = fingers[name] = {"finger": placed}
         finger = as_table(placed).get("finger")
         if _replaces(finger):
@@ -229,7 +229,7 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
         read = without_unread(inner, {last: value})
         for unread in inner.keys() - read.keys():
             del inner[unread]
-        if last in inner and isinstance(value, str) and value == NONE:
+        if last in inner and isinstance(value, str) and value == INHERIT_NOTHING:
             del inner[last]
         else:
             inner[last] = copy.deepcopy(value)

@@ -19,7 +19,7 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.typing import Array, Indices
 
 # Below this share of the largest, an internal tension counts as none.
-_SLACK = 1e-9
+_SLACK_SHARE = 1e-9
 
 
 def _parts(_: object, description: FingerDescription) -> tuple[object, ...]:
@@ -214,7 +214,7 @@ class ForceClosure:
         if count == 1:
             vector = _largest_one(null_space[:, 0])
             # Where signs are mixed, any multiple but zero would make some tendon push.
-            tension = vector if vector.min() >= -_SLACK else np.zeros(len(tendons))
+            tension = vector if vector.min() >= -_SLACK_SHARE else np.zeros(len(tendons))
         elif count > 1:
             tension = _tautest_tensions(null_space)
         return cls(null_space, tension, tendons)
@@ -222,7 +222,7 @@ class ForceClosure:
     @property
     def holds(self) -> bool:
         """Whether every internal tension is positive."""
-        return len(self.tension) > 0 and bool(np.all(self.tension > _SLACK))
+        return len(self.tension) > 0 and bool(np.all(self.tension > _SLACK_SHARE))
 
     def __str__(self) -> str:
         """Return a sentence: force closure, or the tendons that lack it."""
@@ -236,7 +236,7 @@ class ForceClosure:
         balance = self.tension
         if self.null_space.shape[1] == 1:
             balance = _largest_one(self.null_space[:, 0])
-        worst = [name for name, tension in zip(self.tendons, balance, strict=True) if tension <= _SLACK]
+        worst = [name for name, tension in zip(self.tendons, balance, strict=True) if tension <= _SLACK_SHARE]
         return f"no force closure: {', '.join(worst)} cannot be kept taut at zero joint torque"
 
 
@@ -259,7 +259,7 @@ def _tautest_tensions(null_space: Array) -> Array:
         b_ub=np.append(np.zeros(size), np.ones(size)),
         bounds=[(None, None)] * count + [(None, 1.0)],
     )
-    if solution.x[-1] <= _SLACK:
+    if solution.x[-1] <= _SLACK_SHARE:
         # Not all can be taut: most entries e_i in [0, 1] with N y >= e; a tendon that can be taut reaches 1.
         solution = scipy.optimize.linprog(
             np.append(np.zeros(count), -np.ones(size)),
@@ -268,4 +268,4 @@ def _tautest_tensions(null_space: Array) -> Array:
             bounds=[(None, None)] * count + [(0.0, 1.0)] * size,
         )
     tension = np.asarray(null_space @ solution.x[:count])
-    return tension / tension.max() if tension.max() > _SLACK else np.zeros(size)
+    return tension / tension.max() if tension.max() > _SLACK_SHARE else np.zeros(size)

@@ -26,7 +26,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
 _Item = TypeVar("_Item")
-_OPEN = 'controller.kind = "tensions"'
+_OPEN_LOOP_SETTING = 'controller.kind = "tensions"'
 
 
 class Scenario(Description):
@@ -261,10 +261,12 @@ class Scenario(Description):
     def _check_taut(self, routing: Routing, missing: str) -> None:
         """Raise unless springs keep the tendons taut that (22) cannot without force closure."""
         if not any(joint.spring for joint in self.finger.joints.values()):
-            raise problem("finger.tendons", f"{missing}; the controller needs force closure, {_OPEN} does not")
+            raise problem(
+                "finger.tendons", f"{missing}; the controller needs force closure, {_OPEN_LOOP_SETTING} does not"
+            )
         tautness = self._tautness(routing)
         if not tautness.holds:
-            raise problem("finger.tendons", f"{missing}, and {tautness}; {_OPEN} can do without")
+            raise problem("finger.tendons", f"{missing}, and {tautness}; {_OPEN_LOOP_SETTING} can do without")
 
     def _tautness(self, routing: Routing) -> Tautness:
         minimum = expand(self.controller.minimum_tension, len(routing.tendons))

@@ -25,9 +25,9 @@ from finger_pin.description.validation import (
 
 #: The most points or samples of a signal in a file. Arrays in Python may be longer.
 MOST_POINTS = 1_000_000
-_LATEST, _MOST_FORCE = 1e6, 1e6
+_LATEST_TIME, _MOST_FORCE = 1e6, 1e6
 AXES = ("x", "y", "z")
-_NEEDED: dict[str, tuple[str, ...]] = {
+_ENTRIES_OF_KIND: dict[str, tuple[str, ...]] = {
     "sine": (),
     "step": ("time", "height"),
     "ramp": ("time", "duration", "height"),
@@ -52,8 +52,10 @@ class SignalSettings(Description):
     and all are constant before and after.
     """
 
-    kind: Annotated[Literal["sine", "step", "ramp", "points", "cosine", "samples"], choice(*_NEEDED)] = quantity(
-        "sine", unit="1", source="chosen", doc="Function that is added to the sinusoid: none, or one of these."
+    kind: Annotated[Literal["sine", "step", "ramp", "points", "cosine", "samples"], choice(*_ENTRIES_OF_KIND)] = (
+        quantity(
+            "sine", unit="1", source="chosen", doc="Function that is added to the sinusoid: none, or one of these."
+        )
     )
     frequency: Annotated[float, real(0.0, 1e4)] = quantity(
         0.0, unit="Hz", source="chosen", doc="Frequency of the sinusoid."
@@ -61,13 +63,13 @@ class SignalSettings(Description):
     phase: Annotated[float, real(-1e3, 1e3)] = quantity(
         0.0, unit="rad", source="chosen", doc="Phase of the sinusoid at t = 0."
     )
-    time: Annotated[float, real(-_LATEST, _LATEST)] | None = quantity(
+    time: Annotated[float, real(-_LATEST_TIME, _LATEST_TIME)] | None = quantity(
         None, unit="s", source="chosen", doc="Instant of the step, or start of the ramp."
     )
-    duration: Annotated[float, real(1e-6, _LATEST)] | None = quantity(
+    duration: Annotated[float, real(1e-6, _LATEST_TIME)] | None = quantity(
         None, unit="s", source="chosen", doc="Time that the ramp takes."
     )
-    times: Annotated[tuple[float, ...] | Series, series(-_LATEST, _LATEST)] | None = quantity(
+    times: Annotated[tuple[float, ...] | Series, series(-_LATEST_TIME, _LATEST_TIME)] | None = quantity(
         None, unit="s", source="chosen", doc="Of the points or samples, increasing."
     )
     offset: float
@@ -77,13 +79,13 @@ class SignalSettings(Description):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        needed = _NEEDED[self.kind]
+        needed = _ENTRIES_OF_KIND[self.kind]
         for entry in ("time", "duration", "height", "times", "values"):
             value = getattr(self, entry)
             if value is None and entry in needed:
                 raise problem(entry, f'is missing: kind = "{self.kind}" needs {", ".join(needed)}')
             if value is not None and entry not in needed:
-                kinds = " or ".join(f'"{kind}"' for kind, entries in _NEEDED.items() if entry in entries)
+                kinds = " or ".join(f'"{kind}"' for kind, entries in _ENTRIES_OF_KIND.items() if entry in entries)
                 raise problem(entry, f'is for kind = {kinds}, not "{self.kind}"', value)
         if self.times is not None and self.values is not None:
             if len(self.values) != len(self.times):

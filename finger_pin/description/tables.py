@@ -22,14 +22,14 @@ from finger_pin.description.validation import Description, Table, as_table, chec
 from finger_pin.exceptions import InputError
 
 #: In place of an inherited table or value: takes it away, as if the base had left it out.
-NONE = "none"
+INHERIT_NOTHING = "none"
 #: What a text of many numbers begins with.
-PACKED = "base64:"
+PACKED_PREFIX = "base64:"
 # Of more numbers than this a text is written that is read at once; nobody reads them one by one.
-_MANY = 10_000
+_MOST_PLAIN_NUMBERS = 10_000
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
 _KINDS_APART = {"step", "ramp", "points", "cosine", "samples", "tensions"}
-_INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6}(,\d{1,6})*)\]")
+_INDEXED_KEY = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6}(,\d{1,6})*)\]")
 _Settings = TypeVar("_Settings", bound=Description)
 
 
@@ -102,7 +102,7 @@ def merge(base: Table, top: Table) -> Table:
     """Return a table with the entries of another on top; the value "none" removes an entry."""
     merged = without_unread(base, top)
     for key, value in top.items():
-        if key in merged and isinstance(value, str) and value == NONE:
+        if key in merged and isinstance(value, str) and value == INHERIT_NOTHING:
             del merged[key]
             continue
         both = isinstance(value, dict) and isinstance(merged.get(key), dict) and not is_other_kind(merged[key], value)
@@ -165,7 +165,7 @@ def split(key: str) -> tuple[str, tuple[int, ...] | None]:
     Raises:
         InputError: If it has brackets elsewhere than at its end.
     """
-    indexed = _INDEXED.fullmatch(key)
+    indexed = _INDEXED_KEY.fullmatch(key)
     if indexed:
         return indexed["name"], tuple(map(int, indexed["index"].split(",")))
     if "[" in key or "]" in key:
@@ -273,7 +273,7 @@ def packed(value: Any, texts: list[str]) -> Any:
         plain, timed = {}, dict[str, Any]()
         for key, item in value.items():
             times = item.get("times") if isinstance(item, dict) else None
-            if times is not None and len(times) > _MANY:
+            if times is not None and len(times) > _MOST_PLAIN_NUMBERS:
                 same = next((name for name, other in timed.items() if other == times), None)
                 item = item if same is None else item | {"times": same}
                 timed[key] = times
@@ -281,17 +281,17 @@ def packed(value: Any, texts: list[str]) -> Any:
         return plain
     if not isinstance(value, tuple | Series):
         return value
-    if len(value) > _MANY:
+    if len(value) > _MOST_PLAIN_NUMBERS:
         # Bit for bit: base64 of doubles, the least byte first.
-        texts.append(PACKED + base64.b64encode(np.asarray(value, dtype="<f8").tobytes()).decode("ascii"))
-        return f"{PACKED}{len(texts) - 1}"
+        texts.append(PACKED_PREFIX + base64.b64encode(np.asarray(value, dtype="<f8").tobytes()).decode("ascii"))
+        return f"{PACKED_PREFIX}{len(texts) - 1}"
     return [packed(item, texts) for item in value]
 
 
 def _unpacked(text: str) -> Series:
     try:
-        if not text.startswith(PACKED):
+        if not text.startswith(PACKED_PREFIX):
             raise ValueError
-        return Series(np.frombuffer(base64.b64decode(text[len(PACKED) :], validate=True), "<f8"))
+        return Series(np.frombuffer(base64.b64decode(text[len(PACKED_PREFIX) :], validate=True), "<f8"))
     except ValueError:
         raise problem("", "must be a list of numbers", text[:40]) from None

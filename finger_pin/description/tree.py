@@ -284,7 +284,7 @@ class Tree(Description):
 
 
 #: What a finger of links has beside its own joints and tendons: nothing.
-EMPTY = Tree.model_construct(bodies={}, joints={})
+NO_TREE = Tree.model_construct(bodies={}, joints={})
 
 
 def _check(entry: str, name: str | None, names: Iterable[str], what: str) -> None:

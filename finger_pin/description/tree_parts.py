@@ -22,7 +22,7 @@ from finger_pin.description.validation import (
     reals,
     vector,
 )
-from finger_pin.description.waypoints import PLACE, Triple, Waypoint, check_path
+from finger_pin.description.waypoints import BODY_POINT, Triple, Waypoint, check_path
 
 _MILLIMETRES = " m (is it in millimetres?)"
 _LARGE = 1e9
@@ -51,7 +51,7 @@ class TreeSolid(Description):
     semi_axes: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of an ellipsoid, along x, y and z."
     )
-    position: Annotated[Triple, PLACE] = quantity(
+    position: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, or a mesh's origin, in the body's frame."
     )
     orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
@@ -69,14 +69,14 @@ class Body(Description):
     """A rigid body, placed on another one or on the base."""
 
     parent: Name | None = Field(None, description="The body that carries it; the base if left out.")
-    position: Annotated[Triple, PLACE] = quantity(
+    position: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its frame, in the parent's."
     )
     orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of its frame in the parent's: quaternion x, y, z, w."
     )
     mass: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="kg", source="design", doc="Mass of the body.")
-    centre: Annotated[Triple, PLACE] = quantity(
+    centre: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre in the body's frame."
     )
     inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
@@ -104,7 +104,7 @@ class TreeJoint(Description):
     axis: Annotated[Triple, direction(3)] = quantity(
         (0.0, 0.0, 1.0), unit="1", source="design", doc="Unit vector in the body's frame."
     )
-    anchor: Annotated[Triple, PLACE] = quantity(
+    anchor: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="A point of the axis, in the body's frame."
     )
     reference: Annotated[float, real(-MOST_ANGLE, MOST_ANGLE)] = quantity(
@@ -240,10 +240,10 @@ class Loop(Description):
 
     body: Name = Field(description="The first body.")
     other: Name | None = Field(None, description="The second; the base if left out.")
-    position: Annotated[Triple, PLACE] = quantity(
+    position: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point in the first body's frame."
     )
-    other_position: Annotated[Triple, PLACE] = quantity(
+    other_position: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point in the second body's frame."
     )
     stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(
@@ -258,7 +258,7 @@ class Tip(Description):
     """A point whose motion is recorded, and at which a fingertip force acts."""
 
     body: Name | None = Field(None, description="Body that carries it; the base if left out.")
-    position: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
+    position: Annotated[Triple, BODY_POINT] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
 
 
 class Keyframe(Description):

@@ -21,10 +21,10 @@ from finger_pin.exceptions import InputError
 
 Name = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 #: Of a joint or tendon, which begins with that of its finger and a dot where there is a hand.
-_FULL = r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"
-FullName = Annotated[str, StringConstraints(strict=True, pattern=_FULL, max_length=129)]
+_DOTTED_NAME = r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"
+FullName = Annotated[str, StringConstraints(strict=True, pattern=_DOTTED_NAME, max_length=129)]
 # So many names a message lists; of more it lists so many that are near.
-_READABLE, _NEAR = 20, 5
+_MOST_NAMES_LISTED, _NEAREST_NAMES_LISTED = 20, 5
 # Directions are given with three digits at least.
 _UNIT = 1.001
 #: The largest angle of a joint, rad: two turns. Nearly every angle in degrees is beyond it.
@@ -174,7 +174,11 @@ def suggestion(name: Any, names: Iterable[str]) -> str:
 def choices(name: Any, names: Iterable[str]) -> str:
     """Return the valid names as the end of a message: the nearest ones if there are too many to read."""
     known = list(names)
-    shown = known if len(known) <= _READABLE else difflib.get_close_matches(str(name), known, _NEAR, cutoff=0.0)
+    shown = (
+        known
+        if len(known) <= _MOST_NAMES_LISTED
+        else difflib.get_close_matches(str(name), known, _NEAREST_NAMES_LISTED, cutoff=0.0)
+    )
     rest = f" and {len(known) - len(shown)} more" if len(shown) < len(known) else ""
     return f"{', '.join(shown)}{rest}{suggestion(name, known)}"
 
@@ -237,7 +241,11 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
         raise InputError(entry, context["allowed"], context["value"].content) from None
     if failure["type"] == "extra_forbidden":
         names = sorted(field_names(model, location[:-1]))
-        near = _MEANT.get(location[-1], "") if _MEANT.get(location[-1]) in names else nearest(location[-1], names)
+        near = (
+            _OTHER_NAMES.get(location[-1], "")
+            if _OTHER_NAMES.get(location[-1]) in names
+            else nearest(location[-1], names)
+        )
         hint = f"; did you mean {'.'.join([*prefix, *location[:-1], near])}?" if near else ""
         raise InputError(entry, f"unknown key; allowed here: {', '.join(names)}{hint}") from None
     if failure["type"] == "missing":
@@ -250,8 +258,8 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
 
 
 # What people call keys whose names are not near.
-_MEANT = dict.fromkeys(("motor_position", "motor_angle"), "spool_angle")
-_MEANT |= dict.fromkeys(("winding", "windings", "tendon_length"), "tendon_winding")
+_OTHER_NAMES = dict.fromkeys(("motor_position", "motor_angle"), "spool_angle")
+_OTHER_NAMES |= dict.fromkeys(("winding", "windings", "tendon_length"), "tendon_winding")
 _MESSAGES = {
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",

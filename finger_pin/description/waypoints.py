@@ -13,7 +13,7 @@ from finger_pin.description.validation import Description, Name, choice, directi
 
 _MILLIMETRES = " m (is it in millimetres?)"
 #: A place in a body's frame.
-PLACE = vector(3, -10.0, 10.0, _MILLIMETRES)
+BODY_POINT = vector(3, -10.0, 10.0, _MILLIMETRES)
 Triple = tuple[float, float, float]
 
 
@@ -21,7 +21,7 @@ class SidePoint(Description):
     """The side point of a wrap, carried by another body."""
 
     body: Name | None = Field(None, description="Body that carries it; the base if left out.")
-    position: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
+    position: Annotated[Triple, BODY_POINT] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
 
 
 class Waypoint(Description):
@@ -31,7 +31,7 @@ class Waypoint(Description):
         Literal["point", "cylinder", "sphere", "pulley"], choice("point", "cylinder", "sphere", "pulley")
     ] = quantity(..., unit="1", source="design", doc="point, cylinder, sphere or pulley.")
     body: Name | None = Field(None, description="Body that carries it; the base if left out.")
-    position: Annotated[Triple, PLACE] = quantity(
+    position: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point, or the wrap's centre, in the body's frame."
     )
     orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
@@ -40,7 +40,7 @@ class Waypoint(Description):
     radius: Annotated[float, real(0.0, 1.0, hint=_MILLIMETRES)] = quantity(
         0.0, unit="m", source="design", doc="Of a sphere or cylinder around which it wraps."
     )
-    side: Annotated[Triple, PLACE] | None = quantity(
+    side: Annotated[Triple, BODY_POINT] | None = quantity(
         None, unit="m", source="design", doc="Side point of a wrap, in its frame; nearer than the radius: inside."
     )
     side_point: SidePoint | None = Field(

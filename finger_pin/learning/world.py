@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, sampled_control
-from finger_pin.core.stepping.batch_stepper import IDLE
+from finger_pin.core.stepping.batch_stepper import NO_END
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.caching import cached_property
@@ -228,7 +228,7 @@ class World:
         return self._next_end()
 
     def finish_piece(self, end: float, status: int) -> float:
-        """Note the status with which a stepper ended a piece; return the end of the next, s, or `IDLE`."""
+        """Note the status with which a stepper ended a piece; return the end of the next, s, or `NO_END`."""
         self.now = end
         if status:
             self.now = self.stepper.time
@@ -236,10 +236,10 @@ class World:
         return self._next_end()
 
     def _next_end(self) -> float:
-        """Hold the inputs that act now, and return the time of their end, s; `IDLE` after the period."""
+        """Hold the inputs that act now, and return the time of their end, s; `NO_END` after the period."""
         end = self._step * self.task.period
         if self.reason or self.now >= end:
-            return IDLE
+            return NO_END
         return self.action.next_piece(self.stepper, self.now, end)
 
     def result(self, sample_rate: float) -> xr.Dataset:

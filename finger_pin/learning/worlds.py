@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from finger_pin.core.stepping.batch_stepper import IDLE, BatchStepper
+from finger_pin.core.stepping.batch_stepper import NO_END, BatchStepper
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.exceptions import InputError
 from finger_pin.learning.sensors import measurements
@@ -103,13 +103,13 @@ class Worlds:
 
         Where actions arrive within the period, it has several pieces.
         """
-        worlds, ends = self.worlds, [IDLE] * len(self.worlds)
+        worlds, ends = self.worlds, [NO_END] * len(self.worlds)
         for i in places:
             ends[i] = worlds[i].act(actions[i])
-        while max(ends) != IDLE:
+        while max(ends) != NO_END:
             statuses = self._steppers.advance(ends)
             for i in places:
-                if ends[i] != IDLE:
+                if ends[i] != NO_END:
                     ends[i] = worlds[i].finish_piece(ends[i], statuses[i])
 
     def observe(self, places: _Places, *, judged: bool = True) -> tuple[NDArray[np.float32], dict[str, Array]]:

@@ -24,9 +24,9 @@ from finger_pin.mechanism.solids import Solid
 from finger_pin.typing import Array
 
 # Fillets are this share of a body's least half-width, but at most so large, m.
-_SHARE, _LARGEST = 0.1, 1e-3
+_FILLET_SHARE, _LARGEST_FILLET = 0.1, 1e-3
 # A face's pressure, if even, has its moment about the face's axis at two thirds of the radius.
-_STUD = 2.0 / 3.0
+_EVEN_PRESSURE_RADIUS = 2.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def fillet(solid: Solid) -> float:
     if solid.shape not in ("box", "cylinder"):
         return 0.0
     halves = (solid.sizes[0], 0.5 * solid.sizes[1]) if solid.shape == "cylinder" else 0.5 * np.array(solid.sizes)
-    return min(_SHARE * float(min(halves)), _LARGEST)
+    return min(_FILLET_SHARE * float(min(halves)), _LARGEST_FILLET)
 
 
 def solid_contacts(one: Solid, other: Solid) -> Iterator[tuple[Solid, ContactPart, Solid, tuple[float, ...]]]:
@@ -140,7 +140,9 @@ def _rims(solid: Solid, rounding: float) -> list[ContactPart]:
     for side in (-half, half):
         parts.append(ContactPart(np.array([[0.0, 0.0, side], [0.0, 0.0, -side]]), rounding, radius - rounding, 0.0))
         for turn in 2.0 * np.pi * np.arange(3) / 3.0:
-            stud = np.array([_STUD * radius * np.cos(turn), _STUD * radius * np.sin(turn), side])
+            stud = np.array(
+                [_EVEN_PRESSURE_RADIUS * radius * np.cos(turn), _EVEN_PRESSURE_RADIUS * radius * np.sin(turn), side]
+            )
             parts.append(ContactPart(np.stack([stud, stud]), rounding))
     return parts
 

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.rows import BASE, GUIDED, Energies, RowSignals
+from finger_pin.mechanism.rows import BASE, PRESCRIBED, Energies, RowSignals
 from finger_pin.typing import Array
 
 #: What an evaluation is wanted for: all, all but accelerations, or the rows' forces. It may give more than that.
@@ -85,7 +85,7 @@ class Evaluation:
             for name, value in exchanged.items():
                 powers[name] = powers[name] + value
         if self.prescribed_power is not None:
-            powers[GUIDED.name] = self.prescribed_power
+            powers[PRESCRIBED.name] = self.prescribed_power
         if self.base_power is not None:
             powers[BASE.name] = self.base_power[..., 0]
         return energies, powers

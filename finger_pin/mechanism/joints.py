@@ -27,7 +27,7 @@ _SPRINGS = Energy("joint_springs", "joints' springs")
 
 _LIMITERS = Energy("limiter", "stroke limiters")
 # Farther than any joint gets, rad or m.
-_NEVER = 1e9
+_BEYOND_ANY_JOINT = 1e9
 
 #: What friction in the joints takes, in the order of its law.
 LOSSES = (
@@ -178,7 +178,10 @@ class StrokeLimiter:
 
     def rows(self, names: tuple[str, ...], width: int) -> Rows:
         """Return the table of the limiters."""
-        lower, upper = np.where(self.limited, self.lower, -_NEVER), np.where(self.limited, self.upper, _NEVER)
+        lower, upper = (
+            np.where(self.limited, self.lower, -_BEYOND_ANY_JOINT),
+            np.where(self.limited, self.upper, _BEYOND_ANY_JOINT),
+        )
         return Rows(
             group="limiter",
             law=STROKE_LIMITER,

@@ -32,7 +32,7 @@ from finger_pin.mechanism.wiring import sort_tables
 from finger_pin.typing import Array
 
 #: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `base_motion`.
-GUIDES = 27
+PRESCRIBED_ACCELERATIONS = 27
 
 
 class Mechanism:
@@ -161,7 +161,7 @@ class Mechanism:
             command: Inputs u, shape (channels,) or (m, channels).
             force: At the tips, shape (3,) or (m, 3) for one, (t, 3) or (m, t, 3) for several, N, base frame.
             base: Motion of the base, the numbers of `base_motion`, shape (12 or more,) or (m, 12 or more), at rest by
-                default; after `GUIDES` of them the accelerations of what is moved along paths, zero by default.
+                default; after `PRESCRIBED_ACCELERATIONS` of them those of what is moved along paths, zero by default.
         """
         q, v, _ = self.split(x)
         joints, turning, lead = int(self.body.model.nv), q[..., : self.body.model.nq], x.shape[:-1]
@@ -179,7 +179,7 @@ class Mechanism:
         )
         prescribed, prescribed_power = np.flatnonzero(self.prescribed >= 0), None
         if len(prescribed):
-            columns = self.prescribed[prescribed] + GUIDES
+            columns = self.prescribed[prescribed] + PRESCRIBED_ACCELERATIONS
             acceleration[..., prescribed] = 0.0 if base is None else base[..., columns]
             prescribed_power = -np.sum(torque[..., prescribed] * v[..., prescribed], axis=-1)
         if base is not None and self.moved:

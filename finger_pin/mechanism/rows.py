@@ -43,7 +43,7 @@ def energy(entry: Energy | str) -> Energy:
 
 
 #: The powers that a moving base supplies, and what moves objects along paths.
-BASE, GUIDED = Energy("palm", "motion of the palm", SUPPLIED), Energy("objects", "motion of objects", SUPPLIED)
+BASE, PRESCRIBED = Energy("palm", "motion of the palm", SUPPLIED), Energy("objects", "motion of objects", SUPPLIED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Energies:
     @classmethod
     def from_rows(cls, rows: Sequence[Rows], moved: bool = False, prescribed: bool = False) -> Energies:
         """Collect the energies and powers of tables, of moved coordinates and of a base that moves."""
-        base = ((GUIDED,) if prescribed else ()) + ((BASE,) if moved else ())
+        base = ((PRESCRIBED,) if prescribed else ()) + ((BASE,) if moved else ())
         return cls(
             _unique(table.stored for table in rows), (*_unique(p for table in rows for p in table.powers), *base)
         )

@@ -29,11 +29,11 @@ from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.typing import Array
 
-_STRETCH = Energy("elastic_tendons", "tendons on spools")
+_STRETCH_ENERGY = Energy("elastic_tendons", "tendons on spools")
 _DAMPING = Energy("elastic_damping", "tendons stretching")
 _FLANKS = Energy("backlash", "flanks of gears with play")
 # Of a motor with play: the spool's part of its inertia, stiffness of flanks over that of bristles, and their c, s/rad.
-_OF_SPOOL, _FLANK, _REBOUND = 1e-4, 10.0, 1.0
+_SPOOL_INERTIA_SHARE, _FLANK_STIFFNESS_RATIO, _FLANK_DAMPING = 1e-4, 10.0, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ class Actuators:
     @property
     def inertias(self) -> Array:
         """Inertias of spools with play and of motors, shape (p + m,), kg m2."""
-        spools = _OF_SPOOL * self.inertia[self.loose]
+        spools = _SPOOL_INERTIA_SHARE * self.inertia[self.loose]
         rotors = self.inertia.copy()
         rotors[self.loose] -= spools
         return np.concatenate([spools, rotors])
@@ -211,7 +211,7 @@ class Actuators:
             parameters=np.array([self.stiffness, self.damping]),
             arm=arm,
             offset=-self.slack,
-            stored=_STRETCH,
+            stored=_STRETCH_ENERGY,
             powers=(_DAMPING,),
             pulls=tuple(self.routing.tendons[index] for index in self.tendons),
         )
@@ -258,13 +258,13 @@ class Actuators:
         # Tendons that are all wound in keep to one flank, where the motor's angle is the spool's; else it is amid.
         gap = self.backlash[loose]
         lower = np.where(np.any(self.spools[:, loose] < 0.0, axis=0), -0.5 * gap, 0.0)
-        flank = _FLANK * self.gearbox[GEARBOX.parameters.index("stiffness"), loose]
+        flank = _FLANK_STIFFNESS_RATIO * self.gearbox[GEARBOX.parameters.index("stiffness"), loose]
         return [
             Rows(
                 "backlash",
                 STROKE_LIMITER,
                 self.loose_names,
-                np.array([lower, lower + gap, flank, np.full(count, _REBOUND), np.zeros(count)]),
+                np.array([lower, lower + gap, flank, np.full(count, _FLANK_DAMPING), np.zeros(count)]),
                 arm,
                 stored=_FLANKS,
                 powers=(_FLANKS,),

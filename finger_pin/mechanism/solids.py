@@ -20,8 +20,8 @@ from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.tendon_paths import Placed, rotation
 from finger_pin.typing import Array
 
-# A link's own z axis runs along it, which is the x axis of its joint.
-_SLIGHT = 1e-9
+# Mass and moments of joints of the world, which carry nothing yet, kg and kg m2.
+_LEAST_MASS = 1e-9
 #: Joints of the world that a palm sees: less than its roll, pitch, yaw, x, y and z, one carrying the next.
 WORLD = tuple(f"world {name}" for name in ("roll", "pitch", "yaw", "x", "y", "z"))
 _WORLD_JOINTS = (
@@ -32,6 +32,7 @@ _WORLD_JOINTS = (
     pin.JointModelPY,
     pin.JointModelPZ,
 )
+# A link's own z axis runs along it, which is the x axis of its joint.
 _ALONG_LINK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
@@ -215,7 +216,7 @@ def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm 
 def _with_masses(extended: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
     """Return an extended body with the inertias of the body itself, and those of objects that move."""
     # Any inertia that is too little to count will do for what moves on a path.
-    slight, none = pin.Inertia(_SLIGHT, np.zeros(3), _SLIGHT * np.eye(3)), pin.Inertia.Zero()
+    slight, none = pin.Inertia(_LEAST_MASS, np.zeros(3), _LEAST_MASS * np.eye(3)), pin.Inertia.Zero()
     inertias = body.inertias
     for obj in moved:
         inertias += [none, slight if obj.mass is None else _inertia(obj)]

@@ -164,7 +164,7 @@ class State:
 #: Every block of the state, in the order of the packed vector.
 BLOCKS: dict[str, Block] = {each.name: each.metadata["block"] for each in fields(State)}
 # Blocks whose numbers have the names of the user's rows.
-_NAMED = ("drives", "further")
+_BLOCKS_OF_USERS_ROWS = ("drives", "further")
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ class Layout:
     def names(self) -> tuple[str, ...]:
         """A name for every number of the packed state."""
         return tuple(
-            name if kind in _NAMED else f"{block.variable or kind}[{name}]"
+            name if kind in _BLOCKS_OF_USERS_ROWS else f"{block.variable or kind}[{name}]"
             for (kind, block), names in zip(BLOCKS.items(), self.labels, strict=True)
             for name in names
         )

@@ -17,7 +17,7 @@ from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, pat
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import RowSignals, weighted_sum
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
-from finger_pin.mechanism.spans.span import ELSEWHERE
+from finger_pin.mechanism.spans.span import SIDE_ON_OTHER_BODY
 from finger_pin.mechanism.tendon_wraps import Wrap
 from finger_pin.typing import Array
 
@@ -170,7 +170,7 @@ def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[s
     frame = body.frame * pin.SE3(rotation(wrap.orientation), np.array(wrap.position))
     side, elsewhere = (0.0, 0.0, 0.0) if wrap.side is None else wrap.side, wrap.side_point
     inside = wrap.side is not None and float(np.linalg.norm(side)) < wrap.radius
-    known = ELSEWHERE if elsewhere else float(wrap.side is not None)
+    known = SIDE_ON_OTHER_BODY if elsewhere else float(wrap.side is not None)
     numbers = np.array([wrap.radius, *side, known, inside], dtype=float)
     third = (placed[elsewhere.body].place(elsewhere.position),) if elsewhere else ()
     shape = CYLINDER if wrap.kind == "cylinder" else SPHERE

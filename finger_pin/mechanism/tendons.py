@@ -32,9 +32,12 @@ SLACK = Energy("slack", "tensions cut at zero")
 BRISTLES = Energy("tendon_bristles", "tendon bristles")
 #: Tables of sources of tension that are rows: those with an end, and ideal winches.
 SOURCES_WITH_END, WINCHES = "tension_sources", "winches"
-_WOUND = Energy("winches", "winches, through their cords")
+_WINCH_ENERGY = Energy("winches", "winches, through their cords")
 _HALVES = ("proximal", "distal")
-_NAMES, _STRETCHING = {"ratio": "stiction_ratio"}, Energy("passive_hysteresis", "passive tendons stretching")
+_ENTRY_OF_PARAMETER, _HYSTERESIS_ENERGY = (
+    {"ratio": "stiction_ratio"},
+    Energy("passive_hysteresis", "passive tendons stretching"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +96,7 @@ class Tendons:
         return cls(
             routing=routing,
             **{name: each[:size] for name, each in friction.items()},
-            canals=np.array([friction[_NAMES.get(name, name)] for name in PASSIVE_FRICTION.parameters]),
+            canals=np.array([friction[_ENTRY_OF_PARAMETER.get(name, name)] for name in PASSIVE_FRICTION.parameters]),
             wraps=tuple(wraps),
             several={
                 k: _places(routing, k, wraps[k])
@@ -169,7 +172,7 @@ class Tendons:
             elif most is not None:
                 plain[k] = [1.0, 0.0, 0.0, 0.0, 0.0, most, 0.0, most]
         tables = []
-        for group, numbers, supplied in ((SOURCES_WITH_END, plain, SOURCES), (WINCHES, winches, _WOUND)):
+        for group, numbers, supplied in ((SOURCES_WITH_END, plain, SOURCES), (WINCHES, winches, _WINCH_ENERGY)):
             if not numbers:
                 continue
             places, arm = np.array(list(numbers), dtype=np.int64), np.zeros((len(numbers), width))
@@ -203,7 +206,7 @@ class Tendons:
             stored=Energy("passive_tendon", "passive tendons"),
         )
         shares = np.repeat(self.hysteresis, 2)
-        return [halves, *hysteresis_rows("passive_hysteresis", halves, shares, OF_TENDONS, _STRETCHING)]
+        return [halves, *hysteresis_rows("passive_hysteresis", halves, shares, OF_TENDONS, _HYSTERESIS_ENERGY)]
 
     def rows(self, drives: Sequence[Rows] = (), motors: int = 0) -> list[Rows]:
         """Return the tables of halves (12), drives, driven and passive tendons (14), for (theta, p, theta_s, theta_m).

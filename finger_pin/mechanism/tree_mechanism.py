@@ -37,9 +37,9 @@ STATELESS, STATEFUL, MUSCLES = "actuator", "actuator_with_state", "muscle"
 #: The table of tendons that stretch and only pull.
 ELASTIC = "elastic_cords"
 # Dry friction of a tendon holds until it has slid so far, m.
-_HOLDS = 1e-4
+_DRY_STICTION = 1e-4
 # How soon an actuator of limited rate follows its input, s.
-_LAG, _UNLIMITED = 1e-4, (-np.inf, np.inf)
+_INPUT_LAG, _UNLIMITED = 1e-4, (-np.inf, np.inf)
 # Inertia of what moves along a path, which takes none, kg or kg m2.
 _ON_PATH = 1e-9
 # What rows of a tree store and exchange, by table.
@@ -54,7 +54,7 @@ _STORED = {
     "actuator": Energy("joint_springs", "joints' springs"),
     "muscle": Energy("muscle_passive", "muscles' passive elements"),
 }
-_EXCHANGED = {
+_EXCHANGED_POWERS = {
     "tendon_spring": (Energy("tendon_spring_damping", "tendons' dampers"),),
     ELASTIC: (Energy("tendon_spring_damping", "tendons' dampers"),),
     "tendon_limit": (Energy("tendon_limit_limiter", "tendons' limits"),),
@@ -145,7 +145,7 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
         arm = np.zeros((len(along), width))
         arm[:, : len(joints)] = [route.coefficients for route in along.values()]
         paths = tuple(route.legs for route in along.values())
-        wiring = {"stored": _STORED.get(group), "powers": _EXCHANGED.get(group, ())}
+        wiring = {"stored": _STORED.get(group), "powers": _EXCHANGED_POWERS.get(group, ())}
         return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **(wiring | more))
 
     tables: list[Rows] = []
@@ -192,7 +192,7 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
     limits = [each.limiter for each in limited.values()]
     # Law (9) whose level is its floor.
-    dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()]
+    dry = [(0, 0, each.friction / _DRY_STICTION, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()]
     return [
         ("tendon_spring", DEAD_BAND_SPRING, along(sprung), springs),
         ("tendon_limit", STROKE_LIMITER, along(limited), limits),
@@ -239,9 +239,7 @@ def _loops(tree: Tree, routes: TendonPaths) -> _Described:
     for name, loop in tree.loops.items():
         first, second = routes.placed[loop.body], routes.placed[loop.other]
         for axis, unit in zip("xyz", np.eye(3), strict=True):
-            along[f"{name}.{axis}"] = _height_difference(
-                first.place(loop.position), second.place(loop.other_position), unit
-            )
+            along[f"{name}.{axis}"] = _height(first.place(loop.position), second.place(loop.other_position), unit)
     numbers = [(loop.stiffness, 0.0, loop.damping) for loop in tree.loops.values() for _ in "xyz"]
     return "loop", JOINT_SPRING, along, numbers
 
@@ -257,14 +255,13 @@ def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
     }
     base, places = Place(0, np.zeros(3)), routes.placed
     along = {
-        name: _height_difference(base, places[name].place(each.centre), -gravity / size)
-        for name, each in compensated.items()
+        name: _height(base, places[name].place(each.centre), -gravity / size) for name, each in compensated.items()
     }
     numbers = [(each.gravity_compensation * each.mass * size,) for each in compensated.values()]
     return "gravity_compensation", CONSTANT_FORCE, along, numbers
 
 
-def _height_difference(first: Place, second: Place, axis: Array) -> TendonPath:
+def _height(first: Place, second: Place, axis: Array) -> TendonPath:
     """Return the height of one point above another along an axis of the base, a unit vector."""
     numbers = np.eye(len(RISE.parameters))[1]
     piece = PathElement(RISE, numbers, (first, second), 0, pin.SE3(_upright(axis), np.zeros(3)))
@@ -298,6 +295,6 @@ def _actuator(actuator: TreeActuator) -> tuple[float, ...]:
     if actuator.integral:
         law, state = actuator.gain, (actuator.integral, 1.0, -1.0, 0.0)
     else:  # What it holds takes the place of its input.
-        lag = actuator.time_constant or (0.0 if actuator.slew is None else _LAG)
+        lag = actuator.time_constant or (0.0 if actuator.slew is None else _INPUT_LAG)
         law, state = 0.0, (actuator.gain, 1.0 / (lag or 1.0), 0.0, -1.0 / lag if lag else 0.0)
     return law, *bias, *state, *(actuator.state_range or _UNLIMITED), actuator.slew or np.inf

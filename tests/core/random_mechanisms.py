@@ -14,7 +14,7 @@ from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.spans import ANGLE, RISE, SPHERE, STRAIGHT
-from finger_pin.mechanism.spans.span import ELSEWHERE
+from finger_pin.mechanism.spans.span import SIDE_ON_OTHER_BODY
 
 KINDS = (
     pin.JointModelRX,
@@ -78,7 +78,7 @@ def random_path(rng, joints):
         shape, numbers = (STRAIGHT, ()) if rng.random() < 0.6 else (SPHERE, (0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
         side = ()
         if shape is SPHERE and more.random() < 0.5:
-            numbers = (0.3, 0.0, 0.0, 0.0, ELSEWHERE, 0.0)
+            numbers = (0.3, 0.0, 0.0, 0.0, SIDE_ON_OTHER_BODY, 0.0)
             side = (Place(int(more.integers(0, joints + 1)), 2.0 * more.normal(size=3)),)
         frame = int(rng.integers(0, joints + 1))
         piece = PathElement(shape, np.array(numbers), (first, last, *side), frame, random_placement(rng))

@@ -34,7 +34,7 @@ from finger_pin.core.structure import Structure
 # Bernstein coefficients of a coordinate over a step.
 _Coefficients: TypeAlias = tuple[float, float, float, float, float]
 # Of a step in which all touches have been seen, and of one in which a culled pair may have closed.
-NOTHING, MISSED_BY_CULLING = 2.0, 1.0
+NOTHING_MISSED, MISSED_BY_CULLING = 2.0, 1.0
 # Derivations and origins: core/stepping/NOTES.md.
 # Rounding of a gap, m: 450 times the spacing of doubles at a distance of a metre.
 _GAP_ROUNDING = 1e-13
@@ -161,7 +161,7 @@ def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: V
 
 @njit_inline
 def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -> float:
-    """Return the share of the step to a meeting of bodies that part again before its end, or `NOTHING`.
+    """Return the share of the step to a meeting of bodies that part again before its end, or `NOTHING_MISSED`.
 
     Those that are not apart at its end have parted too, unless ``contact_known``: the step knows of it.
     """
@@ -170,7 +170,7 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
     _look(integration, model, e, 1.0, looks[1])
     _look(integration, model, e, 0.0, looks[0])
     pieces.ahead[e] = looks[1, LOOK.gap] - GAP_ACCURACY
-    parted, met, depth = looks[0, LOOK.gap] >= 0.0, NOTHING, 1
+    parted, met, depth = looks[0, LOOK.gap] >= 0.0, NOTHING_MISSED, 1
     while depth > 0:
         one, two = looks[0], looks[depth]
         if depth < MAX_LOOKS - 2 and not _is_clear(structure, parameters, pieces, e, one, two):
@@ -178,15 +178,15 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
             _look(integration, model, e, 0.5 * (one[LOOK.share] + two[LOOK.share]), looks[depth])
             continue
         if two[LOOK.gap] >= 0.0:
-            if met < NOTHING:
+            if met < NOTHING_MISSED:
                 return met
             parted = True
-        elif parted and met == NOTHING:
+        elif parted and met == NOTHING_MISSED:
             met = _meeting(integration, model, e, one, two)
         for i in range(looks.shape[1]):
             one[i] = two[i]
         depth -= 1
-    return NOTHING if contact_known else met
+    return NOTHING_MISSED if contact_known else met
 
 
 @njit_always_inline
@@ -201,13 +201,13 @@ def _is_pressed(structure: Structure, rows: Matrix, k: int) -> bool:
 
 @njit_always_inline
 def detect_missed_contacts(integration: Integration, model: Model) -> float:
-    """Return the share of a tried step after which bodies touch and part again before its end, or `NOTHING`.
+    """Return the share of a tried step after which bodies touch and part again before its end, or `NOTHING_MISSED`.
 
     It is `MISSED_BY_CULLING` if a culled pair is closed at the end, or may be: it is active now.
     """
     structure, parameters = model.structure, model.parameters
     pieces, rows, state = model.work.paths, model.work.rows, model.state
-    paths, size, first, woken = structure.paths, structure.parents.size, NOTHING, False
+    paths, size, first, woken = structure.paths, structure.parents.size, NOTHING_MISSED, False
     bound_step_motion(integration.dense, integration.k, integration.x, state, size, pieces)
     for e in range(paths.columns.size):
         if paths.columns[e] == 1:
@@ -219,7 +219,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
             if pieces.ahead[e] > 0.0:
                 continue
             share = _scan(integration, model, e, True)
-            if share < NOTHING or pieces.ahead[e] < 0.0:
+            if share < NOTHING_MISSED or pieces.ahead[e] < 0.0:
                 # Until it is listed again it exerts nothing, whatever else the step has met.
                 set_culled(structure, k, 0, pieces.culled)
                 woken = True

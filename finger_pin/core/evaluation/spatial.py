@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.core.jit import Vector, njit_inline
 
-_QUARTERS = 0.6366197723675814
+_TWO_OVER_PI = 0.6366197723675814
 # pi / 2 in parts of 33 bits, whose products with small integers are exact.
 _FIRST, _SECOND, _THIRD = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21
 _S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
@@ -67,7 +67,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     """Return sine and cosine of an angle, rad."""
     if not abs(angle) < _LARGE:
         return np.sin(angle), np.cos(angle)
-    turns = np.floor(angle * _QUARTERS + 0.5)
+    turns = np.floor(angle * _TWO_OVER_PI + 0.5)
     x = ((angle - turns * _FIRST) - turns * _SECOND) - turns * _THIRD
     z = x * x
     sine = x + z * x * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.collision.broad_phase import activate_all_pairs, forget_culled, list_active_pairs, update_culling
-from finger_pin.core.collision.continuous import MISSED_BY_CULLING, NOTHING, detect_missed_contacts
+from finger_pin.core.collision.continuous import MISSED_BY_CULLING, NOTHING_MISSED, detect_missed_contacts
 from finger_pin.core.events.branches import (
     branch_error,
     freeze,
@@ -68,7 +68,7 @@ def find_missed_contacts(address: int, _h: float) -> int:
     if touch == MISSED_BY_CULLING:
         list_active_pairs(model.structure, model.work.paths)
         memory.stale[0] = 1.0
-    elif touch < NOTHING:
+    elif touch < NOTHING_MISSED:
         # Of a touch nothing has seen the next step's end is inside, and sees it.
         memory.retry_share[0] = memory.taken_share[0] * touch
     return 1

@@ -29,11 +29,11 @@ from numba.extending import is_jitted
 from finger_pin.files import write_text
 
 #: The core, its sibling, and the rooms below them, which are all that they may import.
-ROOMS = ("core", "description", "exchange", "laws", "mechanism", "mujoco", "references")
-_OURS = tuple(f"finger_pin.{room}" for room in ROOMS)
+CORE_ROOMS = ("core", "description", "exchange", "laws", "mechanism", "mujoco", "references")
+_OWN_MODULES = tuple(f"finger_pin.{room}" for room in CORE_ROOMS)
 # Their names tell what they have, as their versions are part of the digest.
-_KNOWN = {"builtins", "cmath", "llvmlite", "math", "numba", "numpy", "operator"}
-_PLAIN = (int, float, complex, str, bytes, bool, type(None), slice)
+_VERSIONED_PACKAGES = {"builtins", "cmath", "llvmlite", "math", "numba", "numpy", "operator"}
+_PLAIN_TYPES = (int, float, complex, str, bytes, bool, type(None), slice)
 
 
 class Undigestible(Exception):
@@ -58,7 +58,7 @@ def cache_root() -> Path:
 def _package_digest() -> str:
     """Return a digest of the package's code and of the versions that compile it."""
     root = Path(__file__).parents[2]
-    paths = sorted([*root.glob("*.py"), *(each for room in ROOMS for each in (root / room).rglob("*.py"))])
+    paths = sorted([*root.glob("*.py"), *(each for room in CORE_ROOMS for each in (root / room).rglob("*.py"))])
     texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in paths}
     versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
     # Parsing takes a second: of files that are the same to the byte the digest is kept.
@@ -135,7 +135,7 @@ def _values(function: FunctionType, names: frozenset[str]) -> Iterator[tuple[str
 
 
 def _is_ours(value: object) -> bool:
-    return (getattr(value, "__module__", None) or "").startswith(_OURS)
+    return (getattr(value, "__module__", None) or "").startswith(_OWN_MODULES)
 
 
 def _constant_text(value: Any, names: frozenset[str], above: tuple[FunctionType, ...]) -> str:
@@ -144,7 +144,7 @@ def _constant_text(value: Any, names: frozenset[str], above: tuple[FunctionType,
     def described(part: object) -> str:
         return _constant_text(part, names, above)
 
-    if isinstance(value, _PLAIN):
+    if isinstance(value, _PLAIN_TYPES):
         return repr(value)
     if is_jitted(value):
         dispatcher: Any = value
@@ -153,7 +153,7 @@ def _constant_text(value: Any, names: frozenset[str], above: tuple[FunctionType,
         # The type of a table has its layout.
         return f"{value.name} {described(getattr(value, 'kinds', {}))}"
     if isinstance(value, ModuleType):
-        if value.__name__.partition(".")[0] in _KNOWN:
+        if value.__name__.partition(".")[0] in _VERSIONED_PACKAGES:
             return value.__name__
         return f"{value.__name__} {described({name: vars(value)[name] for name in names & vars(value).keys()})}"
     if isinstance(value, tuple):
@@ -167,7 +167,7 @@ def _constant_text(value: Any, names: frozenset[str], above: tuple[FunctionType,
     module, name = str(getattr(value, "__module__", None)), getattr(value, "__qualname__", None)
     if isinstance(value, np.ufunc) and any(value is each for each in vars(np).values()):
         return f"numpy {value}"
-    if name is not None and module.partition(".")[0] in _KNOWN:
+    if name is not None and module.partition(".")[0] in _VERSIONED_PACKAGES:
         return f"{module}.{name}"
     if isinstance(value, FunctionType):
         return _function(value, above)

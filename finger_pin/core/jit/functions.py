@@ -37,7 +37,7 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 # Arrays are free to pass only where calls are inlined; nobody calls these functions from outside.
 _INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 # How long to wait for a process that compiles the same, s; one that has ended, however, is not waited for.
-_PATIENCE = 300.0
+_LONGEST_WAIT = 300.0
 
 
 def njit_inline(function: _Function) -> _Function:
@@ -100,7 +100,7 @@ _lock = threading.RLock()
 if hasattr(os, "register_at_fork"):
     # No compilation is under way then, and none of numba's own locks is held.
     os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
-_living: list[Any] = []
+_kept_alive: list[Any] = []
 
 
 def address_of(signature: str, function: Callable[..., Any], announced: bool = True) -> int:
@@ -125,7 +125,7 @@ def address_of(signature: str, function: Callable[..., Any], announced: bool = T
             reason = getattr(error, "strerror", None) or repr(error)
             _warn_once(f"the compile cache {cache_root()} cannot be used: {reason}; the next run compiles again")
             made = numba.cfunc(signature, **_OPTIONS)(function)
-        _living.append(made)
+        _kept_alive.append(made)
         return made.address  # type: ignore[no-any-return]
 
 
@@ -159,7 +159,7 @@ def _named(function: FunctionType) -> FunctionType | None:
 @contextmanager
 def _exclusively(named: FunctionType) -> Iterator[None]:
     """Let one process at a time compile a function for the cache; the others then load it from disk."""
-    lock = filelock.FileLock(cache_root() / f"{named.__name__.rpartition('-')[2]}.lock", timeout=_PATIENCE)
+    lock = filelock.FileLock(cache_root() / f"{named.__name__.rpartition('-')[2]}.lock", timeout=_LONGEST_WAIT)
     # Where files cannot be locked, each process compiles for itself.
     with suppress(OSError, NotImplementedError):
         lock.acquire()

@@ -63,7 +63,7 @@ def try_counted(address: int, integration: Integration, model: Model, h: float) 
     memory = integration.memory
     fresh, count = memory.fresh[0] > 0.0, integration.tableau.nodes.size
     outcome = try_step(address, integration, model, memory.time[0], h, fresh)
-    if outcome == at.SENSELESS:
+    if outcome == at.NOT_FINITE_AT_START:
         for c in range(integration.x.size - 1, -1, -1):
             if not np.isfinite(integration.start[c]):
                 memory.limiting_state[0] = c
@@ -164,7 +164,7 @@ def advance(address: int, end: float) -> int:
         if final:
             h = end - time
         outcome = try_counted(args.integration, integration, model, h)
-        if outcome == at.SENSELESS:
+        if outcome == at.NOT_FINITE_AT_START:
             return at.NOT_FINITE
         error = np.inf
         if outcome != at.SINGULAR:

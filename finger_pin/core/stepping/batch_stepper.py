@@ -9,7 +9,7 @@ from finger_pin.core.threads import in_threads
 from finger_pin.typing import Array
 
 #: In the place of an end: this one is left alone.
-IDLE = -1.0
+NO_END = -1.0
 
 
 class BatchStepper:
@@ -27,8 +27,8 @@ class BatchStepper:
         return BatchStepper, (self._steppers,)
 
     def advance(self, ends: Sequence[float]) -> list[int]:
-        """Advance each to a time, s, or not if that is `IDLE`; return the statuses of `advance`."""
-        active = [index for index, owner in enumerate(self._owners) if ends[owner] != IDLE]
+        """Advance each to a time, s, or not if that is `NO_END`; return the statuses of `advance`."""
+        active = [index for index, owner in enumerate(self._owners) if ends[owner] != NO_END]
 
         def advance(index: int) -> int:
             block, unit = self._ready[index]

@@ -16,7 +16,7 @@ WINDOW, LEAST_MEAN_STEP = 20_000, 1e-9
 # 1 cm is then faster than sound, 343 m/s.
 FASTEST = 343.0 / 0.01
 # What comes of trying a step.
-TRIED, LEFT_BRANCH, SINGULAR, SENSELESS = range(4)
+TRIED, LEFT_BRANCH, SINGULAR, NOT_FINITE_AT_START = range(4)
 
 
 class StepMemory(NamedTuple):

@@ -22,10 +22,10 @@ from finger_pin.typing import Array
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
 _MOST_BYTES = 2e9
 # Room for so many of an island's to begin with; what is not used of it takes no memory.
-_ROOM = 8192
+_FIRST_RECORD_LENGTH = 8192
 
 # Slices of a simulation of several islands, between which it can be watched.
-_SLICES = 200
+_WATCHED_SLICES = 200
 
 
 class SampledController(Protocol):
@@ -53,7 +53,7 @@ class _Recorder:
         self._stepper, self._index = stepper, index
         part = self.part
         self.start = (part.time, part.x.copy(), part.attitude.copy())
-        self.room, self._chunk = part.room(_ROOM), chunk
+        self.room, self._chunk = part.room(_FIRST_RECORD_LENGTH), chunk
         self.step_count = 0
         self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
         # Compiling is no part of an integration's cost.
@@ -150,7 +150,7 @@ def integrate_compiled(
 def _next_end(stepper: Stepper, duration: float, controller: SampledController | None, sliced: bool) -> float:
     """Let a controller that is due act, and return the next time at which islands synchronise."""
     if controller is None:
-        return min(duration, stepper.time + duration / _SLICES) if sliced else duration
+        return min(duration, stepper.time + duration / _WATCHED_SLICES) if sliced else duration
     if stepper.time >= controller.instant:
         stepper.hold(controller.act(stepper.x))
     return min(duration, controller.instant)

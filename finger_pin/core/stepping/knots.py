@@ -8,7 +8,7 @@ from finger_pin.core.jit import CompiledFunction, Indices, StructType, Vector, c
 from finger_pin.core.stepping.integration import ADVANCE_ARGS, DONE, FULL, INTEGRATION
 
 # Times it, a positive number becomes the one before it.
-_BEFORE = 1.0 - 2.0**-53
+_PREVIOUS_FLOAT_FACTOR = 1.0 - 2.0**-53
 
 
 class AdvanceKnottedArgs(NamedTuple):
@@ -48,7 +48,7 @@ def advance_knotted(address: int, end: float) -> int:
             last: int = call_at(knotted.inner, knotted.inner_args, end)
             return last
         knot = knots[passed[0]]
-        status: int = call_at(knotted.inner, knotted.inner_args, knot * _BEFORE)
+        status: int = call_at(knotted.inner, knotted.inner_args, knot * _PREVIOUS_FLOAT_FACTOR)
         if status != DONE:
             return status
         memory.time[0] = knot

@@ -74,7 +74,7 @@ def repeat_steps(address: int, end: float) -> int:
             call_at(integration.events.forget, args.integration, 0.0)
         memory.fresh[0], memory.frozen[0], memory.taken_share[0] = 1.0, 1.0 * frozen, share
         outcome = try_counted(args.integration, integration, model, (goal - time) / share)
-        if outcome == at.SENSELESS:
+        if outcome == at.NOT_FINITE_AT_START:
             return at.NOT_FINITE
         if outcome == at.SINGULAR:
             return at.UNDERFLOW

@@ -7,7 +7,7 @@ import numpy as np
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import call_at, njit_always_inline
 from finger_pin.core.model import Model
-from finger_pin.core.stepping.integration import LEFT_BRANCH, SENSELESS, SINGULAR, TRIED, Integration
+from finger_pin.core.stepping.integration import LEFT_BRANCH, NOT_FINITE_AT_START, SINGULAR, TRIED, Integration
 
 
 @njit_always_inline
@@ -17,8 +17,8 @@ def try_step(address: int, integration: Integration, model: Model, time: float, 
     What depends on the start alone, f(t, x) and the linearisation, is kept for a second try.
 
     Returns:
-        `TRIED`; `LEFT_BRANCH`, if at a stage a branch is left that is frozen; `SINGULAR`, if g - J is; `SENSELESS`, if
-        f(t, x) is not finite.
+        `TRIED`; `LEFT_BRANCH`, if at a stage a branch is left that is frozen; `SINGULAR`, if g - J is;
+        `NOT_FINITE_AT_START`, if f(t, x) is not finite.
     """
     tableau, x, k, r, start = integration.tableau, integration.x, integration.k, integration.r, integration.start
     size, state, rate, events = x.size, model.state, model.rate, integration.events
@@ -42,7 +42,7 @@ def try_step(address: int, integration: Integration, model: Model, time: float, 
                 for c in range(size):
                     start[c] = rate[c]
                     if not np.isfinite(rate[c]):
-                        return SENSELESS
+                        return NOT_FINITE_AT_START
                 call_at(events.freeze, address, 0.0)
                 call_at(model.linearise, integration.model, time)
             if call_at(model.condense, integration.model, g) == 0:

@@ -13,7 +13,7 @@ from finger_pin.description.validation import Description, Name, choice, problem
 #: What a parameter of one recording begins with, before its name.
 OF_RECORDINGS = "recordings."
 #: Input of a motion that is given, not computed; what is then no output; and the output that is there then alone.
-IMPOSED, _KINEMATIC, _EFFORT = (
+IMPOSED, _KINEMATIC, _EFFORT_OUTPUTS = (
     "joint_position",
     ("joint_position", "joint_velocity", "joint_acceleration"),
     "joint_effort",
@@ -158,7 +158,7 @@ class RecordingSettings(TableFormat):
             variable = name.partition(".")[0]
             if self.imposed and variable in _KINEMATIC:
                 raise problem(f"outputs.{name}", f"cannot be compared: the inputs {IMPOSED} say it")
-            if not self.imposed and variable == _EFFORT:
+            if not self.imposed and variable == _EFFORT_OUTPUTS:
                 raise problem(f"outputs.{name}", f"is there where {IMPOSED} of every joint is an input of a motion")
         if self.imposed and self.start != "rest":
             raise problem("start", f"is for motions that are computed: the inputs {IMPOSED} say it", self.start)

@@ -29,12 +29,12 @@ from finger_pin.files import expand
 
 _TIMES = ("time", "t")
 # Rows that are so far apart on average, s, over so long a time are asked about; the units that they may be in.
-_FAR_APART, _LONG = 1.0, 60.0
+_LARGE_PERIOD, _LARGE_DURATION = 1.0, 60.0
 _SMALL_UNITS = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 # Times from here on, s, are of an epoch, and counted from the first: three years are no motion.
 _EPOCH = 1e8
 # A date and a time of ISO 8601, and the difference of its zone from UTC.
-_STAMP = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)\s*(?:Z|(?:([+-])(\d\d):?(\d\d)?))?")
+_ISO_DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)\s*(?:Z|(?:([+-])(\d\d):?(\d\d)?))?")
 # The part of a period, from one sample to the next, from which on the way round is not clear.
 _AMBIGUOUS = 0.45
 
@@ -163,8 +163,8 @@ class Table:
             raise InputError(entry, f"times must increase, two rows at least{where}")
         length, unknown = times[-1] - times[0], not dated and (column.unit or header_unit) is None
         apart = length / (len(times) - 1)
-        if unknown and column.scale == 1.0 and length >= _LONG and apart >= _FAR_APART:
-            unit = next((unit for unit in _SMALL_UNITS if apart * UNITS["s"][unit] < _FAR_APART), "ns")
+        if unknown and column.scale == 1.0 and length >= _LARGE_DURATION and apart >= _LARGE_PERIOD:
+            unit = next((unit for unit in _SMALL_UNITS if apart * UNITS["s"][unit] < _LARGE_PERIOD), "ns")
             asked = f"its {len(times)} rows take {length:g} s (is it in {_SMALL_UNITS[unit]}?)"
             answer = f'write {{ column = "{column.column}", unit = "{unit}" }}, or unit = "s" if they do'
             raise InputError(entry, f"{asked}; {answer}", column.column)
@@ -231,7 +231,7 @@ def _dates(entry: str, column: Column, name: str, cells: NDArray[Any]) -> NDArra
     instants = np.zeros(len(cells), dtype="datetime64[ns]")
     zones = set()
     for row, cell in enumerate(cells):
-        match = _STAMP.fullmatch(cell.strip()) if isinstance(cell, str) else None
+        match = _ISO_DATE.fullmatch(cell.strip()) if isinstance(cell, str) else None
         try:
             instants[row] = np.datetime64(match[1].replace(",", "."), "ns")  # type: ignore[index]
         except (TypeError, ValueError):

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from finger_pin.description.recordings.columns import read_signals
-from finger_pin.description.tables import PACKED
+from finger_pin.description.tables import PACKED_PREFIX
 from finger_pin.description.validation import Table, as_table
 from finger_pin.description.winding import COMMANDS, command_place
 from finger_pin.exceptions import InputError
@@ -81,9 +81,9 @@ def _share_times(table: Table) -> None:
                 continue
             inner.append((f"{place}{name}.", entry))
             times = entry.get("times")
-            if isinstance(times, str) and not times.startswith(PACKED):
+            if isinstance(times, str) and not times.startswith(PACKED_PREFIX):
                 shared = as_table(around.get(times)).get("times")
-                if not shared or (isinstance(shared, str) and not shared.startswith(PACKED)):
+                if not shared or (isinstance(shared, str) and not shared.startswith(PACKED_PREFIX)):
                     allowed = "must be a list of numbers, or the name of another signal here that has one"
                     raise InputError(f"{place}{name}.times", allowed, times)
                 entry["times"] = shared

@@ -8,7 +8,7 @@ import re
 from finger_pin.description.validation import nearest, suggestion
 from finger_pin.exceptions import InputError
 
-_POUND, _GRAVITY = 0.45359237, 9.80665
+_KILOGRAMS_PER_POUND, _STANDARD_GRAVITY = 0.45359237, 9.80665
 #: By SI unit, the units that a column may have and what one of each is.
 UNITS: dict[str, dict[str, float]] = {
     "N": {
@@ -16,11 +16,11 @@ UNITS: dict[str, dict[str, float]] = {
         "mN": 1e-3,
         "cN": 1e-2,
         "kN": 1e3,
-        "gf": 1e-3 * _GRAVITY,
-        "kgf": _GRAVITY,
-        "lbf": _POUND * _GRAVITY,
+        "gf": 1e-3 * _STANDARD_GRAVITY,
+        "kgf": _STANDARD_GRAVITY,
+        "lbf": _KILOGRAMS_PER_POUND * _STANDARD_GRAVITY,
     },
-    "N m": {"N m": 1.0, "N mm": 1e-3, "mN m": 1e-3, "N cm": 1e-2, "kgf cm": 1e-2 * _GRAVITY},
+    "N m": {"N m": 1.0, "N mm": 1e-3, "mN m": 1e-3, "N cm": 1e-2, "kgf cm": 1e-2 * _STANDARD_GRAVITY},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
     "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
     "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "rev": 2.0 * math.pi},
@@ -30,7 +30,13 @@ UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
 }
 # Further units, by the one above that they are so many of, and prefixes of those that have any.
-_FURTHER = {"min": ("s", 60.0), "h": ("s", 3600.0), "ozf": ("lbf", 0.0625), "dyn": ("N", 1e-5), "ft": ("in", 12.0)}
+_FURTHER_UNITS = {
+    "min": ("s", 60.0),
+    "h": ("s", 3600.0),
+    "ozf": ("lbf", 0.0625),
+    "dyn": ("N", 1e-5),
+    "ft": ("in", 12.0),
+}
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
 _PREFIXED = ("N", "m", "rad", "A", "V", "s")
 # Other spellings: of one sign, and of whole units.
@@ -41,13 +47,13 @@ _SPELLINGS = {"Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "rev/min
 BRACKETED = re.compile(r"(.+?)\s*[(\[]\s*(.+?)\s*[)\]]")
 APPENDED = re.compile(r"(.+)_(s|ms|us|ns|rad|mrad|deg|mN|gf|kgf)")
 # What stands in brackets for no unit.
-_NO_UNIT = ("1", "-")
+_DIMENSIONLESS = ("1", "-")
 
 
 def split_unit(name: str, *patterns: re.Pattern[str]) -> tuple[str, str | None]:
     """Return a name without its unit, and the unit: what is in brackets, known or not."""
     for match in filter(None, (pattern.fullmatch(name) for pattern in patterns)):
-        return match[1], None if match[2] in _NO_UNIT else match[2]
+        return match[1], None if match[2] in _DIMENSIONLESS else match[2]
     return name, None
 
 
@@ -62,8 +68,8 @@ def parse_unit(text: str) -> tuple[str, float] | None:
     for si, units in UNITS.items():
         if spelled in units:
             return si, units[spelled]
-    if spelled in _FURTHER:
-        unit, count = _FURTHER[spelled]
+    if spelled in _FURTHER_UNITS:
+        unit, count = _FURTHER_UNITS[spelled]
         known = parse_unit(unit)
         return known and (known[0], count * known[1])
     if spelled[:1] in _PREFIXES and spelled[1:] in _PREFIXED:

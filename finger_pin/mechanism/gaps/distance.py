@@ -33,10 +33,10 @@ from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_matrix, turned
 # for its opposite, which is no normal of a face and lies on no plane of symmetry of a shape.
 _POLE_X, _POLE_Y, _POLE_Z = 2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0
 #: Tangents of that direction.
-FIRST, SECOND = (3.0 / 7.0, -6.0 / 7.0, 2.0 / 7.0), (6.0 / 7.0, 2.0 / 7.0, -3.0 / 7.0)
+POLE_TANGENT_1, POLE_TANGENT_2 = (3.0 / 7.0, -6.0 / 7.0, 2.0 / 7.0), (6.0 / 7.0, 2.0 / 7.0, -3.0 / 7.0)
 _LEAST = 1e-12
 # The level is iterated to this, m, in so many steps at most.
-_CLOSE, _MOST_STEPS = 1e-15, 40
+_LEVEL_ACCURACY, _MOST_STEPS = 1e-15, 40
 
 
 def _offset_slopes(w: Any, p: Any) -> Any:
@@ -99,7 +99,7 @@ def _level_of_core(y: Any, p: Any) -> Any:
         if u == end and excess <= 0.0:
             return far - most, size, most, 0.0, 0.0, (1.0 / least if size < 1.0 else 0.0), s, x, y_, z
         step = excess / (1.0 + (spread - 1.0) * rate)
-        if abs(step) < _CLOSE:
+        if abs(step) < _LEVEL_ACCURACY:
             break
         low, high = (low, u) if excess > 0.0 else (u, high)
         # By Newton, or by halves where that leaves what is known of the root.
@@ -133,8 +133,8 @@ def _value(y: Any, p: Any, out: Any) -> None:
     x_, y_, z_ = y[0] + s * (y[3] - y[0]) + r_x, y[1] + s * (y[4] - y[1]) + r_y, y[2] + s * (y[5] - y[2]) + r_z
     _, u, v, w, _, _, _, _, _, _ = surface(x_, y_, z_, p, sunk)
     out[0] = level - p[GAP.rounding] - p[GAP.radius]
-    tangent(u, v, w, FIRST, out, 7)
-    tangent(u, v, w, SECOND, out, 10)
+    tangent(u, v, w, POLE_TANGENT_1, out, 7)
+    tangent(u, v, w, POLE_TANGENT_2, out, 10)
     for i in range(7, 13):
         out[i] *= size
     out[1], out[2], out[3] = size * u, size * v, size * w
@@ -256,8 +256,8 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         out[18 + j] = dx - back * du - 0.5 * slope * size * u
         out[24 + j] = dy - back * dv - 0.5 * slope * size * v
         out[30 + j] = dz - back * dw - 0.5 * slope * size * w
-        tangent_slope(unit, moved, growing, FIRST, out, 36 + j)
-        tangent_slope(unit, moved, growing, SECOND, out, 54 + j)
+        tangent_slope(unit, moved, growing, POLE_TANGENT_1, out, 36 + j)
+        tangent_slope(unit, moved, growing, POLE_TANGENT_2, out, 54 + j)
 
 
 #: The gap between a part of a body and a rounded prism; sizes of the latter from `prism_parameters`.

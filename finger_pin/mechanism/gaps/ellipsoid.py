@@ -8,7 +8,7 @@ from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_matrix, perpen
 
 _MOST_STEPS = 60
 # Weight, in parts of a quadratic function's own, of the way from where one is: what is undetermined stays there.
-_LEAST = 1e-6
+_INERTIA_SHARE = 1e-6
 # So far inside the ball, or nearer, a point lies on its surface.
 _ON_SURFACE = 1e-6
 
@@ -27,7 +27,7 @@ def on_ball(h: Any, start: Any) -> Any:
     ``h`` has H as xx, xy, xz, yy, yz, zz, then g.
     """
     pull, u, far = 0.0, (0.0, 0.0, 0.0), 0.0
-    k = _LEAST * (h[0] + h[3] + h[5])
+    k = _INERTIA_SHARE * (h[0] + h[3] + h[5])
     xx, yy, zz = h[0] + k, h[3] + k, h[5] + k
     for _ in range(_MOST_STEPS):
         inverse = inverse_matrix(xx + pull, h[1], h[2], yy + pull, h[4], zz + pull)

@@ -13,14 +13,14 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from finger_pin.mechanism.gaps.distance import FIRST, SECOND, tangent, tangent_slope
+from finger_pin.mechanism.gaps.distance import POLE_TANGENT_1, POLE_TANGENT_2, tangent, tangent_slope
 from finger_pin.mechanism.gaps.ellipsoid import semi_axes
 from finger_pin.mechanism.gaps.nearest import SignedDistance
 from finger_pin.mechanism.gaps.vectors import cross, dot, inverse_matrix, perpendicular_vectors, size, turned
 
 _MOST_STEPS, _MOST_HALVINGS = 60, 40
 # Newton's steps end below this angle, rad; and where the maximum is not sharp, they go as if it were by this part.
-_CLOSE, _LEAST = 1e-15, 1e-3
+_LEAST_TURN, _LEAST_CURVATURE_SHARE = 1e-15, 1e-3
 
 
 class _Parameters(NamedTuple):
@@ -32,7 +32,7 @@ class _Parameters(NamedTuple):
     z: int
 
 
-_P = _Parameters(*range(4))
+_PARAMETERS = _Parameters(*range(4))
 
 
 def _squared(f: Any, g: Any, e: Any) -> Any:
@@ -83,9 +83,16 @@ def _unit(x: float, y: float, z: float) -> Any:
 
 def _normal(y: Any, p: Any) -> Any:
     """Return n, and M M^T and B B^T."""
-    f, g, e = semi_axes(y, p[_P.third])
+    f, g, e = semi_axes(y, p[_PARAMETERS.third])
     one, centre = _squared(f, g, e), (y[0], y[1], y[2])
-    two = (p[_P.x] * p[_P.x], 0.0, 0.0, p[_P.y] * p[_P.y], 0.0, p[_P.z] * p[_P.z])
+    two = (
+        p[_PARAMETERS.x] * p[_PARAMETERS.x],
+        0.0,
+        0.0,
+        p[_PARAMETERS.y] * p[_PARAMETERS.y],
+        0.0,
+        p[_PARAMETERS.z] * p[_PARAMETERS.z],
+    )
     both = inverse_matrix(one[0] + two[0], one[1], one[2], one[3] + two[3], one[4], one[5] + two[5])
     x, y_, z = turned(both, y[0], y[1], y[2])
     n = _unit(x, y_, z)
@@ -98,7 +105,7 @@ def _normal(y: Any, p: Any) -> Any:
         ss, st, tt = _bent(s, t, slope, other, dot(n, way))
         # What turns no maximum into one: the least eigenvalue is lifted.
         least = 0.5 * (ss + tt) - (0.25 * (ss - tt) * (ss - tt) + st * st) ** 0.5
-        lift = max(_LEAST * (abs(ss) + abs(tt)) - least, 0.0)
+        lift = max(_LEAST_CURVATURE_SHARE * (abs(ss) + abs(tt)) - least, 0.0)
         ss, tt = ss + lift, tt + lift
         by_s, by_t, whole = dot(s, way), dot(t, way), 1.0 / (ss * tt - st * st)
         a, b = (tt * by_s - st * by_t) * whole, (ss * by_t - st * by_s) * whole
@@ -113,7 +120,7 @@ def _normal(y: Any, p: Any) -> Any:
                 break
             share *= 0.5
         gap = better
-        if abs(a) + abs(b) < _CLOSE:
+        if abs(a) + abs(b) < _LEAST_TURN:
             break
     return n, one, two
 
@@ -123,8 +130,8 @@ def _value(y: Any, p: Any, out: Any) -> None:
     far, _, _ = _support(one, n)
     near, there, _ = _support(two, n)
     out[0] = dot(n, (y[0], y[1], y[2])) - far - near
-    tangent(n[0], n[1], n[2], FIRST, out, 7)
-    tangent(n[0], n[1], n[2], SECOND, out, 10)
+    tangent(n[0], n[1], n[2], POLE_TANGENT_1, out, 7)
+    tangent(n[0], n[1], n[2], POLE_TANGENT_2, out, 10)
     for i in range(3):
         out[1 + i], out[4 + i] = n[i], there[i] + 0.5 * out[0] * n[i]
 
@@ -155,8 +162,8 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         for i in range(3):
             out[6 * i + j] = turning[i]
             out[18 + 6 * i + j] = slid[i] + 0.5 * (rises * n[i] + gap * turning[i])
-        tangent_slope(n, turning, 0.0, FIRST, out, 36 + j)
-        tangent_slope(n, turning, 0.0, SECOND, out, 54 + j)
+        tangent_slope(n, turning, 0.0, POLE_TANGENT_1, out, 36 + j)
+        tangent_slope(n, turning, 0.0, POLE_TANGENT_2, out, 54 + j)
 
 
 #: The gap between a body's ellipsoid, seen as three points, and another one, by its semi-axes, m.

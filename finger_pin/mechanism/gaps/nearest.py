@@ -32,7 +32,7 @@ EPSILON = 1e-5
 INSIDE = 1e-9
 _MOST_STEPS = 60
 # By so much a step along a line lessens the slope of F.
-_ENOUGH = 0.1
+_SLOPE_REDUCTION = 0.1
 _ROUNDING = 1e-9
 
 
@@ -190,7 +190,7 @@ def _line_search(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: A
             above, share = rise, 0.0
             continue
         if k == 1:
-            if above <= -_ENOUGH * rise or rise >= 0.0:
+            if above <= -_SLOPE_REDUCTION * rise or rise >= 0.0:
                 return 1.0
             below = first = rise
         # The rule of false position after Illinois.
@@ -200,7 +200,7 @@ def _line_search(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: A
         else:
             low, below, above = share, rise, (0.5 * above if side < 0 else above)
             side = -1
-        if k > 1 and abs(rise) <= -_ENOUGH * first:
+        if k > 1 and abs(rise) <= -_SLOPE_REDUCTION * first:
             break
         share = (low * above - high * below) / (above - below)
     return share

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 #: A half-space is a core so deep below its surface, m, with that rounding: what penetrates it stays outside the core.
-DEEP = 1.0
+HALF_SPACE_DEPTH = 1.0
 
 
 class GapParameters(NamedTuple):
@@ -44,7 +44,7 @@ def prism_parameters(shape: str, sizes: Any, fillet: float = 0.0) -> tuple[float
         fillet: Radius with which edges of a box, or the rims of a cylinder, are rounded, m.
     """
     if shape == "half_space":
-        return np.inf, np.inf, 0.0, -np.inf, -DEEP, DEEP
+        return np.inf, np.inf, 0.0, -np.inf, -HALF_SPACE_DEPTH, HALF_SPACE_DEPTH
     if shape == "sphere":
         return 0.0, 0.0, 0.0, 0.0, 0.0, sizes[0]
     if shape == "box":

@@ -16,7 +16,7 @@ from finger_pin.mechanism.spans import CYLINDER, STRAIGHT
 from finger_pin.typing import Array
 
 #: Drawn sag of a loose span in parts of its length, and lift of a loose arc off its pulley in parts of its radius.
-SAG, LIFT = 0.12, 0.15
+DRAWN_SAG, DRAWN_LIFT = 0.12, 0.15
 # Points of a leg that may wrap.
 _POINTS = 12
 
@@ -60,7 +60,7 @@ class WoundSpan:
             down: Direction of gravity.
         """
         rotation, translation = poses.rotation[..., self.link, :, :], poses.translation[..., self.link, None, :]
-        sag = (SAG * loose * self.sag)[..., None] * down
+        sag = (DRAWN_SAG * loose * self.sag)[..., None] * down
         return np.asarray(self.points @ np.swapaxes(rotation, -1, -2) + translation + sag)
 
     def moved(self, place: pin.SE3, first: int) -> WoundSpan:
@@ -103,7 +103,7 @@ class Arc:
         rotation, translation = poses.rotation[..., self.joint, :, :], poses.translation[..., self.joint, None, :]
         theta = position[..., self.joint - 1, None]
         direction = self.entry - theta + self.fraction * (self.turn + theta)
-        radius = self.radius * (1.0 + LIFT * loose * np.sin(math.pi * self.fraction))
+        radius = self.radius * (1.0 + DRAWN_LIFT * loose * np.sin(math.pi * self.fraction))
         offset = np.broadcast_to(self.offset, direction.shape)
         local = np.stack([-radius * np.sin(direction), radius * np.cos(direction), offset], axis=-1)
         return np.asarray(local @ np.swapaxes(rotation @ self.frame, -1, -2) + translation)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 #: Which way the path goes.
 FREE, SHORT_WAY, LONG_WAY, INSIDE = range(4)
 # Below this, a length or a radius is none, as in MuJoCo.
-_TINY = 1e-15
+_LENGTH_ROUNDING = 1e-15
 _MOST_STEPS = 50
 
 
@@ -52,7 +52,7 @@ def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: A
         has_side: Whether there is a side point.
         inside: Whether the path passes inside.
     """
-    if radius < _TINY or min(r0, r1) <= radius:
+    if radius < _LENGTH_ROUNDING or min(r0, r1) <= radius:
         return FREE
     touching = math.acos(radius / r0) + math.acos(radius / r1)
     if inside != 0.0:

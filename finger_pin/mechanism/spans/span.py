@@ -35,12 +35,12 @@ class WrapSegment:
 #: point that another body carries is a third point in y, and inside if it is nearer than the radius.
 WRAP = ("radius", "side_x", "side_y", "side_z", "has_side", "inside")
 #: What ``has_side`` is for a side point in y.
-ELSEWHERE = 2.0
+SIDE_ON_OTHER_BODY = 2.0
 
 
 def side_point(y: Any, p: Any) -> Any:
     """Return the side point, seen from the wrap, and whether the path passes inside."""
-    if p[4] != ELSEWHERE:
+    if p[4] != SIDE_ON_OTHER_BODY:
         return p[1], p[2], p[3], p[5]
     near = y[6] * y[6] + y[7] * y[7] + y[8] * y[8] < p[0] * p[0]
     return y[6], y[7], y[8], 1.0 if near else 0.0
