@@ -136,7 +136,9 @@ def test_every_equation_of_the_paper_has_its_place_in_the_code():
 
 
 # Columns of arrays and names of outcomes: no thresholds.
-INDICES = {f"continuous.{name}" for name in ("NOTHING_MISSED", "MISSED_BY_CULLING", "_SHARE", "_GAP", "_NORMAL", "_FAR")}
+INDICES = {
+    f"continuous.{name}" for name in ("NOTHING_MISSED", "MISSED_BY_CULLING", "_SHARE", "_GAP", "_NORMAL", "_FAR")
+}
 
 
 def test_every_threshold_of_events_and_collision_has_a_name_and_stands_in_the_notes_with_its_value():

@@ -191,8 +191,8 @@ def fill(
     loaded, count = bool(np.any(forces)), len(states)
 
     def fill_part(model: BoundModel, part: slice) -> None:
-        asked = buffer.states(part, model.address, states, commands, forces, bases, attitudes)
-        call(evaluate_many, asked, STATES)
+        batch = buffer.states(part, model.address, states, commands, forces, bases, attitudes)
+        call(evaluate_many, batch, STATES)
 
     if count < MIN_STATES_PER_THREAD or threads() < 2:
         fill_part(models.model(loaded), slice(None))

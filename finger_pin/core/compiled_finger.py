@@ -69,18 +69,20 @@ class CompiledMechanism:
         mechanism, (columns, rows) = self.mechanism, self.models.model().model.work.rows.shape
         forces_only, width = outputs == "row_forces", mechanism.coordinates
         # Of states whose rows are kept, and of those whose sums are.
-        kept, summed = 0 if outputs == "powers" else count, 0 if forces_only else count
+        row_states, summed_states = 0 if outputs == "powers" else count, 0 if forces_only else count
         return SignalBuffer(
             packed=np.empty((count, mechanism.size)),
             rates=np.empty((count if outputs == "all" else 0, self.charts.size)),
-            rows=np.empty((1 if forces_only else columns, kept, rows)),
+            rows=np.empty((1 if forces_only else columns, row_states, rows)),
             first=0,
             column=ROW.force if forces_only else 0,
-            torques=np.empty((summed, width)),
-            externals=np.empty((summed, width)),
-            energy_terms=np.empty((summed, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
+            torques=np.empty((summed_states, width)),
+            externals=np.empty((summed_states, width)),
+            energy_terms=np.empty((summed_states, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
             # Of what touches, forces are added up.
-            touches=np.zeros((min(kept, summed), self.structure.contact_rows // self.structure.contact_arms, 9)),
+            touches=np.zeros(
+                (min(row_states, summed_states), self.structure.contact_rows // self.structure.contact_arms, 9)
+            ),
         )
 
     def to_evaluation(self, buffer: SignalBuffer, at: slice | int = slice(None)) -> Evaluation:
@@ -158,10 +160,10 @@ class CompiledMechanism:
         alone = position.ndim == 1
         count = 1 if alone else len(position)
         # A few postures after the other are asked for in loops: what is bound once serves them all.
-        kept = count < MIN_STATES_PER_THREAD and base is None
-        buffers = self._motions.get(count) if kept else None
+        reusable = count < MIN_STATES_PER_THREAD and base is None
+        buffers = self._motions.get(count) if reusable else None
         motions, tips, block = buffers or self._bound_motions(count, base)
-        if kept:
+        if reusable:
             self._motions[count] = motions, tips, block
         motions.positions[:], motions.velocities[:] = position, velocity
         motion_many(block.address)

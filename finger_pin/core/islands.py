@@ -38,10 +38,10 @@ def _read_coordinates(control: InputTable) -> NDArray[np.bool_]:
     return np.asarray((control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0)))
 
 
-def _island_key(structure: Structure, control: InputTable, *more: bool) -> tuple[object, ...]:
+def _island_key(structure: Structure, control: InputTable, *options: bool) -> tuple[object, ...]:
     """Return all that islands depend on."""
     wires = control.loop.tobytes(), control.channel.tobytes(), _read_coordinates(control).tobytes()
-    return (structure, *wires, control.kind, len(control.tension), len(control.minimum), *more)
+    return (structure, *wires, control.kind, len(control.tension), len(control.minimum), *options)
 
 
 @memoised(_island_key)
@@ -58,8 +58,8 @@ def find_islands(structure: Structure, control: InputTable, touching: bool = Tru
     links.append((moved, structure.parents[moved]))
     for start, at in ((structure.arm_start, structure.arm_at), (structure.bend_start, structure.bend_at)):
         owners = np.repeat(np.arange(count), np.diff(start))
-        kept = touching | (structure.touch[owners] == 0)
-        links.append((row_at + owners[kept], at[kept]))
+        coupling = touching | (structure.touch[owners] == 0)
+        links.append((row_at + owners[coupling], at[coupling]))
     for start in (structure.input_start, structure.load_start):
         owners = np.repeat(np.arange(count), np.diff(start))
         links.append((row_at + owners, row_at + structure.terms[start[0] : start[-1]]))

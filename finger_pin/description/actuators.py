@@ -165,8 +165,8 @@ class Motor(Description):
             return self.torque_constant, self.resistance, friction
         resistance = self.voltage / sheet.stall_current
         constant = math.sqrt(sheet.stall_torque * resistance / sheet.no_load_speed)
-        dry = constant * sheet.stall_current - sheet.stall_torque
-        return constant, resistance, dry if friction is None else friction
+        friction_torque = constant * sheet.stall_current - sheet.stall_torque
+        return constant, resistance, friction_torque if friction is None else friction
 
 
 class PositionLoop(Description):

@@ -45,11 +45,11 @@ def memoised(
     """
 
     def decorate(function: Callable[_P, _Made]) -> Callable[_P, _Made]:
-        known = lru_cache(most)(_Call[_Made].made)
+        remembered = lru_cache(most)(_Call[_Made].made)
 
         @wraps(function)
         def remembering(*arguments: _P.args, **options: _P.kwargs) -> _Made:
-            return known(_Call(parts(*arguments, **options), lambda: function(*arguments, **options)))
+            return remembered(_Call(parts(*arguments, **options), lambda: function(*arguments, **options)))
 
         return remembering
 

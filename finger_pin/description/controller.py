@@ -217,9 +217,9 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
     limits = settings.distribution
     if limits is not None:
         sizes.append(("distribution.maximum_tension", limits.maximum_tension, of_tendons))
-    for entry, value, (names, what) in sizes:
+    for entry, value, (names, kind) in sizes:
         if value is not None:
-            check_size(value, names, f"controller.{entry}", what)
+            check_size(value, names, f"controller.{entry}", kind)
     if limits is not None:
         for name, low, high in zip(
             tendons,

@@ -235,8 +235,8 @@ def without_unread(inherited: dict[str, Any], choices: dict[str, Any]) -> dict[s
 
 def refuse_idle(described: Description, rules: tuple[Rule, ...]) -> None:
     """Raise the error of the first entry that is given and has no effect."""
-    for entry, value, says in idle(described, rules):
-        raise problem(entry, says, shown(value))
+    for entry, value, message in idle(described, rules):
+        raise problem(entry, message, shown(value))
 
 
 def shown(value: Any) -> Any:

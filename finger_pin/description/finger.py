@@ -111,14 +111,14 @@ class FingerDescription(Description):
 
     def _expand(self) -> PerItem:
         """Refuse lists of another length than their joints or tendons, and expand one number for all."""
-        for group, names, what in (
+        for group, names, kind in (
             ("tendon_friction", (*self.tendons, *self.canals), "tendon"),
             ("joint_friction", tuple(self.joints), "joint"),
             ("passive_tendon", self.passive_names, "passive tendon"),
             ("stroke_limiter", tuple(self.joints), "joint"),
         ):
             for field, value in getattr(self, group):
-                check_size(value, names, f"{group}.{field}", what)
+                check_size(value, names, f"{group}.{field}", kind)
             self._numbers[group] = per_item(getattr(self, group), len(names))
         return self._numbers
 

@@ -152,19 +152,19 @@ class JointFrictionSettings(Description):
 
 
 def bristles(
-    law: JointFrictionSettings | TendonFrictionSettings, numbers: Mapping[str, Array], more: Number = 0.0
+    law: JointFrictionSettings | TendonFrictionSettings, numbers: Mapping[str, Array], extra: Number = 0.0
 ) -> dict[str, Array]:
     """Return the numbers that friction of tendons and of joints share, by the laws' names, one per item.
 
     Args:
         law: Numbers of friction.
         numbers: Those of ``law``, one per tendon or joint.
-        more: Level without load besides the drag and the floor of ``law``, of the same unit.
+        extra: Level without load besides the drag and the floor of ``law``, of the same unit.
     """
     names = ("viscous", "stribeck_velocity", "floor", "stribeck_exponent")
     shared: dict[str, Array] = {name: numbers[name] for name in names}
     softest, give = _TENDON_BRISTLES if isinstance(law, TendonFrictionSettings) else _JOINT_BRISTLES
-    level = np.maximum(np.maximum(numbers["drag"], numbers["floor"]), more)
+    level = np.maximum(np.maximum(numbers["drag"], numbers["floor"]), extra)
     # In a hand some fingers may give it.
     stiffness = numbers.get("stiffness", np.full(len(numbers["floor"]), math.nan))
     free = np.isnan(stiffness)

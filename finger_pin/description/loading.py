@@ -31,12 +31,12 @@ DescriptionLike: TypeAlias = FingerDescription | Scenario | str | Path
 
 
 @contextmanager
-def _depth_limited(what: str) -> Iterator[None]:
+def _depth_limited(kind: str) -> Iterator[None]:
     """Refuse, in one line, what is nested more deeply than calls can be."""
     try:
         yield
     except RecursionError:
-        raise InputError(what, "is nested too deeply") from None
+        raise InputError(kind, "is nested too deeply") from None
 
 
 def load_finger(name: str | Path | FingerDescription, overrides: Mapping[str, Any] | None = None) -> FingerDescription:
@@ -146,8 +146,8 @@ def load_bench(
     """
     benches = shipped("benches")
     if isinstance(name, str) and not is_path(name) and name not in {**benches, **shipped("scenarios")}:
-        near = suggestion(name, benches)
-        allowed = f"no such bench; there are {', '.join(benches)}, or the path of a .toml file{near}"
+        hint = suggestion(name, benches)
+        allowed = f"no such bench; there are {', '.join(benches)}, or the path of a .toml file{hint}"
         raise InputError("bench", allowed, name)
     table, folder = ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(str(name), Path(), bench=True)
     entries = merge(as_table(table.pop("identify", None)), dict(identify or {}))

@@ -46,18 +46,18 @@ def _read(kind: str, name: str, folder: Path, entry: str = "") -> tuple[Table, P
     if not is_path(name):
         names = shipped_texts(f"{kind}s")
         if name not in names:
-            near = suggestion(name, [*names, *(shipped_texts("benches") if kind == "scenario" else ())])
-            allowed = f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{near}"
+            hint = suggestion(name, [*names, *(shipped_texts("benches") if kind == "scenario" else ())])
+            allowed = f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{hint}"
             raise InputError(entry or kind, allowed, name)
         return shipped_table(f"{kind}s", name), Path(name)
-    what, path = f"{kind} file {name}", folder / expand(name)
-    text = read_text(what, path)
+    label, path = f"{kind} file {name}", folder / expand(name)
+    text = read_text(label, path)
     try:
         return tomllib.loads(text), path
     except RecursionError:
-        raise InputError(what, "is nested too deeply") from None
+        raise InputError(label, "is nested too deeply") from None
     except ValueError as error:
-        raise InputError(what, f"is not valid TOML: {error}") from None
+        raise InputError(label, f"is not valid TOML: {error}") from None
 
 
 def kind_of(name: str, folder: Path = Path()) -> str:
@@ -244,20 +244,20 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
     hand = {key: as_table(each).get("finger") for key, each in placed_fingers(table).items()}
     # A signal for a joint or a tendon that is there may have no entry of its own yet.
     present: dict[tuple[str, ...], tuple[str, Iterable[str]]] = {}
-    for place, what in _BY_NAME.items():
-        present[place] = ("finger", hand) if hand else (what, as_table(finger.get(f"{what}s")))
+    for place, kind in _BY_NAME.items():
+        present[place] = ("finger", hand) if hand else (kind, as_table(finger.get(f"{kind}s")))
         for key, table_of_finger in hand.items():
-            present[*place, key] = what, as_table(as_table(table_of_finger).get(f"{what}s"))
+            present[*place, key] = kind, as_table(as_table(table_of_finger).get(f"{kind}s"))
     if hand := hand or as_table(as_table(finger.get("tree")).get("tips")):
         present |= {("controller", "fingers"): ("finger", hand), ("environment", "fingers"): ("finger", hand)}
     present["environment", "objects"] = "object", siblings
     field = find_field(Scenario, owner) if owner else None
     if tuple(owner) not in present and (field is None or get_origin(field.annotation) is not dict):
         return
-    what, names = present.get(tuple(owner), (owner[-1].removesuffix("s"), siblings))
+    kind, names = present.get(tuple(owner), (owner[-1].removesuffix("s"), siblings))
     if name not in names:
-        allowed = f"no such {what}; there are {', '.join(names) or 'none'}"
-        if not names and (what == "object" or tuple(owner) not in present):
+        allowed = f"no such {kind}; there are {', '.join(names) or 'none'}"
+        if not names and (kind == "object" or tuple(owner) not in present):
             allowed = f"{allowed}; {'.'.join(owner)} = {{ {name} = {{ ... }} }} puts it there"
         raise InputError(".".join(path), f"{allowed}{suggestion(name, names)}")
 
@@ -270,8 +270,8 @@ def _normalised(overrides: Mapping[str, Any], sections: Iterable[str]) -> Table:
     for key, value in _flatten_overrides(overrides):
         first, *rest = key.split(".")
         if first not in sections:
-            near = nearest(first, sections)
-            hint = f"; did you mean {'.'.join([near, *rest])}?" if near else ""
+            nearest_section = nearest(first, sections)
+            hint = f"; did you mean {'.'.join([nearest_section, *rest])}?" if nearest_section else ""
             raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(sections))}{hint}")
         if _PLACE.fullmatch(key) and isinstance(value, str):
             # Another finger at the same place.

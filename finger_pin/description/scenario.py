@@ -94,8 +94,8 @@ class Scenario(Description):
             if chosen_loop or any(key.startswith(prefix) for key in self.reference.joints):
                 continue
             if (self._part(name, alone[name]) if alone else self)._is_open():
-                kept = {key: getattr(settings, key) for key in settings.model_fields_set - {"sampling", "fingers"}}
-                chosen[name] = ControllerSettings().updated(**kept, kind="tensions")
+                entries = {key: getattr(settings, key) for key in settings.model_fields_set - {"sampling", "fingers"}}
+                chosen[name] = ControllerSettings().updated(**entries, kind="tensions")
         if len(chosen) == max(len(alone), 1):
             object.__setattr__(self, "controller", self.controller.updated(kind="tensions"))
         elif chosen:
@@ -119,12 +119,12 @@ class Scenario(Description):
         ineffective = {name: {entry: rest for entry, *rest in idle(part, OF_SCENARIO)} for name, part in parts.items()}
         for name, entries in ineffective.items():
             settings = (self.controller.fingers or {}).get(name)
-            for entry, (value, says) in entries.items():
+            for entry, (value, message) in entries.items():
                 table, key = entry.split(".", 1)
                 if settings is not None and key in settings.model_fields_set:
-                    raise problem(f"{table}.fingers.{name}.{key}", says, shown(value))
+                    raise problem(f"{table}.fingers.{name}.{key}", message, shown(value))
                 if all(entry in each for each in ineffective.values()):
-                    raise problem(entry, says, shown(value))
+                    raise problem(entry, message, shown(value))
 
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -196,9 +196,9 @@ class Scenario(Description):
     @property
     def keyframe(self) -> Keyframe | None:
         """The posture of a tree that the run starts from, and the inputs that go with it; None without any."""
-        known, initial = self.finger.tree.keyframes, self.simulation.initial
+        keyframes, initial = self.finger.tree.keyframes, self.simulation.initial
         name = initial.keyframe if initial else None
-        return known[name] if name else next(iter(known.values()), None)
+        return keyframes[name] if name else next(iter(keyframes.values()), None)
 
     def _check_names(self) -> None:
         """Refuse a table for a joint or a finger that is not there."""
@@ -229,13 +229,13 @@ class Scenario(Description):
                 raise problem(f"controller.fingers.{name}.{entry}", "is of a hand's finger; a tip has fingertip_force")
             if "sampling" in settings.model_fields_set:
                 raise problem(f"controller.fingers.{name}.sampling", "is the same for all: set controller.sampling")
-        for table, (names, what, allowed) in tables.items():
+        for table, (names, kind, allowed) in tables.items():
             for name in names:
                 if name not in allowed:
                     hint = suggestion(name, allowed)
-                    missing = "there is none" if what == "keyframe" else "there is no hand"
-                    listed = f"the {what}s are {', '.join(allowed)}" if allowed else missing
-                    raise problem(f"{table}.{name}", f"no such {what}; {listed}{hint}")
+                    missing = "there is none" if kind == "keyframe" else "there is no hand"
+                    listed = f"the {kind}s are {', '.join(allowed)}" if allowed else missing
+                    raise problem(f"{table}.{name}", f"no such {kind}; {listed}{hint}")
 
     def _check(self) -> None:
         """Refuse tables of a finger that do not fit each other."""

@@ -94,10 +94,12 @@ def check_currents(actuators: dict[str, Actuator], tension: dict[str, float]) ->
         constant, resistance, _ = motor.constants
         needed = abs(float(actuator.radii @ taut)) / constant
         if needed > min(motor.maximum_current, motor.voltage / resistance):
-            what = ", ".join(f"{each:.3g} N of {tendon}" for each, tendon in zip(taut, actuator.tendons, strict=True))
+            tensions = ", ".join(
+                f"{each:.3g} N of {tendon}" for each, tendon in zip(taut, actuator.tendons, strict=True)
+            )
             if needed > motor.maximum_current:
                 entry, limit, unit = "maximum_current", motor.maximum_current, "A"
             else:
                 entry, limit, needed, unit = "voltage", motor.voltage, needed * resistance, "V"
-            allowed = f"pretension alone needs {needed:.3g} {unit}: {what} at rest"
+            allowed = f"pretension alone needs {needed:.3g} {unit}: {tensions} at rest"
             raise problem(f"finger.actuators.{name}.motor.{entry}", allowed, limit)

@@ -49,15 +49,15 @@ class Tree(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        known: list[str] = []
+        earlier: list[str] = []
         for name, body in self.bodies.items():
-            _check(f"bodies.{name}.parent", body.parent, known, "body before it")
-            known.append(name)
+            _check(f"bodies.{name}.parent", body.parent, earlier, "body before it")
+            earlier.append(name)
             for key, solid in body.solids.items():
                 _check(f"bodies.{name}.solids.{key}.mesh", solid.mesh, self.meshes, "mesh")
         for name, joint in self.joints.items():
             _check(f"joints.{name}.body", joint.body, self.bodies, "body")
-        order = [known.index(joint.body) for joint in self.joints.values()]
+        order = [earlier.index(joint.body) for joint in self.joints.values()]
         if order != sorted(order):
             raise problem("joints", "must follow the order of their bodies", list(self.joints))
         for name, tendon in self.tendons.items():
@@ -287,8 +287,8 @@ class Tree(Description):
 NO_TREE = Tree.model_construct(bodies={}, joints={})
 
 
-def _check(entry: str, name: str | None, names: Iterable[str], what: str) -> None:
-    known = list(names)
-    if name is not None and name not in known:
-        hint = suggestion(name, known)
-        raise problem(entry, f"no such {what}; there are {', '.join(known) or 'none'}{hint}", name)
+def _check(entry: str, name: str | None, names: Iterable[str], kind: str) -> None:
+    valid = list(names)
+    if name is not None and name not in valid:
+        hint = suggestion(name, valid)
+        raise problem(entry, f"no such {kind}; there are {', '.join(valid) or 'none'}{hint}", name)

@@ -131,7 +131,7 @@ def vector(size: int, low: float = -math.inf, high: float = math.inf, hint: str 
 def direction(size: int) -> BeforeValidator:
     """Return a validator for ``size`` numbers of length 1, which rounding to three digits may miss: they are scaled."""
     check = checker(-_UNIT, _UNIT, False, "")
-    what = "a quaternion x, y, z, w of length 1" if size == 4 else "a unit vector"
+    expected = "a quaternion x, y, z, w of length 1" if size == 4 else "a unit vector"
 
     def validate(value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple) or len(value) != size:
@@ -139,7 +139,7 @@ def direction(size: int) -> BeforeValidator:
         numbers = [check(item, f"[{index}]") for index, item in enumerate(value)]
         length = math.hypot(*numbers)
         if abs(length - 1.0) > _UNIT - 1.0:
-            raise problem("", f"must be {what}", list(value))
+            raise problem("", f"must be {expected}", list(value))
         # What differs by rounding alone stays, to the bit.
         return tuple(numbers if abs(length - 1.0) < 1e-15 else (number / length for number in numbers))
 
@@ -161,26 +161,26 @@ def choice(*allowed: str) -> BeforeValidator:
 def nearest(name: Any, names: Iterable[str]) -> str | None:
     """Return the name that a misspelt one most likely means, or None."""
     folded = {candidate.casefold(): candidate for candidate in names}
-    near = difflib.get_close_matches(str(name).casefold(), folded, n=1, cutoff=0.6)
-    return folded[near[0]] if near else None
+    matches = difflib.get_close_matches(str(name).casefold(), folded, n=1, cutoff=0.6)
+    return folded[matches[0]] if matches else None
 
 
 def suggestion(name: Any, names: Iterable[str]) -> str:
     """Return the nearest valid name as the end of a message; empty if none is near."""
-    near = nearest(name, names)
-    return f"; did you mean {near}?" if near else ""
+    nearest_name = nearest(name, names)
+    return f"; did you mean {nearest_name}?" if nearest_name else ""
 
 
 def choices(name: Any, names: Iterable[str]) -> str:
     """Return the valid names as the end of a message: the nearest ones if there are too many to read."""
-    known = list(names)
+    valid = list(names)
     shown = (
-        known
-        if len(known) <= _MOST_NAMES_LISTED
-        else difflib.get_close_matches(str(name), known, _NEAREST_NAMES_LISTED, cutoff=0.0)
+        valid
+        if len(valid) <= _MOST_NAMES_LISTED
+        else difflib.get_close_matches(str(name), valid, _NEAREST_NAMES_LISTED, cutoff=0.0)
     )
-    rest = f" and {len(known) - len(shown)} more" if len(shown) < len(known) else ""
-    return f"{', '.join(shown)}{rest}{suggestion(name, known)}"
+    rest = f" and {len(valid) - len(shown)} more" if len(shown) < len(valid) else ""
+    return f"{', '.join(shown)}{rest}{suggestion(name, valid)}"
 
 
 def expand(value: Numbers, size: int) -> NDArray[np.float64]:
@@ -204,10 +204,10 @@ def finite_vector(name: str, value: Sequence[float] | NDArray[np.float64], size:
     return numbers
 
 
-def check_size(value: Numbers, names: Sequence[str], entry: str, what: str) -> None:
+def check_size(value: Numbers, names: Sequence[str], entry: str, kind: str) -> None:
     """Raise the error of an entry whose list does not have one number per name."""
     if isinstance(value, tuple) and len(value) != len(names):
-        listed = f"a list of {len(names)}, one per {what} ({', '.join(names)})" if names else f"left out: no {what}"
+        listed = f"a list of {len(names)}, one per {kind} ({', '.join(names)})" if names else f"left out: no {kind}"
         raise problem(entry, f"must be one number, or {listed}", value)
 
 
@@ -241,12 +241,12 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
         raise InputError(entry, context["allowed"], context["value"].content) from None
     if failure["type"] == "extra_forbidden":
         names = sorted(field_names(model, location[:-1]))
-        near = (
+        nearest_key = (
             _OTHER_NAMES.get(location[-1], "")
             if _OTHER_NAMES.get(location[-1]) in names
             else nearest(location[-1], names)
         )
-        hint = f"; did you mean {'.'.join([*prefix, *location[:-1], near])}?" if near else ""
+        hint = f"; did you mean {'.'.join([*prefix, *location[:-1], nearest_key])}?" if nearest_key else ""
         raise InputError(entry, f"unknown key; allowed here: {', '.join(names)}{hint}") from None
     if failure["type"] == "missing":
         raise InputError(entry, f"is missing: {document(model, location)}") from None

@@ -139,10 +139,10 @@ def check_sources(finger: FingerDescription, tensions: Iterable[str]) -> None:
             raise problem(f"controller.tensions.{tendon}", allowed)
 
 
-def _check_name(entry: str, name: str, what: str, known: tuple[str, ...], instead: str) -> None:
-    if name not in known:
-        hint = f"; give {instead}" if instead else suggestion(name, known)
-        raise problem(entry, f"no such {what}; there are {', '.join(known) or 'none'}{hint}")
+def _check_name(entry: str, name: str, kind: str, names: tuple[str, ...], instead: str) -> None:
+    if name not in names:
+        hint = f"; give {instead}" if instead else suggestion(name, names)
+        raise problem(entry, f"no such {kind}; there are {', '.join(names) or 'none'}{hint}")
 
 
 def _check_drive(entry: str, motor: str, finger: FingerDescription) -> None:

@@ -107,13 +107,13 @@ def assemble(
     joints, width = routing.joints, parts.width
     # Dry friction of a tree's tendons has states of its own, which stand with those of the user's rows.
     of_tree = {table.group: table for table in tree_rows(description, paths, width)}
-    dry = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
+    dry_friction = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
     custom_drives = [table for table in args.rows if table.pulls]
     drives = (*actuators.tendon_rows(width), *tendons.sources(description, width), *custom_drives)
     matrices = tendons.drive_matrices(drives)
     tendon_rows = [along_paths(description, paths, table) for table in tendons.rows(drives, len(actuators.inertias))]
     canals = Canals(description, paths, tendons, [*of_tree.values(), *tendon_rows], matrices, width)
-    further = [*springs.hysteresis_rows(joints, width), *dry, *args.rows]
+    further = [*springs.hysteresis_rows(joints, width), *dry_friction, *args.rows]
     tables = [
         *of_tree.values(),
         *tendon_rows,
@@ -239,5 +239,5 @@ def _warn_of_turns(description: FingerDescription) -> None:
             continue
         joint, hinge = description.joints[coupling.other], description.tree.joints[coupling.other].kind == "hinge"
         if hinge and not (joint.limited and np.ptp(joint.range) <= 2.0 * math.pi):
-            says = f"repeat where {coupling.other} turns by more than half a turn from its range's middle; limit it"
-            warnings.warn(ScenarioWarning(f"finger.tree.couplings.{name}.powers: {says}"), stacklevel=4)
+            warning = f"repeat where {coupling.other} turns by more than half a turn from its range's middle; limit it"
+            warnings.warn(ScenarioWarning(f"finger.tree.couplings.{name}.powers: {warning}"), stacklevel=4)

@@ -153,8 +153,10 @@ class Canals:
         """Return a canal at one of its wraps, from 1."""
         wrap = canal.wraps[level - 1]
         beyond = canal.wraps[level].crossed if level < len(canal.wraps) else frozenset()
-        here, on = (np.array([name in each for name in self._joints]) for each in (wrap.crossed - beyond, wrap.crossed))
-        coefficients = canal.route.coefficients * (on if level > 1 else 1.0)
+        before_next, from_wrap_on = (
+            np.array([name in each for name in self._joints]) for each in (wrap.crossed - beyond, wrap.crossed)
+        )
+        coefficients = canal.route.coefficients * (from_wrap_on if level > 1 else 1.0)
         return replace(
             canal,
             name=canal.name if level == 1 else f"{canal.name}.{wrap.name}",
@@ -162,7 +164,7 @@ class Canals:
             crossed=canal.crossed if level == 1 else wrap.crossed,
             sources=canal.sources | tension_terms,
             offset=wrap.offset,
-            bends=canal.bends * here if canal.bends.size else canal.bends,
+            bends=canal.bends * before_next if canal.bends.size else canal.bends,
             drag=canal.drag * wrap.share,
             wraps=(wrap,),
         )
@@ -274,11 +276,11 @@ class Canals:
                         press[joint, self._tables_by_group[group].names.index(row)] += weight
 
 
-def _input_weights(sources: Sequence[Mapping[tuple[str, str], float]], known: Mapping[str, Rows]) -> dict[str, Array]:
+def _input_weights(sources: Sequence[Mapping[tuple[str, str], float]], tables: Mapping[str, Rows]) -> dict[str, Array]:
     """Return the weights of earlier rows in the inputs of some, by table."""
     inputs: dict[str, Array] = {}
     for k, source in enumerate(sources):
         for (group, row), weight in source.items():
-            weights = inputs.setdefault(group, np.zeros((len(sources), known[group].count)))
-            weights[k, known[group].names.index(row)] += weight
+            weights = inputs.setdefault(group, np.zeros((len(sources), tables[group].count)))
+            weights[k, tables[group].names.index(row)] += weight
     return inputs

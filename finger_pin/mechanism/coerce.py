@@ -50,17 +50,17 @@ def is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:
     return finger is not None and scenario.hand is not None and finger.description != scenario.finger
 
 
-def with_parameters_of(finger: Finger, known: Scenario, other: Scenario) -> Finger:
+def with_parameters_of(finger: Finger, scenario: Scenario, other: Scenario) -> Finger:
     """Return a finger with another scenario's numbers; itself if they are the same.
 
     Raises:
         InputError: If the other numbers are those of a hand, and the finger is another one.
     """
     objects = other.environment.objects
-    if known.finger == other.finger:
-        return finger if known.environment.objects == objects else finger.changed(finger.description, objects)
-    if is_other_hand(finger, known):
-        raise InputError("hand", "does not act: the hand that was given is not the scenario's", known.finger.name)
+    if scenario.finger == other.finger:
+        return finger if scenario.environment.objects == objects else finger.changed(finger.description, objects)
+    if is_other_hand(finger, scenario):
+        raise InputError("hand", "does not act: the hand that was given is not the scenario's", scenario.finger.name)
     return finger.changed(other.finger, objects)
 
 
@@ -98,11 +98,11 @@ def _packed_by_name(finger: Finger, state: Mapping[str, float], name: str) -> Ar
 
 
 def _refuse_unknown(
-    values: Mapping[str, float], names: Sequence[str], name: str, what: str, others: Sequence[str] = ()
+    values: Mapping[str, float], names: Sequence[str], name: str, kind: str, others: Sequence[str] = ()
 ) -> None:
     for key in values:
         if key not in names:
-            allowed = f"no such {what}; there are {', '.join(names)}{suggestion(key, [*names, *others])}"
+            allowed = f"no such {kind}; there are {', '.join(names)}{suggestion(key, [*names, *others])}"
             raise InputError(f"{name}.{key}", allowed)
 
 

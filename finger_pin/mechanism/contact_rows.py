@@ -46,8 +46,8 @@ def contact_rows(
     pieces: list[PathElement] = []
     for one, other in itertools.combinations(solids, 2):
         pair = frozenset((one.name, other.name))
-        apart = pair in never or (one.group == other.group and pair not in within)
-        if apart or (one.prescribed and other.prescribed) or one.never_meets(other):
+        never_touching = pair in never or (one.group == other.group and pair not in within)
+        if never_touching or (one.prescribed and other.prescribed) or one.never_meets(other):
             continue
         touches = list(solid_contacts(one, other))
         for index, (a, part, w, prism) in enumerate(touches):

@@ -75,10 +75,10 @@ class TendonForces:
 
     def _has_several_wraps(self) -> NDArray[np.bool_]:
         """Return whether each tendon rubs at several places, shape (t,)."""
-        several = np.zeros(self.driven.rows.count + self.passive.rows.count, dtype=bool)
+        mask = np.zeros(self.driven.rows.count + self.passive.rows.count, dtype=bool)
         for _, weights in self.beyond:
-            several |= np.any(weights, axis=1)
-        return several
+            mask |= np.any(weights, axis=1)
+        return mask
 
     @property
     def velocity(self) -> Array:

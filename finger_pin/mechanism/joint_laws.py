@@ -28,8 +28,8 @@ def joint_law(name: str) -> Law:
     law = _imported(name)
     if not isinstance(law, Law):
         raise InputError("finger.joint_friction.law", f"must be a Law, not {type(law).__name__}", name)
-    for kind, has, known in (("parameters", _PARAMETERS, law.parameters), ("signals", law.signals, SIGNALS)):
-        if lacking := [each for each in known if each not in has]:
+    for kind, has, required in (("parameters", _PARAMETERS, law.parameters), ("signals", law.signals, SIGNALS)):
+        if lacking := [each for each in required if each not in has]:
             allowed = f"the law's {kind} must be some of" if kind == "parameters" else "the law must have the signals"
             names = ", ".join(_PARAMETERS if kind == "parameters" else SIGNALS)
             raise InputError("finger.joint_friction.law", f"{allowed} {names}: see {', '.join(lacking)}", name)

@@ -107,9 +107,9 @@ class JointFriction:
         loaded = self.kinetic > 0.0
         return self.drag * np.where(loaded, self.static / np.where(loaded, self.kinetic, 1.0), 1.0)
 
-    def break_away_drag(self, way: Array) -> Array:
+    def break_away_drag(self, direction: Array) -> Array:
         """Return the level without load at which joints let go in directions of 1 or -1, shape (..., n), N m."""
-        level: Array = directed_drag(self.static_drag, self.drag_asymmetry, way)
+        level: Array = directed_drag(self.static_drag, self.drag_asymmetry, direction)
         return level
 
     def rows(

@@ -205,7 +205,7 @@ class Mechanism:
         q, v, z = self.split(x)
         turning, linear, lead = q[..., : self.body.model.nq], self.linear_positions(q), x.shape[:-1]
         states = {table.group: z[..., part] for table, part in zip(self.rows, self.states, strict=True)}
-        rows, known = dict[str, RowSignals](), dict[str, Array]()
+        rows, earlier = dict[str, RowSignals](), dict[str, Array]()
         touching: list[tuple[Paths, Array]] = []
         torque = np.zeros((*lead, self.coordinates))
         for table in self.rows:
@@ -215,14 +215,14 @@ class Mechanism:
                 linear @ table.measure.T + table.offset + routed.length,
                 (arm @ v[..., None])[..., 0],
                 states[table.group] if table.states else np.zeros((*lead, table.count)),
-                self._load(table, known, turning, forces, touching),
-                self._input(table, known, command, lead),
+                self._load(table, earlier, turning, forces, touching),
+                self._input(table, earlier, command, lead),
                 np.abs(linear) @ table.bends.T + table.curvature_offset + routed.turn,
                 reading=_weighted(table.readings, states, np.zeros((*lead, table.count))),
             )
             law: Any = table.law
             exerted, rate, signals = law.act(arguments := law.arguments(row), table.parameters)
-            rows[table.group], known[table.group] = RowSignals(table, arguments, exerted, rate, signals), exerted
+            rows[table.group], earlier[table.group] = RowSignals(table, arguments, exerted, rate, signals), exerted
             if table.law.arms > 1:
                 touching.append((table.paths[:: table.law.arms], _vectors(exerted, routed.force, table.law.arms)))
             torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
@@ -264,14 +264,14 @@ class Mechanism:
         return _weighted(table.inputs, forces, total)
 
     def _load(
-        self, table: Rows, known: Mapping[str, Array], q: Array, forces: Array, touching: Sequence[tuple[Paths, Array]]
+        self, table: Rows, forces: Mapping[str, Array], q: Array, tips: Array, touching: Sequence[tuple[Paths, Array]]
     ) -> Array:
         """Return N, the magnitude of a sum of earlier rows' forces, or of -e S + F for the pins of joints (17)."""
-        load = _weighted(table.loads, known, np.zeros((*q.shape[:-1], table.count)))
-        if not (table.pins >= 0).any() or not (np.any(forces) or touching):
+        load = _weighted(table.loads, forces, np.zeros((*q.shape[:-1], table.count)))
+        if not (table.pins >= 0).any() or not (np.any(tips) or touching):
             return np.abs(load)
         directions = self.body.link_directions(q)[..., table.pins, :]
-        beyond = self.body.supports[:, table.pins].T @ forces
+        beyond = self.body.supports[:, table.pins].T @ tips
         for paths, pushes in touching:
             beyond = beyond + self._passing(paths, table.pins) @ pushes
         total: Array = beyond - load[..., None] * directions

@@ -143,9 +143,9 @@ class Scene:
         if hand is not None and hand.fingers_touch is False:
             bodies = [replace(each, group=hand.name) for each in bodies]
         for name in objects:
-            for what, names in (("joint", description.joints), ("shape", [each.name for each in bodies])):
+            for kind, names in (("joint", description.joints), ("shape", [each.name for each in bodies])):
                 if name in names:
-                    raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
+                    raise InputError(f"environment.objects.{name}", f"a {kind} has this name; choose another")
         solids = [*bodies, *object_solids(objects, extended)]
         never = pairs_apart(objects, [each.name for each in solids])
         return contact_rows(solids, width, pairs_within(description), never)

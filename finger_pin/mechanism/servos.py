@@ -90,15 +90,21 @@ class Actuators:
         motors, gearboxes = [], []
         for actuator in actuators:
             motor, gears = actuator.motor, actuator.motor.friction
-            constant, resistance, dry = motor.constants
+            constant, resistance, friction_torque = motor.constants
             by_current = float(actuator.drive == "tension")
             share = by_current * actuator.friction_compensation
             electrical = (constant, resistance, motor.voltage, motor.maximum_current)
             # Of N = |x T + tau| at tau = T + friction, T is known from the command.
             by_torque = share * gears.by_load * (1.0 + gears.external_weight)
-            overcome = (share * dry, by_torque, gears.by_load, share * gears.viscous, actuator.reversal_speed)
+            overcome = (
+                share * friction_torque,
+                by_torque,
+                gears.by_load,
+                share * gears.viscous,
+                actuator.reversal_speed,
+            )
             motors.append((*electrical, by_current, actuator.radii[0], *overcome))
-            level = (dry, gears.by_load, gears.stribeck, gears.stribeck_by_load)
+            level = (friction_torque, gears.by_load, gears.stribeck, gears.stribeck_by_load)
             shape = (gears.stribeck_velocity, gears.stribeck_exponent, gears.viscous, gears.stiffness)
             gearboxes.append((*level, *shape, gears.driving, gears.driven))
         return cls(

@@ -153,7 +153,7 @@ def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
     return pairs
 
 
-def pairs_apart(objects: Mapping[str, Object], known: Collection[str]) -> set[frozenset[str]]:
+def pairs_apart(objects: Mapping[str, Object], names: Collection[str]) -> set[frozenset[str]]:
     """Return the names of objects, with those of links, shapes or other objects that they never touch.
 
     Raises:
@@ -161,8 +161,8 @@ def pairs_apart(objects: Mapping[str, Object], known: Collection[str]) -> set[fr
     """
     for name, obj in objects.items():
         for other in obj.apart:
-            if other not in known or other == name:
-                allowed = f"no such link, shape or other object; there are {', '.join(k for k in known if k != name)}"
+            if other not in names or other == name:
+                allowed = f"no such link, shape or other object; there are {', '.join(k for k in names if k != name)}"
                 raise InputError(f"environment.objects.{name}.apart", allowed, other)
     return {frozenset((name, other)) for name, obj in objects.items() for other in obj.apart}
 
@@ -221,8 +221,8 @@ def _with_masses(extended: RigidBody, body: RigidBody, moved: Sequence[Object]) 
     for obj in moved:
         inertias += [none, slight if obj.mass is None else _inertia(obj)]
     # Of the joints of the world the last one carries all.
-    more = extended.model.njoints - 1 - len(inertias)
-    inertias += [*[none] * (more - 1), slight][-more:] if more else []
+    missing = extended.model.njoints - 1 - len(inertias)
+    inertias += [*[none] * (missing - 1), slight][-missing:] if missing else []
     return extended.with_inertias(inertias, body.model.gravity.linear)
 
 

@@ -150,11 +150,11 @@ def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[st
             parts.append((waypoint.divisor, []))
             before = None
         elif waypoint.kind == "point":
-            here = placed[waypoint.body].place(waypoint.position)
+            point = placed[waypoint.body].place(waypoint.position)
             if before is not None:
                 legs = parts[-1][1]
-                legs.append(PathTerm(_piece(before, here, wrap, placed), follows=bool(legs)))
-            before, wrap = here, None
+                legs.append(PathTerm(_piece(before, point, wrap, placed), follows=bool(legs)))
+            before, wrap = point, None
         else:
             wrap = waypoint
     (_, trunk), *branches = parts
@@ -170,8 +170,8 @@ def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[s
     frame = body.frame * pin.SE3(rotation(wrap.orientation), np.array(wrap.position))
     side, elsewhere = (0.0, 0.0, 0.0) if wrap.side is None else wrap.side, wrap.side_point
     inside = wrap.side is not None and float(np.linalg.norm(side)) < wrap.radius
-    known = SIDE_ON_OTHER_BODY if elsewhere else float(wrap.side is not None)
-    numbers = np.array([wrap.radius, *side, known, inside], dtype=float)
+    has_side = SIDE_ON_OTHER_BODY if elsewhere else float(wrap.side is not None)
+    numbers = np.array([wrap.radius, *side, has_side, inside], dtype=float)
     third = (placed[elsewhere.body].place(elsewhere.position),) if elsewhere else ()
     shape = CYLINDER if wrap.kind == "cylinder" else SPHERE
     return PathElement(shape, numbers, (first, second, *third), body.joint, frame)

@@ -128,9 +128,9 @@ class Tendons:
         routing = self.routing
         joints = len(routing.joints)
 
-        def at_place(surface: Number, curvature: Array, way: Array, drag: Number) -> tuple[Array, Array]:
-            part = way * capstan_coefficient(surface, curvature)
-            return (1.0 - part) / (1.0 + part), way * drag / (1.0 + part)
+        def at_place(surface: Number, curvature: Array, direction: Array, drag: Number) -> tuple[Array, Array]:
+            part = direction * capstan_coefficient(surface, curvature)
+            return (1.0 - part) / (1.0 + part), direction * drag / (1.0 + part)
 
         whole = at_place(self.surface, routing.curvature(position), direction, self.drag)
         share, lost = (np.repeat(each[..., None], joints, axis=-1) for each in whole)

@@ -108,8 +108,8 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
             model.appendBodyToJoint(joint, pin.Inertia(body.mass, np.array(body.centre), inertia), place)
     tips = {TIP_FRAME: tree.tip} if tree.tip else {f"{name}.{TIP_FRAME}": tip for name, tip in tree.tips.items()}
     for name, tip in tips.items():
-        there = placed[tip.body].frame * pin.SE3(np.eye(3), np.array(tip.position))
-        model.addFrame(pin.Frame(name, placed[tip.body].joint, 0, there, pin.FrameType.OP_FRAME))
+        placement = placed[tip.body].frame * pin.SE3(np.eye(3), np.array(tip.position))
+        model.addFrame(pin.Frame(name, placed[tip.body].joint, 0, placement, pin.FrameType.OP_FRAME))
     pin.crba(model, data := model.createData(), pin.neutral(model))
     for name, moment in zip(tree.joints, np.diag(data.M), strict=True):
         if not moment > 0.0:
@@ -140,13 +140,13 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
     joints = {name: TendonPath(row, ()) for name, row in zip(tree.joints, np.eye(len(tree.joints)), strict=True)}
 
     def table(
-        group: str, law: Law, along: dict[str, TendonPath], numbers: Sequence[Sequence[float]], **more: Any
+        group: str, law: Law, along: dict[str, TendonPath], numbers: Sequence[Sequence[float]], **further: Any
     ) -> Rows:
         arm = np.zeros((len(along), width))
         arm[:, : len(joints)] = [route.coefficients for route in along.values()]
         paths = tuple(route.legs for route in along.values())
         wiring = {"stored": _STORED.get(group), "powers": _EXCHANGED_POWERS.get(group, ())}
-        return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **(wiring | more))
+        return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **(wiring | further))
 
     tables: list[Rows] = []
     for group, law, along, numbers in (
@@ -192,11 +192,13 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
     limits = [each.limiter for each in limited.values()]
     # Law (9) whose level is its floor.
-    dry = [(0, 0, each.friction / _DRY_STICTION, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()]
+    friction = [
+        (0, 0, each.friction / _DRY_STICTION, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()
+    ]
     return [
         ("tendon_spring", DEAD_BAND_SPRING, along(sprung), springs),
         ("tendon_limit", STROKE_LIMITER, along(limited), limits),
-        ("tendon_dry_friction", PIN_FRICTION, along(rubbing), dry),
+        ("tendon_dry_friction", PIN_FRICTION, along(rubbing), friction),
     ]
 
 

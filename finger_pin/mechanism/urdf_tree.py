@@ -39,8 +39,8 @@ def tree_to_urdf(description: FingerDescription, drawn: bool, base: str, tip: st
     """
     tree = description.tree
     root = ET.Element("robot", name=description.name)
-    more = "by how much the drag of joints differs by direction (drag_asymmetry): friction is the mean"
-    left_out = (*tree.left_out, *[more] * bool(np.any(description.joint_friction.drag_asymmetry)))
+    asymmetry = "by how much the drag of joints differs by direction (drag_asymmetry): friction is the mean"
+    left_out = (*tree.left_out, *[asymmetry] * bool(np.any(description.joint_friction.drag_asymmetry)))
     rest = "".join(f"\n  - {line}" for line in left_out)
     notes = _NOTES.format(title=description.title or description.name, rest=rest)
     root.append(ET.Comment(notes.replace("--", "- -")))

@@ -34,8 +34,8 @@ def sort_tables(tables: Sequence[Rows]) -> tuple[Rows, ...]:
         raise InputError("rows", f"no force may depend on itself: {circle}") from None
     left, ordered = list(tables), list[Rows]()
     while left:
-        known = {table.group for table in ordered}
-        ordered.append(next(table for table in left if readers[table.group] <= known))
+        placed = {table.group for table in ordered}
+        ordered.append(next(table for table in left if readers[table.group] <= placed))
         left.remove(ordered[-1])
     return tuple(ordered)
 

@@ -203,10 +203,10 @@ def test_of_processes_that_start_at_once_on_an_empty_folder_one_compiles_and_a_l
 ):
     gate = tmp_path / "gate"
     code = (
-        f"{DOUBLE}\nfrom finger_pin.core.jit.functions import _living\n"
+        f"{DOUBLE}\nfrom finger_pin.core.jit.functions import _kept_alive\n"
         f"kept = double.kept\n(pathlib.Path({str(tmp_path)!r}) / str(os.getpid())).touch()\n"
         f"while not pathlib.Path({str(gate)!r}).exists():\n    time.sleep(0.001)\n"
-        "print(kept, double(1, 21.0), _living[-1].cache_hits)"
+        "print(kept, double(1, 21.0), _kept_alive[-1].cache_hits)"
     )
     running = [subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) for _ in range(2)]
     while not all((tmp_path / str(each.pid)).exists() for each in running):

@@ -80,16 +80,16 @@ def bound_relative_path(structure: Structure, parameters: Parameters, e: int, pi
     total, turned = 0.0, 0.0
     for s in range(paths.start[e], paths.start[e + 1]):
         j, other, lever = paths.at[s], paths.opposing_coordinate[s], geometry.motion_bounds[s]
-        way = pieces.travel[j]
+        path = pieces.travel[j]
         if other >= 0:
             # Beside what the last stage is off: what both have in common moves neither.
             for i in range(4):
                 one, two = control[j, i + 1] - control[j, i], control[other, i + 1] - control[other, i]
-                way += abs(one - two) - abs(one) - abs(two)
-            way += pieces.travel[other]
-        total += lever * way
+                path += abs(one - two) - abs(one) - abs(two)
+            path += pieces.travel[other]
+        total += lever * path
         if endless and paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and structure.kinds[j] == 0:
-            turned += way
+            turned += path
     return add_turning(total, turned, pieces.far[e])
 
 
@@ -165,14 +165,14 @@ def update_culling(structure: Structure, rows: Matrix, pieces: PathWork, states:
         k = paths.row[e]
         if paths.columns[e] == 1:
             continue
-        near = not pieces.ahead[e] > _STEPS_AHEAD * pieces.path[e]
+        may_close = not pieces.ahead[e] > _STEPS_AHEAD * pieces.path[e]
         if pieces.culled[k]:
             pieces.clear[e] = pieces.ahead[e]
             pieces.far[e] += pieces.path[e]
-            if near:
+            if may_close:
                 changed = True
                 set_culled(structure, k, 0, pieces.culled)
-        elif not near and pieces.active[e] == 0 and _straighten(structure, rows, k, states):
+        elif not may_close and pieces.active[e] == 0 and _straighten(structure, rows, k, states):
             pieces.clear[e], pieces.far[e] = pieces.ahead[e], pieces.far[e] + pieces.path[e]
             changed = True
             set_culled(structure, k, 1, pieces.culled)

@@ -89,10 +89,10 @@ def _bounds(
         )
         b0, b1, b2, b3, b4 = _between(one[LOOK.share], two[LOOK.share], whole)
         d0, d1, d2, d3 = b1 - b0, b2 - b1, b3 - b2, b4 - b3
-        way = abs(d0) + abs(d1) + abs(d2) + abs(d3)
+        travel = abs(d0) + abs(d1) + abs(d2) + abs(d3)
         most = max(max(abs(d0), abs(d1)), max(abs(d2), abs(d3)))
         curve = max(max(abs(d1 - d0), abs(d2 - d1)), abs(d3 - d2))
-        path += lever * way
+        path += lever * travel
         moves += lever * most
         bends += lever * curve
         if structure.kinds[j] == 0:
@@ -102,7 +102,7 @@ def _bounds(
             swing += most
             curl += curve
             if endless:
-                turned += way
+                turned += travel
     path = add_turning(path, turned, far)
     moves, bends = moves + swing * (far + path), bends + curl * (far + path)
     # The second derivative of a coordinate is at most 12 times the second differences, the first one 4 times the first.
@@ -137,12 +137,12 @@ def _look(integration: Integration, model: Model, e: int, share: float, look: Ve
     for j in range(model.structure.parents.size):
         b = pieces.control[j]
         state[j] = w0 * b[0] + w1 * b[1] + w2 * b[2] + w3 * b[3] + w4 * b[4]
-    near = call_at(model.look, integration.model, float(e))
+    in_reach = call_at(model.look, integration.model, float(e))
     look[LOOK.share], look[LOOK.gap] = share, pieces.out[e, GAP_OUT.gap]
     look[LOOK.far] = distance(model.parameters.paths, e, pieces)
     for r in range(3):
         # Of what is far away the normal is not asked for.
-        look[LOOK.normal_x + r] = pieces.out[e, GAP_OUT.normal + r] if near else 0.0
+        look[LOOK.normal_x + r] = pieces.out[e, GAP_OUT.normal + r] if in_reach else 0.0
 
 
 @njit_always_inline

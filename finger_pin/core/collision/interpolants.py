@@ -79,8 +79,8 @@ class _Meetings:
         paths, charts = self._paths, self._charts
         packed = self._to_control @ interpolate(start + (end - start) * self._nodes)
         control = np.zeros((_MAX_DEGREE + 1, self._bodies))
-        kept = charts.cores < self._bodies
-        control[:, charts.cores[kept]] = packed[:, charts.plain[kept]]
+        of_bodies = charts.cores < self._bodies
+        control[:, charts.cores[of_bodies]] = packed[:, charts.plain[of_bodies]]
         steps = np.diff(control, axis=0)
         path = np.abs(steps).sum(axis=0)
         for at, i in zip(charts.quaternions, charts.angles, strict=True):

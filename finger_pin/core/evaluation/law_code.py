@@ -140,13 +140,13 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
         InputError: If it may raise an exception.
     """
     assert isinstance(function, FunctionType)
-    code, known = function.__code__, function.__globals__
+    code, global_names = function.__code__, function.__globals__
     if _may_raise(function):
         raise InputError(
             f"law.{function.__qualname__}", "must raise no exception, as compiled code tells it nobody; return nan"
         )
-    called = {name: known[name] for name in code.co_names if isinstance(known.get(name), FunctionType)}
-    world = {**known, **{name: inlined(each) for name, each in called.items()}}
+    called = {name: global_names[name] for name in code.co_names if isinstance(global_names.get(name), FunctionType)}
+    world = {**global_names, **{name: inlined(each) for name, each in called.items()}}
     return njit_inline(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
 
 
@@ -162,8 +162,8 @@ def _may_raise(function: FunctionType) -> bool:
         return False
     except (OSError, TypeError):
         # Without a text, whoever raises an exception names it.
-        known = vars(builtins) | function.__globals__
-        named = [known.get(name) for name in function.__code__.co_names]
+        global_names = vars(builtins) | function.__globals__
+        named = [global_names.get(name) for name in function.__code__.co_names]
         return any(isinstance(each, type) and issubclass(each, BaseException) for each in named)
 
 

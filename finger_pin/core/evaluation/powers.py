@@ -67,8 +67,8 @@ def _fill_powers(
 @CompiledFunction
 def power_many(address: int, _time: float) -> int:
     """Fill the `Powers` at an address."""
-    asked = unpack(address, POWERS)
-    b, model = asked.between, unpack(asked.model, MODEL)
+    powers = unpack(address, POWERS)
+    b, model = powers.between, unpack(powers.model, MODEL)
     structure, parameters, work, state = model.structure, model.parameters, model.work, model.state
     width, step, last = work.torque.size, -1, -1
     moving = model.base_power != 0 or work.guide.size > 0
@@ -80,17 +80,17 @@ def power_many(address: int, _time: float) -> int:
         if step != last:
             place_bodies(structure, parameters, _attitude(b, step))
         if moving:
-            call_at(model.evaluate, asked.model, time)
+            call_at(model.evaluate, powers.model, time)
         else:
             # Contacts far apart are culled from state to state; what is left in ``rate`` is the state before.
             if structure.contact_rows > 0 and k > 0:
                 activate_since(structure, parameters, work, _attitude(b, last), _attitude(b, step), model.rate, state)
             inputs(model.control, time, state[:width], state[width : 2 * width], work.command)
-            exert_alone(model, asked.model, time)
-        fill_energy_terms(structure, parameters, work, asked.energy_terms)
+            exert_alone(model, powers.model, time)
+        fill_energy_terms(structure, parameters, work, powers.energy_terms)
         if moving:
-            fill_base_power(model, asked.model, True, asked.energy_terms)
+            fill_base_power(model, powers.model, True, powers.energy_terms)
         elif structure.contact_rows > 0:
             cull_distant(structure, parameters, work, state, model.rate)
-        _fill_powers(structure, parameters, work, state, asked.energy_terms, asked.powers[k])
+        _fill_powers(structure, parameters, work, state, powers.energy_terms, powers.powers[k])
     return 1

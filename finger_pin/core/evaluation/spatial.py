@@ -72,8 +72,10 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     z = x * x
     sine = x + z * x * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
     half = 0.5 * z
-    near = 1.0 - half
-    cosine = near + (((1.0 - near) - half) + z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6))))))
+    rounded = 1.0 - half
+    cosine = rounded + (
+        ((1.0 - rounded) - half) + z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6)))))
+    )
     quarter = int(turns) & 3
     if quarter == 0:
         return sine, cosine

@@ -50,8 +50,10 @@ def before_reversal(integration: Integration, model: Model, h: float) -> float:
     for trial in range(1 + _MAX_END_TRIALS):
         if trial > 0:
             # Behind the first reversal it grows as the square, and more where others follow.
-            way = np.sqrt((_TARGET_REVERSAL_ERROR - below) / (cost - below)) if trial <= _SQUARE_LAW_TRIALS else 0.5
-            share = low + way * (high - low)
+            share_of_interval = (
+                np.sqrt((_TARGET_REVERSAL_ERROR - below) / (cost - below)) if trial <= _SQUARE_LAW_TRIALS else 0.5
+            )
+            share = low + share_of_interval * (high - low)
         error, turned = _reversal_error(integration, model, h, share)
         if error > _MAX_REVERSAL_ERROR:
             high, cost = share, error
@@ -68,20 +70,20 @@ def before_reversal(integration: Integration, model: Model, h: float) -> float:
 def _reversal_error(integration: Integration, model: Model, h: float, share: float) -> tuple[float, float]:
     """Return the error of bristles misled in a share of a step, in tolerances, and the share at which that begins."""
     structure, parameters = model.structure, model.parameters
-    rows, off, total, first = model.work.rows, integration.end, 0.0, 1.0
+    rows, error, total, first = model.work.rows, integration.end, 0.0, 1.0
     size, width = integration.x.size, model.linear.mass.shape[0]
     for c in range(2 * width, size):
-        off[c] = 0.0
+        error[c] = 0.0
     for g in range(structure.groups.first.size):
         if structure.groups.kink[g] != ROW.speed:
             continue
         for k in range(structure.groups.first[g], structure.groups.end[g]):
-            way, fastest, turned = _speed_against_branch(integration, model, k, share)
-            if way > 0.0:
+            speed, fastest, turned = _speed_against_branch(integration, model, k, share)
+            if speed > 0.0:
                 c = 2 * width + structure.state[k]
-                off[c] = share * h * way * _rate_jump(structure, parameters, rows, g, k, fastest) / abs(fastest)
+                error[c] = share * h * speed * _rate_jump(structure, parameters, rows, g, k, fastest) / abs(fastest)
                 scale = integration.atol[c] + integration.rtol * max(abs(integration.x[c]), abs(model.state[c]))
-                total += (off[c] / scale) ** 2
+                total += (error[c] / scale) ** 2
                 first = min(first, turned)
     return np.sqrt(total / size), first
 
@@ -98,9 +100,9 @@ def _speed_against_branch(integration: Integration, model: Model, k: int, share:
         two += arm * dense[1, c]
         if dense.shape[0] > 2:
             three += arm * dense[2, c]
-    way, fastest, turned = 0.0, 0.0, 1.0
+    speed, fastest, turned = 0.0, 0.0, 1.0
     if 4.0 * min(start, end) >= abs(one) + abs(two) + abs(three):
-        return way, fastest, turned
+        return speed, fastest, turned
     before = start
     for i in range(1, _SPEED_SAMPLES + 1):
         s = share * i / _SPEED_SAMPLES
@@ -108,24 +110,24 @@ def _speed_against_branch(integration: Integration, model: Model, k: int, share:
         low, high = min(before, after), max(before, after)
         if low < 0.0:
             # Of a straight line between two looks what is below zero.
-            way += 0.5 * low * low / (high - low) if high > 0.0 else -0.5 * (low + high)
+            speed += 0.5 * low * low / (high - low) if high > 0.0 else -0.5 * (low + high)
             left = after / (after - before) if after < 0.0 < before else 1.0
             fastest, turned = min(fastest, low), min(turned, share * (i - left) / _SPEED_SAMPLES)
         before = after
-    return way / _SPEED_SAMPLES, branch * fastest, turned
+    return speed / _SPEED_SAMPLES, branch * fastest, turned
 
 
 @njit_always_inline
 def _rate_jump(structure: Structure, parameters: Parameters, rows: Matrix, g: int, k: int, speed: float) -> float:
     """Return the jump of a state's rate at a speed between the two sides of its kink."""
-    branch, row_speed, more = rows[ROW.side, k], rows[ROW.speed, k], 0.0
+    branch, row_speed, jump = rows[ROW.side, k], rows[ROW.speed, k], 0.0
     # As it is held, on the other side, and at last as it was.
     for weight in (-1.0, 1.0, 0.0):
         rows[ROW.side, k] = -branch if weight > 0.0 else branch
         rows[ROW.speed, k] = speed if weight != 0.0 else row_speed
         call_value(structure.groups.value[g], rows, parameters.laws, k, k + 1)
-        more += weight * rows[ROW.rate, k]
-    return more
+        jump += weight * rows[ROW.rate, k]
+    return jump
 
 
 @njit_always_inline
@@ -140,9 +142,9 @@ def bristles_over_limit(integration: Integration, model: Model) -> bool:
         if structure.groups.kink[g] == ROW.speed:
             for k in range(structure.groups.first[g], structure.groups.end[g]):
                 c = 2 * width + structure.state[k]
-                more = abs(state[c]) - abs(x[c])
+                growth = abs(state[c]) - abs(x[c])
                 if (
-                    more > _MAX_OVERLOAD_GROWTH * (integration.atol[c] + integration.rtol * abs(state[c]))
+                    growth > _MAX_OVERLOAD_GROWTH * (integration.atol[c] + integration.rtol * abs(state[c]))
                     and x[c] * state[c] > 0.0
                 ):
                     if bristle_load_ratio(model, g, k, np.sign(x[c])) > _MAX_LOAD_RATIO:
@@ -151,11 +153,11 @@ def bristles_over_limit(integration: Integration, model: Model) -> bool:
 
 
 @njit_inline
-def bristle_load_ratio(model: Model, g: int, k: int, way: float) -> float:
+def bristle_load_ratio(model: Model, g: int, k: int, direction: float) -> float:
     """Return the ratio of a row's bristle deflection to its limit at its speed in a direction of sliding."""
     rows, parameters, law = model.work.rows, model.parameters.laws, model.structure.groups.value[g]
     branch, speed, bent = rows[ROW.side, k], rows[ROW.speed, k], rows[ROW.state, k]
-    rows[ROW.side, k], rows[ROW.speed, k] = way, way * max(abs(speed), _MIN_SLIDING_SPEED)
+    rows[ROW.side, k], rows[ROW.speed, k] = direction, direction * max(abs(speed), _MIN_SLIDING_SPEED)
     call_value(law, rows, parameters, k, k + 1)
     rate = rows[ROW.rate, k]
     rows[ROW.state, k] = 0.0

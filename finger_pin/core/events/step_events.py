@@ -45,16 +45,16 @@ def cut_step(address: int, h: float) -> int:
     integration = unpack(address, INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
     interpolant(integration.tableau, integration.k, integration.dense)
-    part, kept, share = _accepted_shares(integration, model, h, int(memory.outcome[0]))
-    if kept == 1.0:
-        before = _part_before_reversal(integration, model, part * h)
+    taken_share, retry_share, share = _accepted_shares(integration, model, h, int(memory.outcome[0]))
+    if retry_share == 1.0:
+        before = _part_before_reversal(integration, model, taken_share * h)
         if before < share:
             memory.max_next_step_size[0] = np.inf
-        part *= before
-        if bristles_over_limit(integration, model) and part * h > _MIN_CUT_STEP * max(1.0, abs(memory.time[0])):
-            kept = _OVERLOAD_RETRY_SHARE * part
-    memory.taken_share[0], memory.retry_share[0] = part, kept
-    if kept == 1.0 and integration.events.detect:
+        taken_share *= before
+        if bristles_over_limit(integration, model) and taken_share * h > _MIN_CUT_STEP * max(1.0, abs(memory.time[0])):
+            retry_share = _OVERLOAD_RETRY_SHARE * taken_share
+    memory.taken_share[0], memory.retry_share[0] = taken_share, retry_share
+    if retry_share == 1.0 and integration.events.detect:
         call_at(integration.events.detect, address, h)
     return 1
 

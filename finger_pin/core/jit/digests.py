@@ -62,13 +62,13 @@ def _package_digest() -> str:
     texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in paths}
     versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
     # Parsing takes a second: of files that are the same to the byte the digest is kept.
-    kept = cache_root() / f"source-{_hashed(f'{versions} {texts}')}"
+    digest_file = cache_root() / f"source-{_hashed(f'{versions} {texts}')}"
     with suppress(OSError):
-        if len(digest := kept.read_text()) == 64:
+        if len(digest := digest_file.read_text()) == 64:
             return digest
     digest = _hashed(f"{versions} { {name: _syntax(text) for name, text in texts.items()} }")
     with suppress(OSError):
-        write_text(kept, digest)
+        write_text(digest_file, digest)
     return digest
 
 
@@ -127,10 +127,10 @@ def _values(function: FunctionType, names: frozenset[str]) -> Iterator[tuple[str
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         yield name, cell.cell_contents
     yield "defaults", (function.__defaults__, function.__kwdefaults__)
-    said = vars(sys.modules[function.__module__]) if _is_ours(function) else {}
+    attributes = vars(sys.modules[function.__module__]) if _is_ours(function) else {}
     for name in sorted(names & function.__globals__.keys()):
         value = function.__globals__[name]
-        if name not in said or said[name] is not value:
+        if name not in attributes or attributes[name] is not value:
             yield name, value
 
 

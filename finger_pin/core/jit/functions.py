@@ -112,21 +112,21 @@ def address_of(signature: str, function: Callable[..., Any], announced: bool = T
         announced: Whether it is said that compiling takes its time.
     """
     assert isinstance(function, FunctionType)
-    made: Any
+    result: Any
     with _lock:
         named = _named(function)
-        kept = named is not None and _is_kept(named)
-        if announced and not kept:
+        on_disk = named is not None and _is_kept(named)
+        if announced and not on_disk:
             _announce()
         try:
-            with nullcontext() if kept or named is None else _exclusively(named):
-                made = numba.cfunc(signature, cache=named is not None, **_OPTIONS)(named or function)
+            with nullcontext() if on_disk or named is None else _exclusively(named):
+                result = numba.cfunc(signature, cache=named is not None, **_OPTIONS)(named or function)
         except (OSError, EOFError, UnpicklingError) as error:
             reason = getattr(error, "strerror", None) or repr(error)
             _warn_once(f"the compile cache {cache_root()} cannot be used: {reason}; the next run compiles again")
-            made = numba.cfunc(signature, **_OPTIONS)(function)
-        _kept_alive.append(made)
-        return made.address  # type: ignore[no-any-return]
+            result = numba.cfunc(signature, **_OPTIONS)(function)
+        _kept_alive.append(result)
+        return result.address  # type: ignore[no-any-return]
 
 
 def cache_place() -> Path | None:

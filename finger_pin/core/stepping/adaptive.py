@@ -177,12 +177,12 @@ def advance(address: int, end: float) -> int:
             continue
         memory.outcome[0], memory.stale[0] = outcome, 0.0
         call_at(integration.events.cut, args.integration, h)
-        kept, part = memory.retry_share[0], memory.taken_share[0]
+        retry_share, taken_share = memory.retry_share[0], memory.taken_share[0]
         if memory.stale[0] > 0.0:
             memory.fresh[0] = 1.0
-        elif kept < 1.0:
-            _shorten(integration, h * kept, max(memory.uncut_step_size[0], h))
+        elif retry_share < 1.0:
+            _shorten(integration, h * retry_share, max(memory.uncut_step_size[0], h))
         else:
-            accept_step(args, integration, model, end if final and part == 1.0 else time + part * h)
+            accept_step(args, integration, model, end if final and taken_share == 1.0 else time + taken_share * h)
             _pace(integration, h, error, final, clipped)
     return at.DONE

@@ -119,7 +119,7 @@ def integrate_compiled(
     if knots is not None:
         stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
     # Of a controller that acts in between, the linearised flow knows nothing.
-    known = controller is None and not stepper.driven
+    keeps_islands = controller is None and not stepper.driven
     recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     began = time.perf_counter()
     alone = len(recorders) == 1
@@ -142,7 +142,7 @@ def integrate_compiled(
         failure=reason,
         interrupted=interrupted,
         # Inputs that are held in between are not the core's own.
-        islands=() if not known or stepper.holds_inputs else tuple(steps),
+        islands=() if not keeps_islands or stepper.holds_inputs else tuple(steps),
         steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),
     )
 

@@ -77,14 +77,14 @@ def start_time(b: Any, step: int) -> Any:
 
 
 @njit_inline
-def step_at(b: Any, time: float, known: int) -> Any:
+def step_at(b: Any, time: float, previous: int) -> Any:
     """Return the index of the step that contains a time, or -1; the search starts at a known step."""
-    step, last = max(known, 0), b.ends.size - 1
+    step, last = max(previous, 0), b.ends.size - 1
     while step > 0 and time < b.ends[step - 1]:
         step -= 1
     while step < last and time >= b.ends[step]:
         step += 1
-    if step != known:
+    if step != previous:
         begin_step(b, step)
     return step
 

@@ -53,7 +53,7 @@ class IslandMotion:
             between.interpolated[:], between.turned[:] = self.start, self.attitude
         return between.interpolated, between.turned
 
-    def _between(self, times: Array, kept: int = 0) -> Between:
+    def _between(self, times: Array, count: int = 0) -> Between:
         """Return the steps and times with a buffer for m states."""
         record, structure = self.record, self.part.structure
         return Between(
@@ -68,8 +68,8 @@ class IslandMotion:
             width=len(structure.prescribed),
             before=np.zeros_like(self.start),
             times=times,
-            interpolated=np.empty((kept, len(self.start))),
-            turned=np.empty((kept, *self.attitude.shape)),
+            interpolated=np.empty((count, len(self.start))),
+            turned=np.empty((count, *self.attitude.shape)),
         )
 
     def powers(self, times: Array) -> Array:

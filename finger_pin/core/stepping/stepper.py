@@ -79,9 +79,11 @@ class Stepper:
             # An island that nothing pushes computes as it does alone.
             loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
             numbers = selection.parameters(parameters)._replace(tip_force=pushed, has_tip_force=loaded)
-            begun = inputs, start[at], attitude[free], tableau, float(rtol), tolerances[at], memory
+            start_arguments = inputs, start[at], attitude[free], tableau, float(rtol), tolerances[at], memory
             followed = [laws[group] for group in selection.groups]
-            self.parts.append(IslandIntegrator(selection.island, followed, selection.structure, numbers, *begun))
+            self.parts.append(
+                IslandIntegrator(selection.island, followed, selection.structure, numbers, *start_arguments)
+            )
 
     @classmethod
     def from_finger(

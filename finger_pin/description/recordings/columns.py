@@ -162,12 +162,12 @@ class Table:
                 where += ', which has the same time; repeated_times = "mean" takes the mean of such rows'
             raise InputError(entry, f"times must increase, two rows at least{where}")
         length, unknown = times[-1] - times[0], not dated and (column.unit or header_unit) is None
-        apart = length / (len(times) - 1)
-        if unknown and column.scale == 1.0 and length >= _LARGE_DURATION and apart >= _LARGE_PERIOD:
-            unit = next((unit for unit in _SMALL_UNITS if apart * UNITS["s"][unit] < _LARGE_PERIOD), "ns")
-            asked = f"its {len(times)} rows take {length:g} s (is it in {_SMALL_UNITS[unit]}?)"
+        period = length / (len(times) - 1)
+        if unknown and column.scale == 1.0 and length >= _LARGE_DURATION and period >= _LARGE_PERIOD:
+            unit = next((unit for unit in _SMALL_UNITS if period * UNITS["s"][unit] < _LARGE_PERIOD), "ns")
+            hint = f"its {len(times)} rows take {length:g} s (is it in {_SMALL_UNITS[unit]}?)"
             answer = f'write {{ column = "{column.column}", unit = "{unit}" }}, or unit = "s" if they do'
-            raise InputError(entry, f"{asked}; {answer}", column.column)
+            raise InputError(entry, f"{hint}; {answer}", column.column)
         return times
 
     def signals(self, file: SignalFile) -> Iterator[tuple[str, Column]]:
@@ -185,8 +185,8 @@ class Table:
             )
             raise InputError(self.entry, allowed)
         yield "time", time
-        apart = self._headers.get(time.column, (None,))[0]
-        yield from file.columns.items() or [each for each in named if each[1].column != apart]
+        time_header = self._headers.get(time.column, (None,))[0]
+        yield from file.columns.items() or [each for each in named if each[1].column != time_header]
 
 
 def read_signals(entry: str, source: Any, folder: Path, unit_of: Callable[[str], str]) -> dict[str, dict[str, Any]]:
@@ -254,24 +254,24 @@ def _unwrapped(entry: str, cells: NDArray[np.float64], period: float) -> NDArray
     Raises:
         InputError: If they span more than a period, or it is not clear which way they went round.
     """
-    there = np.flatnonzero(np.isfinite(cells))
-    span = float(np.ptp(cells[there])) if len(there) else 0.0
+    finite = np.flatnonzero(np.isfinite(cells))
+    span = float(np.ptp(cells[finite])) if len(finite) else 0.0
     if span > period:
         raise InputError(entry, f"must be above {span:g}, the difference of the greatest number and the least", period)
     unwrapped = cells.copy()
-    unwrapped[there] = np.unwrap(cells[there], period=period)
-    wide = np.flatnonzero(np.abs(np.diff(unwrapped[there])) > _AMBIGUOUS * period)
+    unwrapped[finite] = np.unwrap(cells[finite], period=period)
+    wide = np.flatnonzero(np.abs(np.diff(unwrapped[finite])) > _AMBIGUOUS * period)
     if len(wide):
-        row = there[wide[0]] + 1
+        row = finite[wide[0]] + 1
         raise InputError(entry, f"is too short to tell the way from row {row} to the next: nearly half of it", period)
     return unwrapped
 
 
 def _means(values: NDArray[np.float64], instants: NDArray[np.intp]) -> NDArray[np.float64]:
     """Return the mean of the numbers of every instant; not a number where there is none."""
-    there = np.isfinite(values)
-    count = np.bincount(instants, there)
-    return np.where(count > 0, np.bincount(instants, np.where(there, values, 0.0)) / np.maximum(count, 1), np.nan)
+    finite = np.isfinite(values)
+    count = np.bincount(instants, finite)
+    return np.where(count > 0, np.bincount(instants, np.where(finite, values, 0.0)) / np.maximum(count, 1), np.nan)
 
 
 def _as_array(values: Any) -> NDArray[Any]:

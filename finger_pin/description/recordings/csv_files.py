@@ -52,7 +52,7 @@ class TableFormat(Description):
     )
 
 
-def read_columns(what: str, path: Path, form: TableFormat | None = None) -> dict[str, Any]:
+def read_columns(entry: str, path: Path, form: TableFormat | None = None) -> dict[str, Any]:
     """Return the columns of a CSV file with a header, by name; empty cells are not numbers, and words stay words.
 
     Columns stand apart by commas, semicolons or tabs, which may also end a line; where not by commas, decimals may have
@@ -64,18 +64,18 @@ def read_columns(what: str, path: Path, form: TableFormat | None = None) -> dict
     """
     form = form or TableFormat()
     encoding = "utf-8-sig" if form.encoding.casefold() in ("utf-8", "utf8") else form.encoding
-    text = read_text(what, path, encoding, '; another one is named by encoding, such as "cp1252"')
+    text = read_text(entry, path, encoding, '; another one is named by encoding, such as "cp1252"')
     skip = {*range(1, form.skip_rows + 1)} if isinstance(form.skip_rows, int) else {*form.skip_rows}
     numbered = ((number, line.strip(" ")) for number, line in enumerate(text.splitlines(), 1) if number not in skip)
     lines = [line for _, line in numbered if line.strip() and not line.lstrip().startswith("#")]
     if len(lines) < 2:
-        raise InputError(what, "must have a header and rows of numbers")
+        raise InputError(entry, "must have a header and rows of numbers")
     separator = max(",;\t", key=lines[0].count)
     header = [name.strip() for name in next(csv.reader(lines[:1], delimiter=separator))]
     while len(header) > 1 and not header[-1]:
         header.pop()
     if len(set(header)) < len(header) or not all(header):
-        raise InputError(what, "the first line must name every column, each once", lines[0])
+        raise InputError(entry, "the first line must name every column, each once", lines[0])
     while lines[1].count(separator) >= len(header) and all(line.endswith(separator) for line in lines[1:]):
         lines = [line.removesuffix(separator).rstrip(" ") for line in lines]
     if separator != ",":
@@ -89,12 +89,12 @@ def read_columns(what: str, path: Path, form: TableFormat | None = None) -> dict
     try:
         rows = list(csv.reader(lines[1:], delimiter=separator))
     except csv.Error as error:
-        raise InputError(what, f"is not valid CSV: {error}") from None
+        raise InputError(entry, f"is not valid CSV: {error}") from None
     for number, row in enumerate(rows, 1):
         while len(row) > len(header) and not row[-1].strip():
             row.pop()
         if len(row) != len(header):
-            raise InputError(what, f"row {number} has {len(row)} values, the header names {len(header)}")
+            raise InputError(entry, f"row {number} has {len(row)} values, the header names {len(header)}")
     return {name: [_cell(row[k].strip()) for row in rows] for k, name in enumerate(header)}
 
 
@@ -121,14 +121,14 @@ def row_mask(entry: str, columns: Mapping[str, Any], rows: Mapping[str, Any]) ->
         if name not in columns:
             allowed = f"no such column; there are {', '.join(columns)}{suggestion(name, columns)}"
             raise InputError(f"{entry}.{name}", allowed)
-        cells, here = columns[name], np.zeros(len(chosen), dtype=bool)
+        cells, matching = columns[name], np.zeros(len(chosen), dtype=bool)
         for one in value if isinstance(value, list | tuple) else [value]:
             equal = np.array([cell == one for cell in cells])
             if not equal.any():
-                known = list(dict.fromkeys(str(cell) for cell in cells))[:12]
-                raise InputError(f"{entry}.{name}", f"no row has it; there are {', '.join(known)}", one)
-            here |= equal
-        chosen &= here
+                values = list(dict.fromkeys(str(cell) for cell in cells))[:12]
+                raise InputError(f"{entry}.{name}", f"no row has it; there are {', '.join(values)}", one)
+            matching |= equal
+        chosen &= matching
     if not chosen.any():
         raise InputError(entry, "no row has all of them")
     return chosen

@@ -54,8 +54,8 @@ def resolve_commands(table: Table) -> None:
     entry, places = "controller.file", partial(command_place, inputs=inputs)
     samples = read_signals(entry, settings.pop("file"), Path(), lambda name: COMMANDS[places(name)[0]])
     for name, signal in samples.items():
-        group, known = places(name)
-        settings[group] = {known: signal, **_signals(settings, "controller", "file", group)}
+        group, names = places(name)
+        settings[group] = {names: signal, **_signals(settings, "controller", "file", group)}
 
 
 def _signals(settings: Table, section: str, key: str, group: str) -> Table:

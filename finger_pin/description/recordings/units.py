@@ -70,8 +70,8 @@ def parse_unit(text: str) -> tuple[str, float] | None:
             return si, units[spelled]
     if spelled in _FURTHER_UNITS:
         unit, count = _FURTHER_UNITS[spelled]
-        known = parse_unit(unit)
-        return known and (known[0], count * known[1])
+        parsed = parse_unit(unit)
+        return parsed and (parsed[0], count * parsed[1])
     if spelled[:1] in _PREFIXES and spelled[1:] in _PREFIXED:
         return spelled[1:], _PREFIXES[spelled[0]]
     for sign, allowed in (("/", ("m/s", "rad/s")), (" ", ("N m", "m N"))):
@@ -106,11 +106,13 @@ def in_si(entry: str, unit: str, wanted: str) -> float:
     Raises:
         InputError: If it is no unit of that; ``entry`` says where it stands.
     """
-    known = parse_unit(unit)
-    if known is not None and (wanted == known[0] or wanted not in UNITS):
-        return known[1]
+    parsed = parse_unit(unit)
+    if parsed is not None and (wanted == parsed[0] or wanted not in UNITS):
+        return parsed[1]
     fitting = UNITS.get(wanted) or {unit: factor for units in UNITS.values() for unit, factor in units.items()}
-    if known is not None:
-        raise InputError(entry, f"is a unit of what is in {known[0]}, and this is in {wanted}", unit)
-    near = nearest(unit, fitting)
-    raise InputError(entry, f"must be {', '.join(fitting)}" + (f"; did you mean {near}?" if near else ""), unit)
+    if parsed is not None:
+        raise InputError(entry, f"is a unit of what is in {parsed[0]}, and this is in {wanted}", unit)
+    nearest_unit = nearest(unit, fitting)
+    raise InputError(
+        entry, f"must be {', '.join(fitting)}" + (f"; did you mean {nearest_unit}?" if nearest_unit else ""), unit
+    )

@@ -99,15 +99,19 @@ def _normal(y: Any, p: Any) -> Any:
     gap = _between(centre, one, two, n)
     for _ in range(_MOST_STEPS):
         s, t = perpendicular_vectors(n[0], n[1], n[2])
-        _, here, slope = _support(one, n)
-        _, there, other = _support(two, n)
-        way = (centre[0] - here[0] - there[0], centre[1] - here[1] - there[1], centre[2] - here[2] - there[2])
-        ss, st, tt = _bent(s, t, slope, other, dot(n, way))
+        _, first_support, slope = _support(one, n)
+        _, second_support, other = _support(two, n)
+        between_supports = (
+            centre[0] - first_support[0] - second_support[0],
+            centre[1] - first_support[1] - second_support[1],
+            centre[2] - first_support[2] - second_support[2],
+        )
+        ss, st, tt = _bent(s, t, slope, other, dot(n, between_supports))
         # What turns no maximum into one: the least eigenvalue is lifted.
         least = 0.5 * (ss + tt) - (0.25 * (ss - tt) * (ss - tt) + st * st) ** 0.5
         lift = max(_LEAST_CURVATURE_SHARE * (abs(ss) + abs(tt)) - least, 0.0)
         ss, tt = ss + lift, tt + lift
-        by_s, by_t, whole = dot(s, way), dot(t, way), 1.0 / (ss * tt - st * st)
+        by_s, by_t, whole = dot(s, between_supports), dot(t, between_supports), 1.0 / (ss * tt - st * st)
         a, b = (tt * by_s - st * by_t) * whole, (ss * by_t - st * by_s) * whole
         share, better = 1.0, gap
         for _ in range(_MOST_HALVINGS):
@@ -128,19 +132,19 @@ def _normal(y: Any, p: Any) -> Any:
 def _value(y: Any, p: Any, out: Any) -> None:
     n, one, two = _normal(y, p)
     far, _, _ = _support(one, n)
-    near, there, _ = _support(two, n)
-    out[0] = dot(n, (y[0], y[1], y[2])) - far - near
+    second_level, second_support, _ = _support(two, n)
+    out[0] = dot(n, (y[0], y[1], y[2])) - far - second_level
     tangent(n[0], n[1], n[2], POLE_TANGENT_1, out, 7)
     tangent(n[0], n[1], n[2], POLE_TANGENT_2, out, 10)
     for i in range(3):
-        out[1 + i], out[4 + i] = n[i], there[i] + 0.5 * out[0] * n[i]
+        out[1 + i], out[4 + i] = n[i], second_support[i] + 0.5 * out[0] * n[i]
 
 
 def _slopes(y: Any, p: Any, out: Any) -> None:
     n, one, two = _normal(y, p)
-    far, here, by_n = _support(one, n)
-    near, _, by_other = _support(two, n)
-    gap = dot(n, (y[0], y[1], y[2])) - far - near
+    first_level, first_support, by_n = _support(one, n)
+    second_level, _, by_other = _support(two, n)
+    gap = dot(n, (y[0], y[1], y[2])) - first_level - second_level
     s, t = perpendicular_vectors(n[0], n[1], n[2])
     ss, st, tt = _bent(s, t, by_n, by_other, gap)
     whole = 1.0 / (ss * tt - st * st)
@@ -149,7 +153,7 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         moved = unit
         if j > 2:
             # The point at which a plane touches goes along, and on from there, as the body turns under the plane.
-            a, b, c = cross(unit, here)
+            a, b, c = cross(unit, first_support)
             d, e, f = cross(unit, n)
             d, e, f = turned(by_n, d, e, f)
             moved = (d - a, e - b, f - c)

@@ -123,15 +123,15 @@ def _arc_fractions(turn: float, limits: tuple[float, float], resolution: int, la
     return np.asarray(np.arange(1, count + 1) / (count if last else count + 1))
 
 
-def _tangent(placement: pin.SE3, here: tuple[float, float], there: tuple[float, float]) -> tuple[float, float]:
+def _tangent(placement: pin.SE3, first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
     # Directions in which a taut path leaves one pulley and meets the next, each (signed radius, offset). Each end is
     # the tangent from the other end's point; for parallel axes this converges quadratically to the common tangent.
     leave, entry = 0.0, 0.0
     for _ in range(8):
-        x, y, _ = placement.act(_on_pulley(*there, entry))
-        leave = math.atan2(y, x) - _asin(here[0], math.hypot(x, y))
-        x, y, _ = placement.actInv(_on_pulley(*here, leave))
-        entry = math.atan2(-y, -x) + _asin(there[0], math.hypot(x, y))
+        x, y, _ = placement.act(_on_pulley(*second, entry))
+        leave = math.atan2(y, x) - _asin(first[0], math.hypot(x, y))
+        x, y, _ = placement.actInv(_on_pulley(*first, leave))
+        entry = math.atan2(-y, -x) + _asin(second[0], math.hypot(x, y))
     return leave, entry
 
 

@@ -64,11 +64,11 @@ def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: A
     return SHORT_WAY if angle > touching else FREE
 
 
-def path(way: Any, r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
+def path(side: Any, r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
     """Return length and turn of a path, and their derivatives."""
-    if way == INSIDE:
+    if side == INSIDE:
         return _inside(r0, r1, angle, radius)
-    return _around(r0, r1, angle if way == SHORT_WAY else 2.0 * math.pi - angle, radius)
+    return _around(r0, r1, angle if side == SHORT_WAY else 2.0 * math.pi - angle, radius)
 
 
 def _around(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:

@@ -23,13 +23,13 @@ def _plane(y: Any, p: Any) -> Any:
     sx, sy, _, inside = side_point(y, p)
     along = (sx * a[0] + sy * a[1]) / max(r0, 1e-300)
     across = sense * (sy * a[0] - sx * a[1]) / max(r0, 1e-300)
-    way = way_of_path(r0, r1, angle, p[0], along, across, p[4], inside)
-    return way, a, b, r0, r1, angle, (0.0, 0.0, sense)
+    side = way_of_path(r0, r1, angle, p[0], along, across, p[4], inside)
+    return side, a, b, r0, r1, angle, (0.0, 0.0, sense)
 
 
-def _turned(way: Any, turn: Any, flat: Any) -> Any:
+def _turned(side: Any, turn: Any, flat: Any) -> Any:
     """Return the turn of a path in space, of that in the plane and of P / L, and its derivatives by both."""
-    if way != INSIDE:
+    if side != INSIDE:
         return turn * flat, flat, turn
     half, rest = math.sin(0.5 * turn), math.cos(0.5 * turn)
     share = 2.0 / math.sqrt(max(1.0 - (flat * half) ** 2, 1e-300))
@@ -38,17 +38,17 @@ def _turned(way: Any, turn: Any, flat: Any) -> Any:
 
 def cylinder_value(y: Any, p: Any, out: Any) -> None:
     """Fill in length, turn and pull."""
-    way, a, b, r0, r1, angle, normal = _plane(y, p)
-    if way == FREE:
+    side, a, b, r0, r1, angle, normal = _plane(y, p)
+    if side == FREE:
         straight_value(y, p, out)
         return
-    wrap = path(way, r0, r1, angle, p[0])
-    pull = gradient(wrap.by_r0, wrap.by_r1, wrap.by_angle, r0, r1, directions(a, b, r0, r1, normal, way))
+    wrap = path(side, r0, r1, angle, p[0])
+    pull = gradient(wrap.by_r0, wrap.by_r1, wrap.by_angle, r0, r1, directions(a, b, r0, r1, normal, side))
     rise = y[5] - y[2]
     length = math.sqrt(wrap.length**2 + rise**2)
     flat = wrap.length / length
     out[0] = length
-    out[1] = _turned(way, wrap.turn, flat)[0]
+    out[1] = _turned(side, wrap.turn, flat)[0]
     for i in range(6):
         out[2 + i] = flat * pull[i]
     out[4] = -rise / length
@@ -57,18 +57,18 @@ def cylinder_value(y: Any, p: Any, out: Any) -> None:
 
 def cylinder_slopes(y: Any, p: Any, out: Any) -> None:
     """Fill in the slopes of turn and pull."""
-    way, a, b, r0, r1, angle, normal = _plane(y, p)
-    if way == FREE:
+    side, a, b, r0, r1, angle, normal = _plane(y, p)
+    if side == FREE:
         straight_slopes(y, p, out)
         return
-    wrap = path(way, r0, r1, angle, p[0])
-    frame = directions(a, b, r0, r1, normal, way)
+    wrap = path(side, r0, r1, angle, p[0])
+    frame = directions(a, b, r0, r1, normal, side)
     flat_pull = gradient(wrap.by_r0, wrap.by_r1, wrap.by_angle, r0, r1, frame)
     flat_turn = gradient(wrap.turn_by_r0, wrap.turn_by_r1, wrap.turn_by_angle, r0, r1, frame)
     curvatures(wrap, 0.0, math.cos(angle), r0, r1, frame, out)
     length = math.sqrt(wrap.length**2 + (y[5] - y[2]) ** 2)
     flat, steep = wrap.length / length, (y[5] - y[2]) / length
-    _, by_turn, by_flat = _turned(way, wrap.turn, flat)
+    _, by_turn, by_flat = _turned(side, wrap.turn, flat)
     for i in range(6):
         up = 1.0 * (i == 5) - 1.0 * (i == 2)
         pull = flat * flat_pull[i] + steep * up

@@ -42,8 +42,8 @@ def side_point(y: Any, p: Any) -> Any:
     """Return the side point, seen from the wrap, and whether the path passes inside."""
     if p[4] != SIDE_ON_OTHER_BODY:
         return p[1], p[2], p[3], p[5]
-    near = y[6] * y[6] + y[7] * y[7] + y[8] * y[8] < p[0] * p[0]
-    return y[6], y[7], y[8], 1.0 if near else 0.0
+    inside = y[6] * y[6] + y[7] * y[7] + y[8] * y[8] < p[0] * p[0]
+    return y[6], y[7], y[8], 1.0 if inside else 0.0
 
 
 def straight_value(y: Any, p: Any, out: Any) -> None:

@@ -27,18 +27,18 @@ def _plane(y: Any, p: Any) -> Any:
     along = (sx * a[0] + sy * a[1] + sz * a[2]) / max(r0, 1e-300)
     tx, ty, tz = crossed(normal, a)
     across = (sx * tx + sy * ty + sz * tz) / max(r0, 1e-300)
-    way = way_of_path(r0, r1, angle, p[0], along, across, p[4], inside)
-    return way, a, b, r0, r1, angle, normal
+    side = way_of_path(r0, r1, angle, p[0], along, across, p[4], inside)
+    return side, a, b, r0, r1, angle, normal
 
 
 def sphere_value(y: Any, p: Any, out: Any) -> None:
     """Fill in length, turn and pull."""
-    way, a, b, r0, r1, angle, normal = _plane(y, p)
-    if way == FREE:
+    side, a, b, r0, r1, angle, normal = _plane(y, p)
+    if side == FREE:
         straight_value(y, p, out)
         return
-    wrap = path(way, r0, r1, angle, p[0])
-    pull = gradient(wrap.by_r0, wrap.by_r1, wrap.by_angle, r0, r1, directions(a, b, r0, r1, normal, way))
+    wrap = path(side, r0, r1, angle, p[0])
+    pull = gradient(wrap.by_r0, wrap.by_r1, wrap.by_angle, r0, r1, directions(a, b, r0, r1, normal, side))
     out[0] = wrap.length
     out[1] = wrap.turn
     for i in range(6):
@@ -47,16 +47,16 @@ def sphere_value(y: Any, p: Any, out: Any) -> None:
 
 def sphere_slopes(y: Any, p: Any, out: Any) -> None:
     """Fill in the slopes of turn and pull."""
-    way, a, b, r0, r1, angle, normal = _plane(y, p)
-    if way == FREE:
+    side, a, b, r0, r1, angle, normal = _plane(y, p)
+    if side == FREE:
         straight_slopes(y, p, out)
         return
-    wrap = path(way, r0, r1, angle, p[0])
-    frame = directions(a, b, r0, r1, normal, way)
+    wrap = path(side, r0, r1, angle, p[0])
+    frame = directions(a, b, r0, r1, normal, side)
     turn = gradient(wrap.turn_by_r0, wrap.turn_by_r1, wrap.turn_by_angle, r0, r1, frame)
     for i in range(6):
         out[i] = turn[i]
-    sine = max(math.sin(angle), 1e-300) * (-1.0 if way == LONG_WAY else 1.0)
+    sine = max(math.sin(angle), 1e-300) * (-1.0 if side == LONG_WAY else 1.0)
     curvatures(wrap, sine, math.cos(angle), r0, r1, frame, out)
 
 
@@ -69,9 +69,9 @@ def crossed(a: Any, b: Any) -> Any:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def directions(a: Any, b: Any, r0: Any, r1: Any, normal: Any, way: Any) -> Any:
+def directions(a: Any, b: Any, r0: Any, r1: Any, normal: Any, side: Any) -> Any:
     """Return unit vectors at both ends: outwards at the first, along the path's turn there; the same at the second."""
-    sense = -1.0 if way == LONG_WAY else 1.0
+    sense = -1.0 if side == LONG_WAY else 1.0
     u, v = (a[0] / r0, a[1] / r0, a[2] / r0), (b[0] / r1, b[1] / r1, b[2] / r1)
     along = (sense * normal[0], sense * normal[1], sense * normal[2])
     return u, crossed(along, u), v, crossed(along, v)
