@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.description.scenario import Scenario
-from finger_pin.identification.comparison import DESCRIBED, bic
+from finger_pin.identification.comparison import SCENARIO_LAW, bic
 from finger_pin.identification.estimate import fit
 from finger_pin.identification.models import build_problem
 from finger_pin.identification.recordings import read_recording
@@ -145,9 +145,9 @@ def comparable_bic(bench: str, law: Law, result: xr.Dataset, reference: xr.Datas
     recorded = [read_recording(name, each, None) for name, each in settings.recordings.items()]
     problem = build_problem(scenario, settings, recorded)
     values, shares = problem.values(problem.start), reference["independent_share"].values[problem.groups]
-    values[: problem.asked] = result["estimate"].values
+    values[: problem.requested_count] = result["estimate"].values
     best = fit(problem, problem.to_search(values), weights=shares)
-    return bic(best.residuals, shares, problem.asked, problem.groups, problem.least_noise)
+    return bic(best.residuals, shares, problem.requested_count, problem.groups, problem.least_noise)
 
 
 def by_variable(result: xr.Dataset, along: str, values: str, samples: str, power: float = 1.0) -> dict[str, float]:
@@ -176,7 +176,7 @@ def summary(bench: str, law: Law, result: xr.Dataset, reference: xr.Dataset) -> 
 def compare(bench: str, starts: int, output: Path | None = None) -> Iterator[tuple[str, Row | str]]:
     """Yield the laws of a bench, that which it has first, each with its row or the name of the same one."""
     reference: xr.Dataset | None = None
-    for name, law in {DESCRIBED: Law({}), **LAWS[bench]}.items():
+    for name, law in {SCENARIO_LAW: Law({}), **LAWS[bench]}.items():
         if isinstance(law, str):
             yield name, law
             continue
@@ -191,7 +191,7 @@ def plot_laws(table: Mapping[str, Mapping[str, Row | str]]) -> Figure:
     """Draw the held-out rms of every law over that of the bench's law, a panel for each bench."""
     figure, panels = grid(len(table), 3, (4.2, 3.6), sharex=True)
     for axes, (bench, rows) in zip(panels, table.items(), strict=True):
-        described, laws = rows[DESCRIBED], [*LAWS[bench], DESCRIBED]
+        described, laws = rows[SCENARIO_LAW], [*LAWS[bench], SCENARIO_LAW]
         assert isinstance(described, Row)
         for (marker, edge, face), (variable, signal) in zip(_MARKS, described.signals.items(), strict=False):
             points = [
@@ -238,7 +238,7 @@ def main(arguments: list[str] | None = None) -> int:
             if isinstance(row, str):
                 print(f"  {law:24} as {row}", flush=True)
                 continue
-            described = rows[DESCRIBED]
+            described = rows[SCENARIO_LAW]
             assert isinstance(described, Row)
             print(f"  {law:24} {row.parameters:2} {row.bic - described.bic:8.1f}", flush=True)
             for variable, each in row.signals.items():

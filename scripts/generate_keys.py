@@ -164,7 +164,7 @@ CONDITIONS: dict[str, Callable[[ClosedLoop], object]] = {
     ),
     "With objects, or links that touch each other": lambda loop: loop.finger.scene,
     "With free objects": lambda loop: loop.finger.scene and loop.finger.scene.free,
-    "With objects that are moved along paths": lambda loop: loop.guides,
+    "With objects that are moved along paths": lambda loop: loop.prescribed_motion,
     "With a palm that moves": lambda loop: loop.palm,
     "With tendons of a tree that are springs": lambda loop: (
         (tree := loop.finger.description.tree) and any(each.stiffness for each in tree.tendons.values())

@@ -19,8 +19,8 @@ from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
-# Postures from which the search for the worst goes on.
-_DEEPER = 3
+# Number of worst postures from which simplex searches start.
+_SIMPLEX_STARTS = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,18 +85,18 @@ def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
         allowed = 'must be "canal" for statics of tendons along paths through space'
         raise InputError("finger.tendon_friction.place", allowed, finger.description.tendon_friction.place)
     coupling, actuated = finger.coupling_at(theta), finger.routing.actuated
-    turns = dict(zip(finger.paths.routes, finger.paths.turn(theta), strict=True))
-    added = [turns.get(str(tendon.along), 0.0) for tendon in finger.description.tendons.values()]
+    angles_by_route = dict(zip(finger.paths.routes, finger.paths.turn(theta), strict=True))
+    added_curvature = [angles_by_route.get(str(tendon.along), 0.0) for tendon in finger.description.tendons.values()]
     routing = replace(
         finger.routing,
         coupling=coupling,
         strand_coupling=np.concatenate([coupling[:actuated], finger.routing.strand_coupling[actuated:]]),
-        curvature_offset=finger.routing.curvature_offset + added,
+        curvature_offset=finger.routing.curvature_offset + added_curvature,
         through_space=np.zeros_like(finger.routing.through_space),
     )
-    twin = copy.copy(finger)
-    twin.routing, twin.tendons = routing, replace(finger.tendons, routing=routing)
-    return twin
+    posed_finger = copy.copy(finger)
+    posed_finger.routing, posed_finger.tendons = routing, replace(finger.tendons, routing=routing)
+    return posed_finger
 
 
 def closure_over_range(finger: FingerLike, samples: int = 512) -> ClosureRange:
@@ -110,19 +110,19 @@ def closure_over_range(finger: FingerLike, samples: int = 512) -> ClosureRange:
     """
     finger = as_finger(finger)
     lower, upper = finger.stroke_limiter.lower, finger.stroke_limiter.upper
-    spread = scipy.stats.qmc.Sobol(len(lower), seed=0).random(samples)
-    positions = list(lower + spread * (upper - lower))
-    margins = [_closure(finger, each)[1] for each in positions]
-    for start in np.argsort(margins, kind="stable")[:_DEEPER]:
+    shares = scipy.stats.qmc.Sobol(len(lower), seed=0).random(samples)
+    positions = list(lower + shares * (upper - lower))
+    margins = [_closure_margin(finger, each)[1] for each in positions]
+    for start in np.argsort(margins, kind="stable")[:_SIMPLEX_STARTS]:
         minimum = scipy.optimize.minimize(
-            lambda theta: _closure(finger, theta)[1],
+            lambda theta: _closure_margin(finger, theta)[1],
             positions[start],
             method="Nelder-Mead",
             bounds=list(zip(lower, upper, strict=True)),
             options={"maxfev": 60 * len(lower)},
         )
         positions.append(np.clip(minimum.x, lower, upper))
-    closures = [_closure(finger, each) for each in positions]
+    closures = [_closure_margin(finger, each) for each in positions]
     return ClosureRange(
         positions=np.array(positions),
         tension=np.array([closure.tension for closure, _ in closures]),
@@ -147,15 +147,15 @@ def locking_over_range(finger: FingerLike, samples: int = 64) -> tuple[CriticalF
     """
     finger = as_finger(finger)
     closure = closure_over_range(finger, samples)
-    taut = closure.positions[closure.taut]
-    if not len(taut):
+    postures = closure.positions[closure.taut]
+    if not len(postures):
         raise InputError("finger.tendons", str(closure))
-    critical = [critical_friction(posed(finger, each), each) for each in taut]
+    critical = [critical_friction(posed(finger, each), each) for each in postures]
     worst = int(np.argmin([each.coefficient for each in critical]))
-    return critical[worst], np.asarray(taut[worst])
+    return critical[worst], np.asarray(postures[worst])
 
 
-def _closure(finger: Finger, position: Array) -> tuple[ForceClosure, float]:
+def _closure_margin(finger: Finger, position: Array) -> tuple[ForceClosure, float]:
     """Return the internal tensions at a posture and their margin, which has a sign if the balance is unique."""
     closure = ForceClosure.from_coupling(finger.coupling_at(position), finger.routing.tendons)
     balances = closure.null_space

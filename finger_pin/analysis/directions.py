@@ -1,4 +1,4 @@
-"""The ways in which joints and, with them, tendons can move."""
+"""Directions of motion of joints and, with them, tendons."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 
-# A mean nearer to the origin than this is there: rows of length one cancel but for rounding.
-_TOUCHING = 1e-7
+# Distance within which a mean is at the origin: rows of length one cancel but for rounding.
+_ORIGIN_TOLERANCE = 1e-7
 
 
 def sliding_velocity(tendons: Tendons, velocity: Array) -> Array:
@@ -22,41 +22,41 @@ def sliding_velocity(tendons: Tendons, velocity: Array) -> Array:
 
 
 def directions_of_motion(tendons: Tendons, moving: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return every way in which the given joints can move: signs of joints, shape (m, n), and tendons, shape (m, t)."""
+    """Return all possible signs of motion of joints, shape (m, n), and with them of tendons, shape (m, t)."""
     columns = sliding_velocity(tendons, np.eye(len(moving))).T
-    return _ways(columns.tobytes(), columns.shape, tuple(moving.tolist()))
+    return _motion_signs(columns.tobytes(), columns.shape, tuple(moving.tolist()))
 
 
-# Of the postures of one finger, most have the same.
+# Most postures of one finger have the same columns.
 @lru_cache(maxsize=16)
-def _ways(columns: bytes, shape: tuple[int, int], moving: tuple[bool, ...]) -> tuple[Array, Array]:
-    speeds, moves = np.frombuffer(columns).reshape(shape), np.array(moving)
+def _motion_signs(columns: bytes, shape: tuple[int, int], moving: tuple[bool, ...]) -> tuple[Array, Array]:
+    speeds, moving_joints = np.frombuffer(columns).reshape(shape), np.array(moving)
     signs, sliding = [], []
-    for chosen in product((1.0, -1.0), repeat=int(moves.sum())):
-        sign = np.zeros(len(moves))
-        sign[moves] = chosen
-        turns = speeds * sign
+    for joint_signs in product((1.0, -1.0), repeat=int(moving_joints.sum())):
+        sign = np.zeros(len(moving_joints))
+        sign[moving_joints] = joint_signs
+        speeds_by_joint = speeds * sign
         options = [
-            [side for side, any_such in ((1.0, (row > 0.0).any()), (-1.0, (row < 0.0).any())) if any_such] or [0.0]
-            for row in turns
+            [side for side in (1.0, -1.0) if (side * tendon_speeds > 0.0).any()] or [0.0]
+            for tendon_speeds in speeds_by_joint
         ]
-        unsure = np.array([len(option) > 1 for option in options])
-        undecided = turns[unsure][:, moves]
-        undecided = undecided / np.linalg.norm(undecided, axis=1, keepdims=True)
-        ways: list[tuple[float, ...]] = [()]
-        # What some tendons cannot do together, all of them cannot.
-        for count in range(1, len(undecided) + 1):
-            further = ((*way, side) for way in ways for side in (1.0, -1.0))
-            ways = [way for way in further if _possible(np.array(way)[:, None] * undecided[:count])]
-        slide = np.array([option[0] for option in options])
-        for way in ways:
-            slide[unsure] = way
+        ambiguous = np.array([len(option) > 1 for option in options])
+        rows = speeds_by_joint[ambiguous][:, moving_joints]
+        rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+        patterns: list[tuple[float, ...]] = [()]
+        # A pattern that is impossible for some tendons is so for all.
+        for count in range(1, len(rows) + 1):
+            extended = ((*pattern, side) for pattern in patterns for side in (1.0, -1.0))
+            patterns = [pattern for pattern in extended if _is_possible(np.array(pattern)[:, None] * rows[:count])]
+        tendon_signs = np.array([option[0] for option in options])
+        for pattern in patterns:
+            tendon_signs[ambiguous] = pattern
             signs.append(sign)
-            sliding.append(slide.copy())
+            sliding.append(tendon_signs.copy())
     return np.array(signs), np.array(sliding)
 
 
-def _possible(turns: Array) -> bool:
+def _is_possible(turns: Array) -> bool:
     """Return whether positive speeds x exist with turns @ x > 0, rows of length one.
 
     They do if and only if no y >= 0 but zero has turns^T y_1 + y_2 = 0 (Gordan, Mathematische Annalen 6, 1873): if the
@@ -66,4 +66,4 @@ def _possible(turns: Array) -> bool:
         return True
     rows = np.concatenate([turns, np.eye(turns.shape[1])])
     means = np.concatenate([rows.T, np.ones((1, len(rows)))])
-    return float(scipy.optimize.nnls(means, np.eye(len(means))[-1])[1]) > _TOUCHING
+    return float(scipy.optimize.nnls(means, np.eye(len(means))[-1])[1]) > _ORIGIN_TOLERANCE

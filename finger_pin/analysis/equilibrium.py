@@ -20,21 +20,21 @@ from finger_pin.mechanism.tendons import SOURCES_WITH_END, WINCHES
 from finger_pin.mechanism.tree_mechanism import MUSCLES, STATEFUL, STATELESS
 from finger_pin.typing import Array
 
-# Of an angle, rad, for differences.
-_SHIFT = 1e-7
+# Change of an angle for differences, rad.
+_ANGLE_SHIFT = 1e-7
 # The longest step of the descent, in the joints' and masses' scales: none leads over a ridge into another valley.
 _LONGEST_STEP = 0.2
-# The slope, in parts of the first, and the number of steps at which the descent ends; a few of Newton's follow.
-_ARRIVED, _MOST_STEPS = 1e-7, 500
+# Slope, part of the first, and number of steps at which the descent ends; a few Newton steps follow.
+_SLOPE_TOLERANCE, _MAX_STEPS = 1e-7, 500
 # Stiffness to the start, N m, without which the descent would wander where a finger may rest anywhere.
 _TETHER = 1e-6
-# Largest acceleration that is rest, in parts of the joints' and masses' scales over a square second.
-_REST = 1e-4
+# Largest acceleration at rest, in scales of joints and masses per square second.
+_REST_ACCELERATION = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Equilibrium(BriefRepr):
-    """A posture in which a finger is at rest, and stays.
+    """Stable posture of a finger at rest.
 
     Attributes:
         position: theta, shape (n,), rad.
@@ -74,7 +74,7 @@ def equilibrium(
             their own or actuators that integrate, or it comes to no rest.
     """
     finger = as_finger(finger)
-    _refuse_restless(finger)
+    _check_can_rest(finger)
     command = as_inputs(finger, inputs)
     if np.any(command[: finger.routing.actuated][~finger.routing.winched] < 0.0):
         raise InputError("inputs", "a tension must not be negative", command.tolist())
@@ -82,9 +82,9 @@ def equilibrium(
     shape = (len(tips), 3) if tips else (3,)
     force = np.zeros(shape) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
     if force.shape != shape:
-        whose = f", a row each for {', '.join(tips)}" if tips else ""
-        raise InputError("fingertip_force", f"must have shape {shape}{whose}", force.shape)
-    pushed = np.reshape(finite_vector("fingertip_force", force.ravel(), force.size), shape)
+        row_names = f", a row each for {', '.join(tips)}" if tips else ""
+        raise InputError("fingertip_force", f"must have shape {shape}{row_names}", force.shape)
+    tip_force = np.reshape(finite_vector("fingertip_force", force.ravel(), force.size), shape)
     joints = len(finger.routing.joints)
     limiter = finger.stroke_limiter
     start = (
@@ -92,16 +92,16 @@ def equilibrium(
         if position is None
         else np.array(finite_vector("position", position, joints))
     )
-    problem = _Statics.from_posture(finger, command, pushed, start)
+    problem = _Statics.from_posture(finger, command, tip_force, start)
     y = problem.start
-    begun = float(np.max(np.abs(problem.acceleration(y))))
-    if begun >= _REST:
-        y = _downhill(problem.energy, problem.slope, problem.acceleration, y)
-    if not float(np.max(np.abs(problem.acceleration(y)))) < max(_REST, 1e-9 * begun):
+    initial_acceleration = float(np.max(np.abs(problem.acceleration(y))))
+    if initial_acceleration >= _REST_ACCELERATION:
+        y = _descend(problem.energy, problem.slope, problem.acceleration, y)
+    if not float(np.max(np.abs(problem.acceleration(y)))) < max(_REST_ACCELERATION, 1e-9 * initial_acceleration):
         raise InputError("inputs", "the finger comes to no rest under it", command.tolist())
-    places, x = problem.scale * y, problem.packed(y)
-    torque = finger.evaluate(x, command, pushed).tendon_torque
-    return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)
+    coordinates, x = problem.scale * y, problem.packed(y)
+    torque = finger.evaluate(x, command, tip_force).tendon_torque
+    return Equilibrium(coordinates[:joints], coordinates[joints:], np.asarray(torque), x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class _Statics:
     Attributes:
         finger: The finger.
         command: Its inputs, shape (u,).
-        pushed: F, shape (3,), N.
+        tip_force: F, shape (3,), N.
         rest: The packed state at the start, with actuators that have settled.
         scale: Of joints and passive tendons, shape (k,), rad and m.
         on_paths: Which of the joints are moved along paths, shape (n,): they stay where they are.
@@ -119,25 +119,26 @@ class _Statics:
 
     finger: Finger
     command: Array
-    pushed: Array
+    tip_force: Array
     rest: Array
     scale: Array
     on_paths: NDArray[np.bool_]
 
     @classmethod
-    def from_posture(cls, finger: Finger, command: Array, pushed: Array, position: Array) -> _Statics:
+    def from_posture(cls, finger: Finger, command: Array, tip_force: Array, position: Array) -> _Statics:
         """Return the problem that starts at a posture, shape (n,)."""
         rest, passive = finger.rest_state(position), finger.routing.passive
         actuator_state = finger.layout.unpack(rest).actuator_state
         for table in finger.mechanism.rows:
             if table.group in (STATEFUL, MUSCLES):
-                # What comes late has come; the input's limits are those of an activation as well.
+                # Lags have settled; the input's limits are those of an activation as well.
                 limits = [4, 5, -2, -1] if table.group == STATEFUL else [-2, -1, -2, -1]
-                least, most, lowest, highest = table.parameters[limits]
-                actuator_state[: table.count] = np.clip(np.clip(command[table.channels], least, most), lowest, highest)
+                lower_input, upper_input, lowest, highest = table.parameters[limits]
+                inputs = np.clip(command[table.channels], lower_input, upper_input)
+                actuator_state[: table.count] = np.clip(inputs, lowest, highest)
                 actuator_state = actuator_state[table.count :]
         scale = np.concatenate([np.ones(len(position)), np.full(passive, 1e-3)])
-        return cls(finger, command, pushed, rest, scale, finger.led_joints)
+        return cls(finger, command, tip_force, rest, scale, finger.led_joints)
 
     @property
     def start(self) -> Array:
@@ -147,25 +148,26 @@ class _Statics:
 
     def packed(self, y: Array) -> Array:
         """Return the packed state at rest in a posture."""
-        x, joints, places = self.rest.copy(), len(self.finger.routing.joints), self.scale * y
+        x, joints, coordinates = self.rest.copy(), len(self.finger.routing.joints), self.scale * y
         state = self.finger.layout.unpack(x)
-        state.position[~self.on_paths], state.passive_position[:] = places[:joints][~self.on_paths], places[joints:]
+        state.position[~self.on_paths] = coordinates[:joints][~self.on_paths]
+        state.passive_position[:] = coordinates[joints:]
         return x
 
     def energy(self, y: Array) -> float:
         """Return the stored energy less the work of inputs and force, J."""
         finger, joints, actuated = self.finger, len(self.finger.routing.joints), self.finger.routing.actuated
         x = self.packed(y)
-        theta, signals = finger.layout.unpack(x).position, finger.evaluate(x, self.command, self.pushed)
+        theta, signals = finger.layout.unpack(x).position, finger.evaluate(x, self.command, self.tip_force)
         stored, _ = signals.mechanism.account()
-        raised = finger.motion(theta, np.zeros(joints)).potential_energy
+        potential_energy = finger.motion(theta, np.zeros(joints)).potential_energy
         work = (~finger.routing.winched * signals.tendons.entering[:actuated]) @ finger.excursion(theta)
-        work += float(np.sum(self.pushed * finger.rigid_body.tip_position(theta))) + _work_of_actuators(signals)
-        return float(sum(stored.values()) + raised - work)
+        work += float(np.sum(self.tip_force * finger.rigid_body.tip_position(theta))) + _actuator_work(signals)
+        return float(sum(stored.values()) + potential_energy - work)
 
     def acceleration(self, y: Array) -> Array:
         """Return the acceleration from rest there, shape (k,)."""
-        rates = self.finger.layout.unpack(self.finger.rhs(0.0, self.packed(y), self.command, self.pushed))
+        rates = self.finger.layout.unpack(self.finger.rhs(0.0, self.packed(y), self.command, self.tip_force))
         return np.asarray(np.concatenate([rates.velocity, rates.passive_velocity]) / self.scale)
 
     def slope(self, y: Array) -> Array:
@@ -177,16 +179,16 @@ class _Statics:
         return np.asarray(-scale * (inertia @ (scale * self.acceleration(y))))
 
 
-def _refuse_restless(finger: Finger) -> None:
+def _check_can_rest(finger: Finger) -> None:
     """Refuse a hand of several fingers, and a finger whose rest depends on more than its inputs."""
     description, tables = finger.description, finger.mechanism.rows
-    driven = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
+    has_drives = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
     stateful = any(table.states for table in finger.constructor_args.rows)
     free = finger.layout.names_of("object_pose")
     refused = {
         "several fingers": description.hand is not None,
-        f"actuators ({', '.join(description.actuators)})": driven and bool(description.actuators),
-        "drives of its own": driven and not description.actuators,
+        f"actuators ({', '.join(description.actuators)})": has_drives and bool(description.actuators),
+        "drives of its own": has_drives and not description.actuators,
         f"free objects ({', '.join(free)})": bool(free),
         "rows with states": stateful,
     }
@@ -199,27 +201,28 @@ def _refuse_restless(finger: Finger) -> None:
             raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")
 
 
-def _work_of_actuators(signals: FingerSignals) -> float:
+def _actuator_work(signals: FingerSignals) -> float:
     """Return the work of a tree's actuators along their lengths, J: the integral of a force that limits cut."""
     total = 0.0
     for group in (STATELESS, STATEFUL, WINCHES):
         if group not in signals.mechanism.rows:
             continue
         rows = signals.mechanism.rows[group]
-        by_length, least, most = rows.rows.parameters[[2, 6, 7]]
-        wanted = rows["wanted"]
-        cut = np.clip(wanted, least, most)
+        by_length, lower, upper = rows.rows.parameters[[2, 6, 7]]
+        unlimited = rows["wanted"]
+        limited = np.clip(unlimited, lower, upper)
         # With F = F_0 + b l the integral is H(F) / b, with H = F^2 / 2 within the limits, and a line beyond them.
-        affine = np.where(wanted == cut, 0.5 * wanted**2, cut * wanted - 0.5 * cut**2)
-        flat = by_length == 0.0
-        total += float(np.sum(np.where(flat, cut * rows.row.length, affine / np.where(flat, 1.0, by_length))))
+        affine = np.where(unlimited == limited, 0.5 * unlimited**2, limited * unlimited - 0.5 * limited**2)
+        constant = by_length == 0.0
+        divisor = np.where(constant, 1.0, by_length)
+        total += float(np.sum(np.where(constant, limited * rows.row.length, affine / divisor)))
     if MUSCLES in signals.mechanism.rows:
         rows = signals.mechanism.rows[MUSCLES]
         total += float(np.sum(active_work(rows.row.length, rows.row.state, rows.rows.parameters)))
     return total
 
 
-def _downhill(
+def _descend(
     energy: Callable[[Array], float],
     slope: Callable[[Array], Array],
     acceleration: Callable[[Array], Array],
@@ -234,19 +237,19 @@ def _downhill(
         start: Shape (k,).
     """
 
-    def by_place(of: Callable[[Array], Array], y: Array) -> Array:
+    def jacobian(function: Callable[[Array], Array], y: Array) -> Array:
         # Angles on limiters are tiny: steps that are parts of them would be lost in rounding.
-        shifts = _SHIFT * np.eye(len(y))
-        return np.transpose([of(y + each) - of(y - each) for each in shifts]) / (2.0 * _SHIFT)
+        shifts = _ANGLE_SHIFT * np.eye(len(y))
+        return np.transpose([function(y + each) - function(y - each) for each in shifts]) / (2.0 * _ANGLE_SHIFT)
 
     def curvature(y: Array) -> Array:
-        hessian = by_place(slope, y)
+        hessian = jacobian(slope, y)
         return 0.5 * (hessian + hessian.T) + _TETHER * np.eye(len(y))
 
-    enough = _ARRIVED * float(np.max(np.abs(slope(start))))
+    gradient_tolerance = _SLOPE_TOLERANCE * float(np.max(np.abs(slope(start))))
     radii = {"initial_trust_radius": 0.5 * _LONGEST_STEP, "max_trust_radius": _LONGEST_STEP}
-    options = {**radii, "gtol": enough, "maxiter": _MOST_STEPS}
-    fallen = scipy.optimize.minimize(
+    options = {**radii, "gtol": gradient_tolerance, "maxiter": _MAX_STEPS}
+    descended = scipy.optimize.minimize(
         lambda y: energy(y) + 0.5 * _TETHER * float(np.sum((y - start) ** 2)),
         start,
         method="trust-exact",
@@ -256,6 +259,6 @@ def _downhill(
     ).x
     # Damped, so that it stays where the finger may rest anywhere.
     polished = scipy.optimize.least_squares(
-        acceleration, fallen, lambda y: by_place(acceleration, y), method="lm", xtol=1e-15
+        acceleration, descended, lambda y: jacobian(acceleration, y), method="lm", xtol=1e-15
     ).x
-    return min((fallen, polished), key=lambda y: float(np.max(np.abs(acceleration(y)))))
+    return min((descended, polished), key=lambda y: float(np.max(np.abs(acceleration(y)))))

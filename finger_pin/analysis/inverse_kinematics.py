@@ -18,16 +18,16 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.path_elements import path_kinematics
 from finger_pin.typing import Array
 
-# A fingertip this close, m, is there.
-_THERE = 1e-6
-# Weight of a posture near the wanted one against the distance, m/rad: it decides between postures that all reach.
-_NEAR = 1e-9
-# Weight of couplings and loops against the distance, m/rad, and steps that bring the posture found onto them.
-_CONSTRAINT_WEIGHT, _LAST_STEPS = 1e3, 3
-# How far what is moved along paths may be from its place, rad or m.
-_STAYS = 1e-9
-# Shares of the joints' ranges from which a search begins, and most of their combinations.
-_STARTS, _MOST = (0.1, 0.5, 0.9), 27
+# Distance within which a fingertip has reached a point, m.
+_REACHED_DISTANCE = 1e-6
+# Weight of the distance to the preferred posture, m/rad: it decides between postures that all reach.
+_POSTURE_WEIGHT = 1e-9
+# Weight of couplings and loops against the distance, m/rad, and Newton steps that project the posture onto them.
+_CONSTRAINT_WEIGHT, _PROJECTION_STEPS = 1e3, 3
+# Half range of joints that are moved along paths, about their place, rad or m.
+_PATH_MARGIN = 1e-9
+# Shares of the joints' ranges at which searches start, and greatest number of their combinations.
+_START_SHARES, _MAX_STARTS = (0.1, 0.5, 0.9), 27
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,13 +47,13 @@ class TipPosture(BriefRepr):
     @property
     def reached(self) -> bool:
         """Whether the fingertip is at the point, to a micrometre."""
-        return self.distance < _THERE
+        return self.distance < _REACHED_DISTANCE
 
 
 def _constraints(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
-    """Return a function of theta: by how much couplings and loops are missed, shape (k,), and its slopes, (k, n)."""
+    """Return a function of theta: residuals of couplings and loops, shape (k,), and their slopes, (k, n)."""
     joints = len(finger.routing.joints)
-    moves = ~finger.led_joints
+    is_free = ~finger.led_joints
     tables = [table for table in finger.mechanism.rows if table.group in ("coupling", "loop")]
     if not tables:
         return lambda theta: (np.zeros(0), np.zeros((0, joints)))
@@ -61,11 +61,11 @@ def _constraints(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
     paths = [legs for table in tables for legs in table.paths]
     rest = np.concatenate([table.parameters[table.law.parameters.index("rest")] for table in tables])
 
-    def missed(theta: Array) -> tuple[Array, Array]:
+    def residuals(theta: Array) -> tuple[Array, Array]:
         kinematics = path_kinematics(finger.rigid_body, theta, paths, joints)
-        return arm @ theta + kinematics.length - rest, (arm + kinematics.arm) * moves
+        return arm @ theta + kinematics.length - rest, (arm + kinematics.arm) * is_free
 
-    return missed
+    return residuals
 
 
 def inverse_kinematics(
@@ -95,47 +95,51 @@ def inverse_kinematics(
     one_finger(finger.description)
     target = np.array(finite_vector("point", point, 3))
     low, high = (np.clip(each, -np.pi, np.pi) for each in (finger.stroke_limiter.lower, finger.stroke_limiter.upper))
-    wanted = np.clip(0.0, low, high) if near is None else np.array(finite_vector("near", near, len(low)))
+    preferred = np.clip(0.0, low, high) if near is None else np.array(finite_vector("near", near, len(low)))
     # What is moved along paths stays.
-    low, high = (np.where(finger.led_joints, wanted + half, each) for half, each in ((-_STAYS, low), (_STAYS, high)))
+    low = np.where(finger.led_joints, preferred - _PATH_MARGIN, low)
+    high = np.where(finger.led_joints, preferred + _PATH_MARGIN, high)
     coupling = PassiveCoupling.inextensible(finger.routing)
     free = coupling.free
-    followers, moved = list(coupling.followers), coupling.matrix[:, free]
+    followers, free_matrix = list(coupling.followers), coupling.matrix[:, free]
     body, constraints = finger.rigid_body, _constraints(finger)
 
-    def misses(angles: Array) -> Array:
-        theta = moved @ angles
+    def residuals(angles: Array) -> Array:
+        theta = free_matrix @ angles
         # A driven joint has a range as well: what is beyond it counts as if the tip were as far away, m/rad.
         beyond = np.maximum(0.0, low - theta)[followers] + np.maximum(0.0, theta - high)[followers]
-        off = _CONSTRAINT_WEIGHT * constraints(theta)[0]
-        return np.concatenate([body.tip_position(theta) - target, beyond, off, _NEAR * (theta - wanted)])
+        misfit = _CONSTRAINT_WEIGHT * constraints(theta)[0]
+        distance = _POSTURE_WEIGHT * (theta - preferred)
+        return np.concatenate([body.tip_position(theta) - target, beyond, misfit, distance])
 
     def slopes(angles: Array) -> Array:
-        theta = moved @ angles
+        theta = free_matrix @ angles
         side = (theta > high).astype(float) - (theta < low)
-        off = _CONSTRAINT_WEIGHT * constraints(theta)[1] @ moved
-        return np.concatenate([body.jacobian(theta) @ moved, (side[:, None] * moved)[followers], off, _NEAR * moved])
+        misfit = _CONSTRAINT_WEIGHT * constraints(theta)[1] @ free_matrix
+        beyond = (side[:, None] * free_matrix)[followers]
+        return np.concatenate([body.jacobian(theta) @ free_matrix, beyond, misfit, _POSTURE_WEIGHT * free_matrix])
 
     span = high[free] - low[free]
-    starts = [np.clip(wanted[free], low[free], high[free])]
-    starts += [low[free] + np.array(shares) * span for shares in islice(product(_STARTS, repeat=len(free)), _MOST)]
+    starts = [np.clip(preferred[free], low[free], high[free])]
+    combinations = islice(product(_START_SHARES, repeat=len(free)), _MAX_STARTS)
+    starts += [low[free] + np.array(shares) * span for shares in combinations]
     solutions: list[tuple[float, Array]] = []
     for start in starts:
         # Strictly inside, as bounded least squares want it.
         inside = np.clip(start, low[free] + 1e-6 * span, high[free] - 1e-6 * span)
         best = scipy.optimize.least_squares(
-            misses, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15
+            residuals, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15
         )
-        solutions.append((float(best.cost), moved @ best.x))
-        near_enough = np.linalg.norm(misses(best.x)[: 3 + len(followers)]) < 0.01 * _THERE
-        if near_enough and np.linalg.norm(constraints(moved @ best.x)[0]) < 0.01 * _THERE:
+        solutions.append((float(best.cost), free_matrix @ best.x))
+        tip_reached = np.linalg.norm(residuals(best.x)[: 3 + len(followers)]) < 0.01 * _REACHED_DISTANCE
+        if tip_reached and np.linalg.norm(constraints(free_matrix @ best.x)[0]) < 0.01 * _REACHED_DISTANCE:
             break
-    theta = _onto_couplings(min(solutions, key=lambda solution: solution[0])[1], constraints, low, high)
-    reached = np.asarray(body.tip_position(theta))
-    return TipPosture(theta, reached, float(np.linalg.norm(reached - target)))
+    theta = _project_onto_couplings(min(solutions, key=lambda solution: solution[0])[1], constraints, low, high)
+    tip_position = np.asarray(body.tip_position(theta))
+    return TipPosture(theta, tip_position, float(np.linalg.norm(tip_position - target)))
 
 
-def _onto_couplings(
+def _project_onto_couplings(
     theta: Array, constraints: Callable[[Array], tuple[Array, Array]], low: Array, high: Array
 ) -> Array:
     """Return the nearest posture within the ranges that satisfies a tree's couplings and loops.
@@ -143,10 +147,10 @@ def _onto_couplings(
     Raises:
         InputError: If there is none.
     """
-    for _ in range(_LAST_STEPS):
-        off, by_theta = constraints(theta)
-        if off.size:
-            theta = np.clip(theta - np.linalg.pinv(by_theta) @ off, low, high)
-    if constraints(theta)[0].size and np.linalg.norm(constraints(theta)[0]) > _THERE:
+    for _ in range(_PROJECTION_STEPS):
+        residual, by_theta = constraints(theta)
+        if residual.size:
+            theta = np.clip(theta - np.linalg.pinv(by_theta) @ residual, low, high)
+    if constraints(theta)[0].size and np.linalg.norm(constraints(theta)[0]) > _REACHED_DISTANCE:
         raise InputError("finger.tree", "no posture within the joints' ranges keeps to its couplings and loops")
     return theta

@@ -28,21 +28,21 @@ from finger_pin.mechanism.coerce import as_finger, as_inputs, as_packed, input_n
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
-# Differences: where to look, in steps; weights of sixth order, and from 0 on of third and of second order.
+# Differences: offsets in steps; weights of sixth order, and from 0 on of third and of second order.
 _OFFSETS = np.arange(-3.0, 4.0)
 _CENTRAL = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 _FORWARD = np.array([-11.0, 18.0, -9.0, 2.0]) / 6.0, np.array([-1.5, 2.0, -0.5, 0.0])
-# Slopes that differ by more than so much of them, or of the value's rounding, are apart; steps are divided so often,
-# and by so much, until one side has no kink.
-_APART, _ROUNDING, _TRIALS, _SHORTER = 1e-4, 1e-13, 4, 10.0
+# Relative difference of slopes, and of the value's rounding, above which they disagree; number of steps tried, and the
+# divisor from one to the next, until one side has no kink.
+_SLOPE_TOLERANCE, _ROUNDING, _MAX_TRIALS, _STEP_DIVISOR = 1e-4, 1e-13, 4, 10.0
 # Steps: of the scale of a state, of an input in N or V, of the size of a parameter.
-_OF_STATES, _OF_INPUTS, _OF_PARAMETERS = 1e-4, 1e-3, 1e-4
-# What part of these for a map.
-_OF_MAPS = 1e-3
-# How far from a state a motion begins that shows which steps its changes need, of its scale.
-_NEARBY = 1e-3
+_STATE_STEP, _INPUT_STEP, _PARAMETER_STEP = 1e-4, 1e-3, 1e-4
+# Steps of a map over these.
+_MAP_STEP_SHARE = 1e-3
+# Shift of the state, in its scales, of the motion whose time steps are used for all changes.
+_START_SHIFT = 1e-3
 # Tolerance of the step whose map is differentiated; it is taken again on the same steps.
-_TIGHT = 1e-9
+_STEP_TOLERANCE = 1e-9
 
 _Map = Callable[[Finger, Array, Array], Array]
 
@@ -83,7 +83,7 @@ def linearise(
         scenario, finger = None, as_finger(finger_or_scenario)
     else:
         scenario = load_scenario(finger_or_scenario)
-        finger = _built(scenario)
+        finger = _build_finger(scenario)
     if objects := (finger.scene.free if finger.scene else {}):
         raise InputError("scenario.environment.objects", "a free object has no linear coordinates", tuple(objects))
     if dt is not None and not 0.0 < dt < np.inf:
@@ -92,15 +92,15 @@ def linearise(
         raise InputError("parameters", "are those of a scenario: give one in place of the finger", list(parameters))
     x = as_packed(finger, state, "state")
     u = as_inputs(finger, inputs)
-    change = _rate if dt is None else _over(finger, x, u, dt)
+    rate_or_map = _rate if dt is None else _step_map(finger, x, u, dt)
 
-    def both(other: Finger, at: Array, inputs: Array) -> Array:
-        return np.concatenate([change(other, at, inputs), _outputs(other, at, inputs)])
+    def response(changed_finger: Finger, point: Array, inputs: Array) -> Array:
+        return np.concatenate([rate_or_map(changed_finger, point, inputs), _outputs(changed_finger, point, inputs)])
 
     # The map is smooth on its steps, but curved where a kink is on the way: there steps are small.
-    part = 1.0 if dt is None else _OF_MAPS
-    by_state = _slopes(lambda varied: both(finger, varied, u), x, part * _OF_STATES * finger.layout.scales())
-    by_input = _slopes(lambda varied: both(finger, x, varied), u, np.full(len(u), part * _OF_INPUTS))
+    step_share = 1.0 if dt is None else _MAP_STEP_SHARE
+    by_state = _slopes(lambda varied: response(finger, varied, u), x, step_share * _STATE_STEP * finger.layout.scales())
+    by_input = _slopes(lambda varied: response(finger, x, varied), u, np.full(len(u), step_share * _INPUT_STEP))
     by_parameter = np.zeros((len(by_state[0]), 0)), np.zeros(0, int)
     if parameters:
         assert scenario is not None
@@ -109,30 +109,33 @@ def linearise(
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise InputError(key, "must be a single number of the scenario", value)
         values = np.array(family.values, dtype=float)
-        sizes = part * _OF_PARAMETERS * np.where(values == 0.0, 1.0, np.abs(values))
-        by_parameter = _slopes(
-            lambda varied: both(_built(family.with_values(varied.tolist())), x, u), values, sizes, least=values == 0.0
-        )
-    return _dataset(finger, both(finger, x, u), (by_state, by_input, by_parameter), list(parameters), dt)
+        sizes = step_share * _PARAMETER_STEP * np.where(values == 0.0, 1.0, np.abs(values))
+
+        def changed(varied: Array) -> Array:
+            return response(_build_finger(family.with_values(varied.tolist())), x, u)
+
+        by_parameter = _slopes(changed, values, sizes, least=values == 0.0)
+    return _dataset(finger, response(finger, x, u), (by_state, by_input, by_parameter), list(parameters), dt)
 
 
-def _built(scenario: Scenario) -> Finger:
+def _build_finger(scenario: Scenario) -> Finger:
     return Finger(scenario.finger, objects=scenario.environment.objects)
 
 
 def _slopes(
-    of: Callable[[Array], Array], at: Array, steps: Array, least: Array | None = None
+    function: Callable[[Array], Array], point: Array, steps: Array, least: Array | None = None
 ) -> tuple[Array, NDArray[np.int_]]:
     """Return the derivatives of a vector by a vector, shape (k, n), and from which sides they are, shape (n,).
 
     At the least value that is allowed they are from above, and 0 is said.
     """
-    value = of(at)
-    columns, sides = np.zeros((len(value), len(at))), np.zeros(len(at), int)
+    value = function(point)
+    columns, sides = np.zeros((len(value), len(point))), np.zeros(len(point), int)
     for k, step in enumerate(steps):
 
         def line(offsets: Array, k: int = k) -> Array:
-            return np.array([of(at + each * (np.arange(len(at)) == k)) if each else value for each in offsets])
+            unit = np.arange(len(point)) == k
+            return np.array([function(point + each * unit) if each else value for each in offsets])
 
         if least is not None and least[k]:
             columns[:, k] = _FORWARD[0] @ line(step * _OFFSETS[3:]) / step
@@ -144,13 +147,13 @@ def _slopes(
 def _slope(line: Callable[[Array], Array], value: Array, step: float) -> tuple[Array, int]:
     """Return the derivative along a line, and its side: 1 above, -1 below, 0 for a central difference."""
     centrals = []
-    for h in step / _SHORTER ** np.arange(_TRIALS):
+    for h in step / _STEP_DIVISOR ** np.arange(_MAX_TRIALS):
         values = line(h * _OFFSETS)
         central = _CENTRAL @ values / h
         above, below = [weights @ values[3:] / h for weights in _FORWARD], [-w @ values[3::-1] / h for w in _FORWARD]
 
         def agree(first: Array, second: Array, h: float = h) -> bool:
-            tolerance = _APART * np.maximum(abs(first), abs(second)) + _ROUNDING * np.max(abs(value)) / h
+            tolerance = _SLOPE_TOLERANCE * np.maximum(abs(first), abs(second)) + _ROUNDING * np.max(abs(value)) / h
             return bool((abs(first - second) <= tolerance).all())
 
         centrals.append(central)
@@ -165,13 +168,13 @@ def _rate(finger: Finger, x: Array, u: Array) -> Array:
     return np.asarray(CompiledFinger(finger).evaluate(x, u).rate)
 
 
-def _over(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
+def _step_map(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
     """Return the map over a step, always on the same steps of the integrator."""
 
     def stepped(other: Finger, start: Array, inputs: Array, ends: list[Array] | None) -> tuple[Array, list[Array]]:
-        mechanism, atol = other.mechanism, _TIGHT * other.layout.scales()
+        mechanism, atol = other.mechanism, _STEP_TOLERANCE * other.layout.scales()
         control = held_control(mechanism.channels, mechanism.coordinates)
-        stepper = Stepper(mechanism, control, start, rodas5p(), _TIGHT, atol)
+        stepper = Stepper(mechanism, control, start, rodas5p(), _STEP_TOLERANCE, atol)
         stepper.hold(inputs)
         if ends is not None:
             stepper.repeat([Steps.from_ends(each) for each in ends])
@@ -181,7 +184,7 @@ def _over(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
         return stepper.x, [each.ends for each in trajectory.steps]
 
     # At rest nothing moves, and one step would do: those of a motion nearby follow what a change sets off.
-    ends = stepped(finger, x + _NEARBY * finger.layout.scales(), u, None)[1]
+    ends = stepped(finger, x + _START_SHIFT * finger.layout.scales(), u, None)[1]
     return lambda other, start, inputs: stepped(other, start, inputs, ends)[0]
 
 
@@ -220,10 +223,10 @@ def _dataset(
         "output_value": ("output", value[len(names) :]),
     }
     kinds = (("A", "C", "by_state"), ("B", "D", "input"), ("E", "F", "parameter"))
-    for (first, second, whose), (columns, sides) in zip(kinds, slopes, strict=True):
-        variables[first] = (("state", whose), columns[: len(names)], {"units": "SI"})
-        variables[second] = (("output", whose), columns[len(names) :], {"units": "SI"})
-        variables["side_by_state" if whose == "by_state" else f"side_of_{whose}"] = (whose, sides)
+    for (first, second, dimension), (columns, sides) in zip(kinds, slopes, strict=True):
+        variables[first] = (("state", dimension), columns[: len(names)], {"units": "SI"})
+        variables[second] = (("output", dimension), columns[len(names) :], {"units": "SI"})
+        variables["side_by_state" if dimension == "by_state" else f"side_of_{dimension}"] = (dimension, sides)
     delays = [*[0.0] * finger.routing.actuated, *(each.delay for each in finger.description.tree.actuators.values())]
     variables["input_delay"] = ("input", delays, {"units": "s"})
     coordinates = {

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger_pin.analysis.directions import directions_of_motion, sliding_velocity
 from finger_pin.analysis.locking_loop import FrictionLoop
@@ -62,9 +61,14 @@ def critical_friction(
     Raises:
         InputError: If an argument has the wrong size, a joint does not exist, or there is no force closure.
     """
-    tendons = _tendons(finger)
+    description = description_of(finger)
+    one_finger(description)
+    tendons = finger.tendons if isinstance(finger, Finger) else Tendons.from_description(description)
     routing = tendons.routing
-    moving = _moving(routing.joints, joints)
+    for name in joints or ():
+        if name not in routing.joints:
+            raise InputError("joints", f"must be among {', '.join(routing.joints)}", name)
+    moving = np.array([joints is None or name in joints for name in routing.joints])
     size = len(moving)
     if velocity is None and position is None:
         signs = np.array(
@@ -91,16 +95,3 @@ def critical_friction(
         torque=torque[worst],
         tension=command[worst],
     )
-
-
-def _tendons(finger: FingerLike) -> Tendons:
-    description = description_of(finger)
-    one_finger(description)
-    return finger.tendons if isinstance(finger, Finger) else Tendons.from_description(description)
-
-
-def _moving(names: tuple[str, ...], joints: Sequence[str] | None) -> NDArray[np.bool_]:
-    for name in joints or ():
-        if name not in names:
-            raise InputError("joints", f"must be among {', '.join(names)}", name)
-    return np.array([joints is None or name in joints for name in names])

@@ -46,13 +46,16 @@ from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 
-_REAL = 1e-9
-_SINGULAR = 1e-12
-_INSIDE = 1e-9
-_SETTLED = 1e-10
-_RUNAWAY = 1e6
-_ITERATIONS = 5000
-_TURNS = 12
+# Imaginary part, over the magnitude, within which an eigenvalue is real.
+_IMAGINARY_TOLERANCE = 1e-9
+_LEAST_DETERMINANT = 1e-12
+# Relative tolerance of the inequalities that bound a cell.
+_CELL_TOLERANCE = 1e-9
+_BALANCE_TOLERANCE = 1e-10
+# Tension at which the loop has run away, N, times 1 + f0 / N.
+_RUNAWAY_TENSION = 1e6
+_MAX_ITERATIONS = 5000
+_GROWTH_TURNS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,30 +135,31 @@ class FrictionLoop:
             lengths = np.linalg.norm(balance, axis=3, keepdims=True)
             rows = np.where(lengths > 0.0, lengths, 1.0)
             balance, friction_torque = balance / rows, friction_torque / rows
-            regular = finite & (np.abs(np.linalg.det(balance)) > _SINGULAR)
+            regular = finite & (np.abs(np.linalg.det(balance)) > _LEAST_DETERMINANT)
             balance = np.where(regular[..., None, None], balance, np.eye(len(torque[0])))
             turn = np.linalg.solve(balance, friction_torque)
             regular &= np.isfinite(turn).all(axis=(2, 3))
             values, vectors = np.linalg.eig(np.where(regular[..., None, None], turn, 0.0))
-            real = regular[..., None] & (values.real > 0.0) & (np.abs(values.imag) <= _REAL * np.abs(values))
+            real = np.abs(values.imag) <= _IMAGINARY_TOLERANCE * np.abs(values)
+            real &= regular[..., None] & (values.real > 0.0)
             for sign in (1.0, -1.0):
                 # Rows: case, cell, eigenvector; then the joint.
                 rays = sign * np.swapaxes(vectors.real, 2, 3)
                 levels = rays @ self.levels.T
                 attained = np.diagonal(levels, axis1=1, axis2=3).swapaxes(1, 2)
                 span = np.max(np.abs(levels), axis=-1)
-                inside = real & (attained >= levels.max(axis=-1) - _INSIDE * span)
+                inside = real & (attained >= levels.max(axis=-1) - _CELL_TOLERANCE * span)
                 for index, is_taut in enumerate(taut):
                     mean = np.einsum("cj,mcej->mce", self.passive[:, index], rays)
-                    slack = _INSIDE * np.max(np.abs(self.passive[:, index]))
+                    slack = _CELL_TOLERANCE * np.max(np.abs(self.passive[:, index]))
                     inside &= (mean >= -slack) if is_taut else (mean <= slack)
                 coefficients = np.where(inside, 1.0 / np.where(real, values.real, 1.0), np.inf).reshape(size, -1)
-                best = np.argmin(coefficients, axis=1)
+                best_ray = np.argmin(coefficients, axis=1)
                 case = np.arange(size)
-                better = coefficients[case, best] < worst
-                worst[better] = coefficients[case, best][better]
-                cell = best // rays.shape[2]
-                ray = rays.reshape(size, -1, rays.shape[3])[case, best]
+                better = coefficients[case, best_ray] < worst
+                worst[better] = coefficients[case, best_ray][better]
+                cell = best_ray // rays.shape[2]
+                ray = rays.reshape(size, -1, rays.shape[3])[case, best_ray]
                 ray = ray / np.max(np.abs(ray), axis=1, keepdims=True)
                 torque[better] = ray[better]
                 command[better] = np.einsum("mtj,mj->mt", self.command[cell], ray)[better]
@@ -177,8 +181,8 @@ class FrictionLoop:
         tension = np.broadcast_to(internal, (len(position), len(internal)))
         growth = np.zeros(len(position))
         torque = np.zeros_like(weights)
-        for _ in range(_TURNS):
-            pull, reaction = self._of_joints(scale * routing.strand_tension(tension)[..., None])
+        for _ in range(_GROWTH_TURNS):
+            pull, reaction = self._joint_torques(scale * routing.strand_tension(tension)[..., None])
             torque = torque + weights * reaction - pull
             size = np.maximum(np.max(np.abs(torque), axis=1, keepdims=True), np.finfo(float).tiny)
             growth, torque = size[:, 0], torque / size
@@ -202,22 +206,22 @@ class FrictionLoop:
         routing, scale, drag = self.tendons.routing, self._shares(position, sliding), self._drags(position, sliding)
         inverse, internal = self.inverse, self.internal
         torque, command = np.array(weight), np.full((len(position), len(internal)), np.inf)
-        going = np.arange(len(position))
-        for _ in range(_ITERATIONS):
-            minimal = torque[going] @ inverse.T
+        active = np.arange(len(position))
+        for _ in range(_MAX_ITERATIONS):
+            minimal = torque[active] @ inverse.T
             level = np.max((minimum - minimal) / internal, axis=1, keepdims=True)
             tension = minimal + level * internal
-            strands = np.maximum(scale[going] * routing.strand_tension(tension)[..., None] - drag[going], 0.0)
-            pull, reaction = self._of_joints(strands)
-            residual = pull - weights[going] * reaction - weight[going]
-            span = np.max(np.abs(tension), axis=1)
+            strands = np.maximum(scale[active] * routing.strand_tension(tension)[..., None] - drag[active], 0.0)
+            pull, reaction = self._joint_torques(strands)
+            residual = pull - weights[active] * reaction - weight[active]
+            largest_tension = np.max(np.abs(tension), axis=1)
             arm = np.max(np.abs(routing.strand_coupling))
-            done = np.max(np.abs(residual), axis=1) <= _SETTLED * arm * span
-            command[going[done]] = tension[done]
-            keep = ~done & (span < _RUNAWAY * (1.0 + np.max(minimum)))
-            torque[going] -= residual
-            going = going[keep]
-            if not going.size:
+            done = np.max(np.abs(residual), axis=1) <= _BALANCE_TOLERANCE * arm * largest_tension
+            command[active[done]] = tension[done]
+            continuing = ~done & (largest_tension < _RUNAWAY_TENSION * (1.0 + np.max(minimum)))
+            torque[active] -= residual
+            active = active[continuing]
+            if not active.size:
                 break
         return command
 
@@ -243,26 +247,26 @@ class FrictionLoop:
         )
         arms = routing.strand_coupling.T - weights[:, None] * routing.loads
         balance = arms @ (shares[:, :, None] * routing.strand_tension(np.eye(count)).T)
-        needed = weight + drags @ arms.T
-        turned, lengths, axes = np.linalg.svd(balance)
-        kernel = axes[:, -1] * np.sign(axes[:, -1].sum(axis=1, keepdims=True))
-        base = np.einsum("mit,mi->mt", axes[:, :-1], np.einsum("mji,mj->mi", turned, needed) / lengths)
-        moves = np.all(kernel > _INSIDE * np.max(kernel, axis=1, keepdims=True), axis=1)
-        largest = np.where(moves, 0.0, np.inf)
-        kernel, base, at = kernel[moves], base[moves], position[moves]
+        demand = weight + drags @ arms.T
+        left_vectors, lengths, right_vectors = np.linalg.svd(balance)
+        kernel = right_vectors[:, -1] * np.sign(right_vectors[:, -1].sum(axis=1, keepdims=True))
+        base = np.einsum("mit,mi->mt", right_vectors[:, :-1], np.einsum("mji,mj->mi", left_vectors, demand) / lengths)
+        can_move = np.all(kernel > _CELL_TOLERANCE * np.max(kernel, axis=1, keepdims=True), axis=1)
+        largest = np.where(can_move, 0.0, np.inf)
+        kernel, base, moving_position = kernel[can_move], base[can_move], position[can_move]
         share, drag = np.ones_like(base), np.zeros_like(base)
-        for way in sliding if moves.any() else ():
-            ways = np.broadcast_to(way, base.shape)
-            share[:, :actuated] = self._shares(at, ways)[:, :actuated, 0]
-            drag[:, :actuated] = self._drags(at, ways)[:, :actuated, 0]
+        for signs in sliding if can_move.any() else ():
+            way_cases = np.broadcast_to(signs, base.shape)
+            share[:, :actuated] = self._shares(moving_position, way_cases)[:, :actuated, 0]
+            drag[:, :actuated] = self._drags(moving_position, way_cases)[:, :actuated, 0]
             # A tendon at f0 that does not overcome its drag delivers nothing.
-            least = np.max((np.maximum(minimum * share - drag, 0.0) - base) / kernel, axis=1, keepdims=True)
-            delivered = base + least * kernel
-            command = np.where(delivered > _INSIDE * delivered.max(), (delivered + drag) / share, minimum)
-            largest[moves] = np.maximum(largest[moves], command[:, :actuated].max(axis=1))
+            level = np.max((np.maximum(minimum * share - drag, 0.0) - base) / kernel, axis=1, keepdims=True)
+            delivered = base + level * kernel
+            command = np.where(delivered > _CELL_TOLERANCE * delivered.max(), (delivered + drag) / share, minimum)
+            largest[can_move] = np.maximum(largest[can_move], command[:, :actuated].max(axis=1))
         return largest
 
-    def _of_joints(self, strands: Array) -> tuple[Array, Array]:
+    def _joint_torques(self, strands: Array) -> tuple[Array, Array]:
         """Return joint torques and pin loads, (m, n) each, of tensions of the strands at every joint, (m, s, n)."""
         routing = self.tendons.routing
         pull, load = (np.einsum("msj,sj->mj", strands, each) for each in (routing.strand_coupling, routing.loads.T))
@@ -272,8 +276,8 @@ class FrictionLoop:
         """Return the tension of every strand at every joint over the command or its tendon's mean, shape (m, s, n)."""
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
         friction = (sliding * capstan_coefficient(self.tendons.surface, routing.curvature(position)))[:, actuated:]
-        share, drawn = self.tendons.in_sliding(position, sliding)[0][:, :actuated], sliding[:, :actuated]
-        gears = np.where(drawn > 0.0, self.gears[0], np.where(drawn < 0.0, self.gears[1], 1.0))
+        share, direction = self.tendons.in_sliding(position, sliding)[0][:, :actuated], sliding[:, :actuated]
+        gears = np.where(direction > 0.0, self.gears[0], np.where(direction < 0.0, self.gears[1], 1.0))
         pairs = np.stack([1.0 + friction, 1.0 - friction], axis=-1).reshape(len(position), -1)
         halves = np.repeat(pairs[..., None], share.shape[-1], axis=-1)
         return np.concatenate([share * gears[..., None], halves], axis=1)
@@ -281,7 +285,7 @@ class FrictionLoop:
     def _drags(self, position: Array, sliding: Array) -> Array:
         """Return the friction of every strand at every joint, shape (m, s, n), N."""
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
-        lost = self.tendons.in_sliding(position, sliding)[1][:, :actuated]
-        of_passive = sliding[:, actuated:] * self.tendons.drag[actuated:]
-        halves = np.repeat(0.5 * of_passive, 2, axis=1) * np.tile([-1.0, 1.0], routing.passive)
-        return np.concatenate([lost, np.repeat(halves[..., None], lost.shape[-1], axis=-1)], axis=1)
+        actuated_drag = self.tendons.in_sliding(position, sliding)[1][:, :actuated]
+        passive_drag = sliding[:, actuated:] * self.tendons.drag[actuated:]
+        halves = np.repeat(0.5 * passive_drag, 2, axis=1) * np.tile([-1.0, 1.0], routing.passive)
+        return np.concatenate([actuated_drag, np.repeat(halves[..., None], actuated_drag.shape[-1], axis=-1)], axis=1)

@@ -76,25 +76,25 @@ def self_locking_map(
     routing, limiter = finger.routing, finger.stroke_limiter
     coupling = PassiveCoupling.inextensible(routing)
     free = [routing.joints[index] for index in coupling.free]
-    chosen = tuple(free[-2:]) if joints is None else tuple(joints)
-    if len(chosen) not in (1, 2) or len(set(chosen)) < len(chosen):
-        raise InputError("joints", "must be one joint or two different ones", list(chosen))
-    for name in (*chosen, *(fixed or {})):
+    map_joints = tuple(free[-2:]) if joints is None else tuple(joints)
+    if len(map_joints) not in (1, 2) or len(set(map_joints)) < len(map_joints):
+        raise InputError("joints", "must be one joint or two different ones", list(map_joints))
+    for name in (*map_joints, *(fixed or {})):
         if name not in free:
             raise InputError("joints", f"must be among {', '.join(free)}", name)
     base = np.clip(np.zeros(len(routing.joints)), limiter.lower, limiter.upper)
     for name, angle in (fixed or {}).items():
         base[routing.joints.index(name)] = angle
-    columns = [routing.joints.index(name) for name in chosen]
+    columns = [routing.joints.index(name) for name in map_joints]
     axes = tuple(np.linspace(limiter.lower[j], limiter.upper[j], samples) for j in columns)
     shape = (samples,) * len(axes)
     postures = np.tile(base, (*shape, 1))
     postures[..., columns] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     flat = (postures @ coupling.matrix.T).reshape(-1, len(base))
     tip = np.array([finger.rigid_body.tip_position(theta) for theta in flat])
-    coefficient, tension = _worst(finger, flat, expand(minimum_tension, len(routing.tendons)))
+    coefficient, tension = _worst_directions(finger, flat, expand(minimum_tension, len(routing.tendons)))
     return SelfLockingMap(
-        joints=chosen,
+        joints=map_joints,
         angles=axes,
         coefficient=coefficient.reshape(shape),
         tension=tension.reshape(shape),
@@ -103,7 +103,7 @@ def self_locking_map(
     )
 
 
-def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Array]:
+def _worst_directions(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Array]:
     """Return critical coefficient and greatest tension at m postures, shape (m,) each, in the worst directions."""
     routing, (count, size) = finger.routing, positions.shape
     signs, sliding = directions_of_motion(finger.tendons, np.ones(size, dtype=bool))
@@ -111,40 +111,40 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
     loop, pins = FrictionLoop.from_tendons(finger.tendons, None), finger.joint_friction
     static = pins.static
     coefficient, tension = np.full(count, np.inf), np.zeros(count)
-    alone = len(routing.tendons) == size + 1 and not loop.tendons.several
-    counted = slice(None)
-    if alone:
+    one_extra_tendon = len(routing.tendons) == size + 1 and not loop.tendons.several
+    relevant = slice(None)
+    if one_extra_tendon:
         # The friction of actuated tendons scales columns of the balance in f, and leaves where f_i = 0 as it was. With
         # more tendons not every f is commanded, and what is commanded it shifts.
-        counted = slice(routing.actuated, None)
-    mattering = np.zeros_like(sliding)
-    mattering[:, counted] = sliding[:, counted]
-    locking = np.unique(np.hstack([signs, mattering]), axis=0)
-    bends = routing.curvature_matrix[counted]
+        relevant = slice(routing.actuated, None)
+    relevant_sliding = np.zeros_like(sliding)
+    relevant_sliding[:, relevant] = sliding[:, relevant]
+    locking = np.unique(np.hstack([signs, relevant_sliding]), axis=0)
+    bends = routing.curvature_matrix[relevant]
     # Of tendons that rub at several places, each of them counts.
-    curved = np.abs(positions) @ (np.diag(bends.any(axis=0)) if loop.tendons.several else bends.T)
-    _, first_of, same = np.unique(curved.round(12), axis=0, return_index=True, return_inverse=True)
-    closest = np.zeros(len(locking))
+    bend = np.abs(positions) @ (np.diag(bends.any(axis=0)) if loop.tendons.several else bends.T)
+    _, first_indices, case_of = np.unique(bend.round(12), axis=0, return_index=True, return_inverse=True)
+    least_coefficient = np.zeros(len(locking))
     for index, case in enumerate(locking):
         sign = np.broadcast_to(case[:size], positions.shape)
-        slide = np.broadcast_to(case[size:], (count, len(routing.tendons)))
-        kappa = loop.critical(positions[first_of], sign[first_of], slide[first_of])[0]
-        coefficient, closest[index] = np.minimum(coefficient, kappa[same.reshape(-1)]), kappa.min()
-    if alone:
+        case_sliding = np.broadcast_to(case[size:], (count, len(routing.tendons)))
+        kappa = loop.critical(positions[first_indices], sign[first_indices], case_sliding[first_indices])[0]
+        coefficient, least_coefficient[index] = np.minimum(coefficient, kappa[case_of.reshape(-1)]), kappa.min()
+    if one_extra_tendon:
         for case in locking:
-            ways = sliding[np.all(np.hstack([signs, mattering]) == case, axis=1)]
-            needed = weight + case[:size] * pins.break_away_drag(case[:size])
-            command = loop.greatest_command(positions, case[:size] * static, ways, minimum, needed)
+            ways = sliding[np.all(np.hstack([signs, relevant_sliding]) == case, axis=1)]
+            demand = weight + case[:size] * pins.break_away_drag(case[:size])
+            command = loop.greatest_command(positions, case[:size] * static, ways, minimum, demand)
             tension = np.maximum(tension, command)
     else:
         # Where it locks in one direction no other one needs more: first that which locks first.
-        for case in locking[np.argsort(closest)]:
-            left = np.flatnonzero(np.isfinite(tension))
-            if not len(left):
+        for case in locking[np.argsort(least_coefficient)]:
+            unlocked = np.flatnonzero(np.isfinite(tension))
+            if not len(unlocked):
                 break
-            cases = np.broadcast_to(case[size:], (len(left), len(routing.tendons)))
-            weights = np.broadcast_to(case[:size] * static, (len(left), size))
-            needed = weight[left] + case[:size] * pins.break_away_drag(case[:size])
-            command = loop.command_to_move(positions[left], weights, cases, minimum, needed)
-            tension[left] = np.maximum(tension[left], command[:, : routing.actuated].max(axis=1))
+            cases = np.broadcast_to(case[size:], (len(unlocked), len(routing.tendons)))
+            weights = np.broadcast_to(case[:size] * static, (len(unlocked), size))
+            demand = weight[unlocked] + case[:size] * pins.break_away_drag(case[:size])
+            command = loop.command_to_move(positions[unlocked], weights, cases, minimum, demand)
+            tension[unlocked] = np.maximum(tension[unlocked], command[:, : routing.actuated].max(axis=1))
     return coefficient, tension

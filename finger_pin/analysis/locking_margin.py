@@ -21,11 +21,11 @@ from finger_pin.typing import Array, Indices
 
 #: Below this margin a simulation warns: friction then multiplies tensions about sixfold.
 CLOSE_TO_LOCKING = 1.2
-# What a simulation spends on its warning: combinations of directions times cases of slack passive tendons.
-_CASES = 48
-# Of the search for the friction that motors cannot overcome: up to what share of the critical one, up to how many times
-# what there is, and in how many steps.
-_NEARLY, _MOST, _HALVINGS = 0.95, 1e3, 8
+# Cases of a simulation's warning: combinations of directions times cases of slack passive tendons.
+_WARNING_CASES = 48
+# Search for the friction that motors cannot overcome: greatest share of the critical one, greatest multiple of the
+# finger's own, and number of bisections.
+_CRITICAL_SHARE, _MAX_SCALE, _BISECTIONS = 0.95, 1e3, 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +49,7 @@ class SelfLockingMargin(BriefRepr):
 def self_locking_margin(
     scenario: ScenarioLike,
     samples: int = 500,
-    most: int | None = None,
+    maximum_cases: int | None = None,
     servos: bool = False,
     reference: LoopReference | None = None,
 ) -> SelfLockingMargin:
@@ -63,8 +63,8 @@ def self_locking_margin(
     Args:
         scenario: The scenario, its name, or the path of a file.
         samples: Instants of the reference; directions that last for less than their distance may be missed.
-        most: Greatest number of combinations to look at, those that seem closest to locking; all by default. A finger
-            of many joints has hundreds, and every one costs as many eigenvalue problems as there are tendons.
+        maximum_cases: Greatest number of combinations to look at, those that seem closest to locking; all by default.
+            A finger of many joints has hundreds, and each costs as many eigenvalue problems as there are tendons.
         servos: Whether gears and the limits of motors count: then the finger is also locked from where the tensions
             that would move it slowly, with passive tendons as planned, are more than a motor can pull.
         reference: Of one finger, where it is built already.
@@ -74,7 +74,7 @@ def self_locking_margin(
     parts = load_scenario(scenario).parts()
     if len(parts) > 1:
         return min(
-            (self_locking_margin(part, samples, most, servos=servos) for part in parts.values()),
+            (self_locking_margin(part, samples, maximum_cases, servos=servos) for part in parts.values()),
             key=lambda candidate: candidate.margin,
         )
     scenario = next(iter(parts.values()))
@@ -87,8 +87,8 @@ def self_locking_margin(
     # What stands still but for rounding does not move.
     speed = np.where(np.abs(motion.velocity) > 1e-12, motion.velocity, 0.0)
     directions = np.sign(np.hstack([speed, sliding_velocity(tendons, speed)]))
-    chosen = _extremes(directions, (np.abs(motion.position) @ routing.curvature_matrix.T).sum(axis=1))
-    signs, sliding = directions[chosen, :size], directions[chosen, size:]
+    cases = _extreme_bends(directions, (np.abs(motion.position) @ routing.curvature_matrix.T).sum(axis=1))
+    signs, sliding = directions[cases, :size], directions[cases, size:]
     weights = signs * scenario.finger.numbers["joint_friction"][scenario.finger.joint_friction.break_away_entry]
     gain = expand(scenario.controller.gain, size)
     # Without gain there is no lag that would say what passive tendons carry: they count as planned.
@@ -96,21 +96,21 @@ def self_locking_margin(
     loop = FrictionLoop.from_tendons(
         tendons, gain if np.all(gain > 0.0) else None, np.where(np.isfinite(gears), gears, 1.0)
     )
-    if most is not None and len(chosen) > most:
-        worst_first = np.argsort(-loop.growth(motion.position[chosen], weights, sliding), kind="stable")[:most]
-        chosen, signs, sliding, weights = (each[worst_first] for each in (chosen, signs, sliding, weights))
-    kappa = loop.critical(motion.position[chosen], weights, sliding)[0]
+    if maximum_cases is not None and len(cases) > maximum_cases:
+        worst_first = np.argsort(-loop.growth(motion.position[cases], weights, sliding), kind="stable")[:maximum_cases]
+        cases, signs, sliding, weights = (each[worst_first] for each in (cases, signs, sliding, weights))
+    kappa = loop.critical(motion.position[cases], weights, sliding)[0]
     if servos:
-        kappa = _within_reach(scenario, loop, motion.position[chosen], weights, signs, sliding, kappa)
+        kappa = _movable_scale(scenario, loop, motion.position[cases], weights, signs, sliding, kappa)
         # Gears that no load turns let no tendon out, whatever joints do.
-        stuck = (sliding[:, : routing.actuated] < 0.0) & np.isinf(gears[1])
-        kappa = np.where(stuck.any(axis=1), 0.0, kappa)
+        not_backdrivable = (sliding[:, : routing.actuated] < 0.0) & np.isinf(gears[1])
+        kappa = np.where(not_backdrivable.any(axis=1), 0.0, kappa)
     worst = int(np.argmin(kappa))
-    where = chosen[worst]
-    return SelfLockingMargin(float(kappa[worst]), float(times[where]), motion.position[where], signs[worst])
+    sample = cases[worst]
+    return SelfLockingMargin(float(kappa[worst]), float(times[sample]), motion.position[sample], signs[worst])
 
 
-def _extremes(directions: Array, bend: Array) -> Indices:
+def _extreme_bends(directions: Array, bend: Array) -> Indices:
     """Return the samples, one or two for every combination of directions, (m, k), with its least and greatest bend."""
     # Ordered by directions, then by bend: the first and the last of every combination.
     order = np.lexsort((bend, *directions.T))
@@ -118,7 +118,7 @@ def _extremes(directions: Array, bend: Array) -> Indices:
     return np.asarray(order[np.unique(np.concatenate([[0], steps, steps + 1, [len(order) - 1]]))])
 
 
-def _within_reach(
+def _movable_scale(
     scenario: Scenario,
     loop: FrictionLoop,
     position: Array,
@@ -134,28 +134,26 @@ def _within_reach(
     finger = Finger(scenario.finger)
     limits, actuated = np.array(tension_limits(finger)), finger.routing.actuated
     minimum = expand(scenario.controller.minimum_tension, len(finger.routing.tendons))
-    weight, drag = (
-        np.array([finger.static_torque(each) for each in position]),
-        signs * finger.joint_friction.break_away_drag(signs),
-    )
+    weight = np.array([finger.static_torque(each) for each in position])
+    drag = signs * finger.joint_friction.break_away_drag(signs)
 
-    def fits(scale: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:
-        case, load = scale[:, None] * weights[at], weight[at] + scale[:, None] * drag[at]
-        needed = loop.command_to_move(position[at], case, sliding[at], minimum, load)[:, :actuated]
+    def within_limits(scale: Array, indices: NDArray[np.int64]) -> NDArray[np.bool_]:
+        case, load = scale[:, None] * weights[indices], weight[indices] + scale[:, None] * drag[indices]
+        command = loop.command_to_move(position[indices], case, sliding[indices], minimum, load)[:, :actuated]
         # What gears take is in the limit, and in the share of what is let out.
-        return np.asarray(np.all(needed * loop.gears[0] <= limits, axis=1), dtype=bool)
+        return np.asarray(np.all(command * loop.gears[0] <= limits, axis=1), dtype=bool)
 
     # Close to critical, tensions grow without bound and take long to find.
-    most = _NEARLY * np.minimum(critical, _MOST)
-    short = np.flatnonzero(~fits(most, np.arange(len(position))))
-    low, high = np.zeros(len(short)), most[short]
-    for _ in range(_HALVINGS if len(short) else 0):
+    upper_scale = _CRITICAL_SHARE * np.minimum(critical, _MAX_SCALE)
+    limited = np.flatnonzero(~within_limits(upper_scale, np.arange(len(position))))
+    low, high = np.zeros(len(limited)), upper_scale[limited]
+    for _ in range(_BISECTIONS if len(limited) else 0):
         middle = 0.5 * (low + high)
-        inside = fits(middle, short)
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    reached = critical.copy()
-    reached[short] = low
-    return reached
+        movable = within_limits(middle, limited)
+        low, high = np.where(movable, middle, low), np.where(movable, high, middle)
+    scale = critical.copy()
+    scale[limited] = low
+    return scale
 
 
 def quick_margin(scenario: Scenario, reference: LoopReference | None = None) -> float:
@@ -172,9 +170,11 @@ def quick_margin(scenario: Scenario, reference: LoopReference | None = None) -> 
     with np.errstate(all="ignore"):
         parts = scenario.parts().values()
         for part in parts:
-            most = max(1, _CASES // 2 ** len(part.finger.passive_names))
+            maximum_cases = max(1, _WARNING_CASES // 2 ** len(part.finger.passive_names))
             part_reference = reference if len(parts) == 1 else None
-            margin = min(margin, self_locking_margin(part, most=most, reference=part_reference).margin)
+            margin = min(
+                margin, self_locking_margin(part, maximum_cases=maximum_cases, reference=part_reference).margin
+            )
     return margin
 
 

@@ -18,21 +18,21 @@ def micro_damping_advice(finger: FingerDescription) -> str:
     # The normal force of a tendon is a factor of both coefficients: their ratio counts.
     ratio = tendons["stiction_ratio"]
     warnings = [
-        _exceeded("tendon", finger.tendons, tendons, np.ones_like(ratio), ratio),
-        _exceeded("joint", finger.joints, joints, joints["coulomb"], joints["stiction"]),
+        _excess("tendon", finger.tendons, tendons, np.ones_like(ratio), ratio),
+        _excess("joint", finger.joints, joints, joints["coulomb"], joints["stiction"]),
     ]
     return "; ".join(filter(None, warnings))
 
 
-def _exceeded(kind: str, names: Iterable[str], numbers: Mapping[str, Array], kinetic: Array, static: Array) -> str:
-    listed = list(names)
+def _excess(kind: str, names: Iterable[str], numbers: Mapping[str, Array], kinetic: Array, static: Array) -> str:
+    name_list = list(names)
     micro, b = numbers["micro_damping"], numbers["viscous"]
-    most = passive_micro_damping(b, kinetic, static)
-    wrong = [index for index in range(len(listed)) if micro[index] > most[index]]
-    if not wrong:
+    limits = passive_micro_damping(b, kinetic, static)
+    exceeding = [index for index in range(len(name_list)) if micro[index] > limits[index]]
+    if not exceeding:
         return ""
-    first = wrong[0]
+    first = exceeding[0]
     return (
-        f"finger.{kind}_friction.micro_damping = {micro[first]:g} can drive the motion of {listed[first]}: "
-        f"friction is passive up to {most[first]:.3g} (b M^d / (M^c - M^d))"
+        f"finger.{kind}_friction.micro_damping = {micro[first]:g} can drive the motion of {name_list[first]}: "
+        f"friction is passive up to {limits[first]:.3g} (b M^d / (M^c - M^d))"
     )

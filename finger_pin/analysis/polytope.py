@@ -16,9 +16,9 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike, as_finger, at_tip
 from finger_pin.typing import Array
 
-_RANK = 1e-6
-_FLAT = 1e-7
-_NEW = 1e-7
+_RANK_TOLERANCE = 1e-6
+_EXTENT_TOLERANCE = 1e-7
+_GROWTH_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,8 +64,8 @@ class ForcePolytope(BriefRepr):
         if rank < 2:
             return np.zeros((0, 3), dtype=int)
         if rank == 2:
-            around = self._around()
-            return np.array([(around[0], a, b) for a, b in pairwise(around[1:])])
+            boundary = self._boundary_order()
+            return np.array([(boundary[0], a, b) for a, b in pairwise(boundary[1:])])
         corners = self.vertices[self.faces]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         inwards = np.einsum("fi,fi->f", across, self.normals[: len(self.faces)]) < 0.0
@@ -78,14 +78,14 @@ class ForcePolytope(BriefRepr):
             return [(0, 1)] if rank else []
         if rank == 2:
             return [(int(first), int(second)) for first, second in self.faces]
-        beside: dict[tuple[int, int], list[int]] = {}
+        faces_of_edge: dict[tuple[int, int], list[int]] = {}
         for index, face in enumerate(self.faces):
             for first, second in ((0, 1), (1, 2), (2, 0)):
                 low, high = sorted((int(face[first]), int(face[second])))
-                beside.setdefault((low, high), []).append(index)
-        return [edge for edge, (one, other) in beside.items() if self.normals[one] @ self.normals[other] < 1.0 - 1e-6]
+                faces_of_edge.setdefault((low, high), []).append(index)
+        return [edge for edge, pair in faces_of_edge.items() if np.prod(self.normals[pair], axis=0).sum() < 1.0 - 1e-6]
 
-    def _around(self) -> Any:
+    def _boundary_order(self) -> Any:
         """Return the vertices of a flat set in their order around its middle."""
         plane = (self.vertices - self.vertices.mean(axis=0)) @ self.basis
         return np.argsort(np.arctan2(plane[:, 1], plane[:, 0]))
@@ -122,27 +122,28 @@ def force_polytope(
         raise InputError("friction", "must be none or helping; hindering friction has a direction", friction.value)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
     statics = TipStatics.from_finger(finger, theta, friction)
-    left, values, _ = np.linalg.svd(statics.jacobian)
-    basis = left[:, : int(np.sum(values > _RANK * np.max(values)))]
+    left_vectors, values, _ = np.linalg.svd(statics.jacobian)
+    basis = left_vectors[:, : int(np.sum(values > _RANK_TOLERANCE * np.max(values)))]
     if not basis.shape[1]:
         raise InputError("position", "no joint moves the fingertip there", list(position))
-    extra = statics.jacobian.T @ basis
+    force_columns = statics.jacobian.T @ basis
     rank = basis.shape[1]
 
     def extreme(direction: Array) -> Array:
         cost = np.concatenate([-direction, np.zeros(sum(statics.sizes))])
-        solution = statics.solve(cost, extra, [*[(None, None)] * rank, *bounds], np.zeros(len(theta)))
+        solution = statics.solve(cost, force_columns, [*[(None, None)] * rank, *bounds], np.zeros(len(theta)))
         if solution.status == UNBOUNDED:
             raise InputError("finger.tendons", "the forces are unbounded: passive tendons alone balance some of them")
         if solution.status != 0:
             raise InputError("limit", "no tensions within the limits balance the finger's weight", bounds)
         return np.asarray(solution.x[:rank])
 
-    points, spanned = _spanning(rank, extreme)
-    axes, thin = basis @ spanned.T, basis @ _complement(spanned).T
-    points, faces, normals, offsets = _grow(points, spanned, extreme)
+    points, spanned = _spanning_points(rank, extreme)
+    perpendicular = np.linalg.svd(np.eye(rank) - spanned.T @ spanned)[2][: rank - len(spanned)]
+    axes, thin_axes = basis @ spanned.T, basis @ perpendicular.T
+    points, faces, normals, offsets = _expand_hull(points, spanned, extreme)
     vertices = points @ basis.T
-    level = vertices[0] @ thin
+    level = vertices[0] @ thin_axes
     return ForcePolytope(
         position=theta,
         tip=finger.rigid_body.tip_position(theta),
@@ -150,56 +151,52 @@ def force_polytope(
         basis=axes,
         vertices=vertices,
         faces=faces,
-        normals=np.concatenate([normals @ axes.T, thin.T, -thin.T]),
+        normals=np.concatenate([normals @ axes.T, thin_axes.T, -thin_axes.T]),
         offsets=np.concatenate([offsets, level, -level]),
     )
 
 
-def _spanning(rank: int, extreme: Any) -> tuple[Array, Array]:
+def _spanning_points(rank: int, extreme: Any) -> tuple[Array, Array]:
     """Return extreme points that span the set, shape (m, rank), and the directions that they span, (r, rank)."""
     points = np.array([extreme(sign * axis) for axis in np.eye(rank) for sign in (1.0, -1.0)])
     while True:
         scale = max(float(np.max(np.abs(points))), 1e-12)
         _, extents, axes = np.linalg.svd(points - points.mean(axis=0))
-        spanned = axes[: int(np.sum(extents > _FLAT * scale))]
+        spanned = axes[: int(np.sum(extents > _EXTENT_TOLERANCE * scale))]
         # Extreme points may lie in a plane though the set does not: look to both sides of it.
-        beside = [extreme(sign * axis) for axis in axes[len(spanned) :] for sign in (1.0, -1.0)]
-        fresh = [p for p in beside if np.max(np.abs(axes[len(spanned) :] @ (p - points[0]))) > _FLAT * scale]
-        if not fresh:
+        candidates = [extreme(sign * axis) for axis in axes[len(spanned) :] for sign in (1.0, -1.0)]
+        outside = axes[len(spanned) :]
+        new_points = [p for p in candidates if np.max(np.abs(outside @ (p - points[0]))) > _EXTENT_TOLERANCE * scale]
+        if not new_points:
             return points, spanned
-        points = np.vstack([points, *fresh])
+        points = np.vstack([points, *new_points])
 
 
-def _complement(rows: Array) -> Array:
-    """Return orthonormal rows perpendicular to orthonormal rows."""
-    return np.asarray(np.linalg.svd(np.eye(rows.shape[1]) - rows.T @ rows)[2][: rows.shape[1] - len(rows)])
-
-
-def _grow(points: Array, axes: Array, extreme: Any) -> tuple[Array, Any, Array, Array]:
+def _expand_hull(points: Array, axes: Array, extreme: Any) -> tuple[Array, Any, Array, Array]:
     """Return vertices, faces, and normals along the axes with their offsets, of the hull of all extreme points."""
     if len(axes) == 0:
         return points[:1], np.zeros((0, 0), dtype=int), np.zeros((0, 0)), np.zeros(0)
     if len(axes) == 1:
-        along, sides = points @ axes[0], np.array([-1.0, 1.0])
-        ends = [int(np.argmin(along)), int(np.argmax(along))]
-        return points[ends], np.array([[0], [1]]), sides[:, None], sides * along[ends]
+        coordinates, sides = points @ axes[0], np.array([-1.0, 1.0])
+        ends = [int(np.argmin(coordinates)), int(np.argmax(coordinates))]
+        return points[ends], np.array([[0], [1]]), sides[:, None], sides * coordinates[ends]
     scale = max(float(np.max(np.abs(points))), 1e-12)
-    asked: set[tuple[float, ...]] = set()
+    searched_normals: set[tuple[float, ...]] = set()
     while True:
         hull = scipy.spatial.ConvexHull(points @ axes.T)
-        fresh = []
+        new_points = []
         for equation in hull.equations:
             key = tuple(equation[:-1].round(9))
-            if key in asked:
+            if key in searched_normals:
                 continue
-            asked.add(key)
+            searched_normals.add(key)
             point = extreme(equation[:-1] @ axes)
-            if equation[:-1] @ (axes @ point) + equation[-1] > _NEW * scale:
-                fresh.append(point)
-        if not fresh:
+            if equation[:-1] @ (axes @ point) + equation[-1] > _GROWTH_TOLERANCE * scale:
+                new_points.append(point)
+        if not new_points:
             break
-        points = np.vstack([points, *fresh])
+        points = np.vstack([points, *new_points])
     used = np.unique(hull.simplices)
-    number = np.zeros(len(points), dtype=int)
-    number[used] = np.arange(len(used))
-    return points[used], number[hull.simplices], hull.equations[:, :-1], -hull.equations[:, -1]
+    new_index = np.zeros(len(points), dtype=int)
+    new_index[used] = np.arange(len(used))
+    return points[used], new_index[hull.simplices], hull.equations[:, :-1], -hull.equations[:, -1]

@@ -6,8 +6,8 @@ from dataclasses import fields
 
 import numpy as np
 
-# Arrays with more entries than this are printed as shape and range.
-_FEW = 8
+# Largest size of an array that is printed in full.
+_MAX_PRINTED = 8
 
 
 class BriefRepr:
@@ -24,7 +24,7 @@ def _brief(value: object) -> str:
         return "; ".join(map(_brief, value))
     if not isinstance(value, np.ndarray) or not value.size:
         return f"{value:.4g}" if isinstance(value, float) else str(value)
-    if value.size <= _FEW:
+    if value.size <= _MAX_PRINTED:
         return np.array2string(value, precision=4, separator=", ").replace("\n", "")
     numbers = value[np.isfinite(value)]
     extent = f", {numbers.min():.4g} to {numbers.max():.4g}" if numbers.size else ", not finite"

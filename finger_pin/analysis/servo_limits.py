@@ -32,10 +32,10 @@ def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float,
         dry, weight = dry + gears.stribeck, gears.external_weight
         by_load = gears.by_load + gears.stribeck_by_load
         sign = 1.0 if holding else -1.0
-        arriving, over = torque * (1.0 + sign * by_load) + sign * dry, 1.0 - sign * by_load * weight
-        most = max(0.0, arriving / over) if over > 0.0 else np.inf
+        arriving, divisor = torque * (1.0 + sign * by_load) + sign * dry, 1.0 - sign * by_load * weight
+        limit = max(0.0, arriving / divisor) if divisor > 0.0 else np.inf
         for tendon, radius in zip(actuator.tendons, expand(actuator.spool_radius, len(actuator.tendons)), strict=True):
-            limits[finger.routing.tendons.index(tendon)] = most / radius
+            limits[finger.routing.tendons.index(tendon)] = limit / radius
     return tuple(limits.tolist())
 
 
@@ -53,7 +53,7 @@ def gear_shares(finger: FingerLike) -> Array:
             continue
         gears = actuator.motor.friction
         by_load, weight = gears.by_load + gears.stribeck_by_load, gears.external_weight
-        over = 1.0 - by_load * weight
+        divisor = 1.0 - by_load * weight
         drawn_in = max(0.0, 1.0 - by_load) / (1.0 + by_load * weight)
-        shares[:, names.index(actuator.tendons[0])] = drawn_in, (1.0 + by_load) / over if over > 0.0 else np.inf
+        shares[:, names.index(actuator.tendons[0])] = drawn_in, (1.0 + by_load) / divisor if divisor > 0.0 else np.inf
     return shares

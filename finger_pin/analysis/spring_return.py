@@ -24,8 +24,8 @@ from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array, Indices
 
-# Postures at most, and of a joint at least and at most.
-_POSTURES, _FEWEST, _MOST = 600, 2, 8
+# Greatest number of postures, and least and greatest number of angles per joint.
+_MAX_POSTURES, _MIN_PER_JOINT, _MAX_PER_JOINT = 600, 2, 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,8 +67,8 @@ class SpringReturn(BriefRepr):
     @property
     def worst(self) -> tuple[str, Array]:
         """The joint with the least ratio, and its posture, shape (n,), rad."""
-        at, joint = divmod(int(np.argmin(self.letting_out / self.winding_in)), len(self.joints))
-        return self.joints[joint], self.positions[at]
+        posture, joint = divmod(int(np.argmin(self.letting_out / self.winding_in)), len(self.joints))
+        return self.joints[joint], self.positions[posture]
 
 
 def spring_return(finger: FingerLike, cord: str | None = None) -> SpringReturn:
@@ -89,32 +89,33 @@ def spring_return(finger: FingerLike, cord: str | None = None) -> SpringReturn:
     routing, index = finger.routing, _index(finger, cord)
     crossed = np.flatnonzero(routing.coupling[index])
     names = tuple(routing.joints[joint] for joint in crossed)
-    loose = [name for name in names if finger.description.joints[name].spring is None]
+    without_spring = [name for name in names if finger.description.joints[name].spring is None]
     if not names:
         raise InputError("cord", "must cross a joint at the same radius in every posture", routing.tendons[index])
-    if loose:
-        raise InputError("finger.joints", f"need a spring to come back, see {', '.join(loose)}")
+    if without_spring:
+        raise InputError("finger.joints", f"need a spring to come back, see {', '.join(without_spring)}")
     positions = _postures(finger, crossed, np.sign(routing.coupling[index]))
-    arms, way = np.abs(routing.coupling[index, crossed]), np.sign(routing.coupling[index, crossed])
-    needed = way * np.array([finger.static_torque(each) for each in positions])[:, crossed]
+    arms, sign = np.abs(routing.coupling[index, crossed]), np.sign(routing.coupling[index, crossed])
+    demand = sign * np.array([finger.static_torque(each) for each in positions])[:, crossed]
     pins, springs = finger.joint_friction, finger.springs
     hysteresis = springs.hysteresis * np.abs(springs.torque(positions, np.zeros_like(positions)))
-    dry, resisting = (
+    friction_in, friction_out = (
         (hysteresis + pins.break_away_drag(side * np.sign(routing.coupling[index])))[:, crossed] for side in (1.0, -1.0)
     )
-    loaded = (pins.static * pins.loads[:, index])[crossed]
-    inward, outward = (_cord(finger, positions, index, crossed, side) for side in (1.0, -1.0))
+    pin_arm = (pins.static * pins.loads[:, index])[crossed]
+    inward, outward = (_transmission(finger, positions, index, crossed, side) for side in (1.0, -1.0))
     with np.errstate(divide="ignore"):
-        delivered = np.where(arms > loaded, np.maximum(needed + dry, 0.0) / np.maximum(arms - loaded, 0.0), np.inf)
+        moving = np.maximum(demand + friction_in, 0.0) / np.maximum(arms - pin_arm, 0.0)
+        delivered = np.where(arms > pin_arm, moving, np.inf)
         # What the cord's drag leaves when nothing pulls.
-        held = resisting - outward[1] * (arms + loaded)
-        margins = np.where(held > 0.0, needed / held, np.where(needed > 0.0, np.inf, 0.0))
+        resistance = friction_out - outward[1] * (arms + pin_arm)
+        margins = np.where(resistance > 0.0, demand / resistance, np.where(demand > 0.0, np.inf, 0.0))
     return SpringReturn(
         cord=routing.tendons[index],
         joints=names,
         positions=positions,
         winding_in=(delivered + inward[1]) / inward[0],
-        letting_out=((needed - resisting) / (arms + loaded) + outward[1]) / outward[0],
+        letting_out=((demand - friction_out) / (arms + pin_arm) + outward[1]) / outward[0],
         margins=margins,
     )
 
@@ -134,20 +135,20 @@ def _index(finger: Finger, cord: str | None) -> int:
     return 0 if cord is None else names.index(cord)
 
 
-def _cord(finger: Finger, positions: Array, index: int, crossed: Indices, side: float) -> tuple[Array, Array]:
+def _transmission(finger: Finger, positions: Array, index: int, crossed: Indices, side: float) -> tuple[Array, Array]:
     """Return the share of the tension that arrives at joints, and the tension lost to drag, shape (m, k) each."""
-    ways = np.zeros((len(positions), len(finger.routing.tendons)))
-    ways[:, index] = side
-    share, lost = finger.tendons.in_sliding(positions, ways)
-    return share[:, index, crossed], lost[:, index, crossed]
+    sliding = np.zeros((len(positions), len(finger.routing.tendons)))
+    sliding[:, index] = side
+    share, drag = finger.tendons.in_sliding(positions, sliding)
+    return share[:, index, crossed], drag[:, index, crossed]
 
 
-def _postures(finger: Finger, crossed: Indices, way: Array) -> Array:
+def _postures(finger: Finger, crossed: Indices, sign: Array) -> Array:
     """Return postures with every joint at shares of its travel from the rest of its spring to the end of its range."""
     limiter, springs = finger.stroke_limiter, finger.springs
     rest = np.clip(springs.rest, limiter.lower, limiter.upper)
-    travel = np.where(way > 0.0, limiter.upper, limiter.lower) - rest
-    count = int(np.clip(_POSTURES ** (1.0 / len(crossed)), _FEWEST, _MOST))
+    travel = np.where(sign > 0.0, limiter.upper, limiter.lower) - rest
+    count = int(np.clip(_MAX_POSTURES ** (1.0 / len(crossed)), _MIN_PER_JOINT, _MAX_PER_JOINT))
     shares = np.array(list(product(np.arange(1, count + 1) / count, repeat=len(crossed))))
     postures = np.repeat(rest[None], len(shares), axis=0)
     postures[:, crossed] += shares * travel[crossed]

@@ -83,18 +83,19 @@ def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> A
     is linear in N, so that either sign of what N is made of gives a level, of which one keeps that sign. Where gears
     take all that a motor adds, slope >= 1, no current slides them: it is infinite.
     """
-    base, by_load, more, more_by_load, velocity, exponent, viscous, _, driving, driven = actuators.gearbox
+    base, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, _, driving, driven = actuators.gearbox
     torque = command[:, actuators.tendons] @ actuators.spools
     speed = v / actuators.radius
-    way, share = np.sign(speed), stribeck_share(speed, velocity, exponent)
-    lost = loss_share(torque, speed, driving, driven) * np.abs(torque)
-    dry, slope = base + more * share + lost, by_load + more_by_load * share
-    unlevelled = (1.0 + actuators.external_weight) * torque + viscous * speed
+    sign, share = np.sign(speed), stribeck_share(speed, velocity, exponent)
+    torque_loss = loss_share(torque, speed, driving, driven) * np.abs(torque)
+    dry, slope = base + stribeck * share + torque_loss, by_load + stribeck_by_load * share
+    frictionless = (1.0 + actuators.external_weight) * torque + viscous * speed
 
     def level_of(side: float) -> Array:
-        left = 1.0 - slope * side * way
-        return np.where(left > 0.0, (dry + slope * side * unlevelled) / np.where(left > 0.0, left, 1.0), np.inf)
+        remaining = 1.0 - slope * side * sign
+        level = (dry + slope * side * frictionless) / np.where(remaining > 0.0, remaining, 1.0)
+        return np.where(remaining > 0.0, level, np.inf)
 
-    level = np.where(unlevelled + way * level_of(1.0) >= 0.0, level_of(1.0), level_of(-1.0))
-    current: Array = (torque + way * level + (0.0 if at_rest else viscous * speed)) / actuators.motor[0]
+    level = np.where(frictionless + sign * level_of(1.0) >= 0.0, level_of(1.0), level_of(-1.0))
+    current: Array = (torque + sign * level + (0.0 if at_rest else viscous * speed)) / actuators.motor[0]
     return current

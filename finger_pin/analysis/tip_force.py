@@ -73,20 +73,24 @@ def largest_force(
     """
     finger = at_tip(as_finger(finger), tip)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
-    along = _unit(direction)
+    vector = finite_vector("direction", direction, 3)
+    length = float(np.linalg.norm(vector))
+    if not length > 0.0:
+        raise InputError("direction", "must not be zero", vector.tolist())
+    unit = vector / length
     worst = np.inf
-    for ways in slips(finger, finger.rigid_body.jacobian(theta), along, friction):
-        best = max(_most(finger, theta, along, friction, slip, bounds) for slip in ways)
+    for choices in slips(finger, finger.rigid_body.jacobian(theta), unit, friction):
+        best = max(_largest(finger, theta, unit, friction, slip, bounds) for slip in choices)
         if best == -np.inf:
             return float("nan")
         worst = min(worst, best)
     return worst
 
 
-def _most(finger: Finger, theta: Array, along: Array, friction: Friction, slip: Slip | None, bounds: Any) -> float:
+def _largest(finger: Finger, theta: Array, unit: Array, friction: Friction, slip: Slip | None, bounds: Any) -> float:
     """Return the largest force along a direction for one pattern of slip, N; minus infinity if there is none."""
     statics = TipStatics.from_finger(finger, theta, friction, slip)
-    extra = (statics.jacobian.T @ along)[:, None]
+    extra = (statics.jacobian.T @ unit)[:, None]
     if slip is not None:
         extra = extra + (slip.joints * finger.joint_friction.kinetic)[:, None]
     cost = np.append(-1.0, np.zeros(sum(statics.sizes)))
@@ -120,25 +124,26 @@ def tension_for_force(
     """
     finger = at_tip(as_finger(finger), tip)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, np.inf)
-    wanted = finite_vector("force", force, 3)
+    tip_force = finite_vector("force", force, 3)
     jacobian = finger.rigid_body.jacobian(theta)
-    needed: list[RequiredTension] = []
-    for ways in slips(finger, jacobian, wanted, friction):
-        candidates = [required for slip in ways if (required := _least(finger, theta, wanted, friction, slip, bounds))]
+    required_tensions: list[RequiredTension] = []
+    for choices in slips(finger, jacobian, tip_force, friction):
+        solutions = [_least_tension(finger, theta, tip_force, friction, slip, bounds) for slip in choices]
+        candidates = [each for each in solutions if each is not None]
         if not candidates:
-            raise InputError("force", "no tensions, however large, exert it", wanted.tolist())
-        needed.append(min(candidates, key=lambda required: required.largest))
-    return max(needed, key=lambda required: required.largest)
+            raise InputError("force", "no tensions, however large, exert it", tip_force.tolist())
+        required_tensions.append(min(candidates, key=lambda required: required.largest))
+    return max(required_tensions, key=lambda required: required.largest)
 
 
-def _least(
-    finger: Finger, theta: Array, wanted: Array, friction: Friction, slip: Slip | None, bounds: Any
+def _least_tension(
+    finger: Finger, theta: Array, tip_force: Array, friction: Friction, slip: Slip | None, bounds: Any
 ) -> RequiredTension | None:
     """Return the tensions with the least maximum for one pattern of slip, or None."""
     statics = TipStatics.from_finger(finger, theta, friction, slip)
-    demand = statics.jacobian.T @ wanted
+    demand = statics.jacobian.T @ tip_force
     if slip is not None:
-        demand = demand + slip.joints * finger.joint_friction.kinetic * np.linalg.norm(wanted)
+        demand = demand + slip.joints * finger.joint_friction.kinetic * np.linalg.norm(tip_force)
     a, s, n = statics.sizes
     cost, largest = np.append(1.0, np.zeros(a + s + n)), [(0.0, None)]
     # z is the largest command: an inequality for each.
@@ -152,11 +157,3 @@ def _least(
     by_radius = np.zeros((len(finger.routing.tendons), n))
     np.add.at(by_radius, segments.tendon, by_segment.T)
     return RequiredTension(float(solution.x[0]), solution.x[1 : 1 + a], tensions[segments.strands], by_radius)
-
-
-def _unit(direction: Sequence[float] | Array) -> Array:
-    vector = finite_vector("direction", direction, 3)
-    length = float(np.linalg.norm(vector))
-    if not length > 0.0:
-        raise InputError("direction", "must not be zero", vector.tolist())
-    return vector / length

@@ -47,10 +47,10 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 
-#: What scipy's linear programmes report.
+#: Status codes of scipy's linear programmes.
 INFEASIBLE, UNBOUNDED = 2, 3
-# Part of the largest lever below which a force turns no joint.
-_UNTURNED = 1e-9
+# Lever, part of the largest, below which a force turns no joint.
+_LEVER_TOLERANCE = 1e-9
 
 
 class Friction(Enum):
@@ -85,8 +85,8 @@ class Segments:
         loads: Which segments load which joints, shape (n, s).
         tendon: Tendon of every segment, shape (s,).
         strands: Segment at the end of every strand.
-        near: What pulls at the near end of every place, shape (k,), an index among commands and segments.
-        far: Likewise at the far end.
+        near_end: What pulls at the near end of every place, shape (k,), an index among commands and segments.
+        far_end: Likewise at the far end.
         friction_of: Tendon of every place, shape (k,).
         loss: exp(-mu_e phi) of every place, shape (k,).
         drag: What drag takes of what arrives there, shape (k,), N.
@@ -96,8 +96,8 @@ class Segments:
     loads: Array
     tendon: NDArray[np.intp]
     strands: NDArray[np.intp]
-    near: NDArray[np.intp]
-    far: NDArray[np.intp]
+    near_end: NDArray[np.intp]
+    far_end: NDArray[np.intp]
     friction_of: NDArray[np.intp]
     loss: Array
     drag: Array
@@ -106,41 +106,42 @@ class Segments:
     def from_tendons(cls, tendons: Tendons, theta: Array) -> Segments:
         """Cut the strands at theta, shape (n,)."""
         routing, a = tendons.routing, tendons.routing.actuated
-        whole, everywhere = routing.curvature(theta), np.ones(len(routing.joints), dtype=bool)
+        curvature, everywhere = routing.curvature(theta), np.ones(len(routing.joints), dtype=bool)
         coupling, loads = list[Array](), list[Array]()
         tendon, strands = list[int](), list[int]()
         # Of every place: tendon, near and far end, curvature, and the tendon's number of places.
         places: list[tuple[int, int, int, float, int]] = []
         for k in range(a):
-            several = tendons.several.get(k)
-            cuts = several or [(routing.curvature_matrix[k], routing.curvature_offset[k], everywhere)]
+            bend_cuts = tendons.several.get(k)
+            cuts = bend_cuts or [(routing.curvature_matrix[k], routing.curvature_offset[k], everywhere)]
             for number, (bends, offset, beyond) in enumerate(cuts):
                 after = cuts[number + 1][2] if number + 1 < len(cuts) else ~everywhere
-                here = a + len(tendon)
-                places.append((k, here - 1 if number else k, here, float(np.abs(theta) @ bends + offset), len(cuts)))
+                segment = a + len(tendon)
+                bend, pulling = float(np.abs(theta) @ bends + offset), segment - 1 if number else k
+                places.append((k, pulling, segment, bend, len(cuts)))
                 # What the first place has before it is that of the whole.
-                on = (beyond if number else everywhere) & ~after
-                coupling.append(routing.strand_coupling[k] * on)
-                loads.append(routing.loads[:, k] * on)
+                mask = (beyond if number else everywhere) & ~after
+                coupling.append(routing.strand_coupling[k] * mask)
+                loads.append(routing.loads[:, k] * mask)
                 tendon.append(k)
             strands.append(len(tendon) - 1)
         for k in range(a, len(routing.tendons)):
-            proximal, here = routing.strand(routing.tendons[k]), a + len(tendon)
-            places.append((k, here, here + 1, float(whole[k]), 1))
+            proximal, segment = routing.strand(routing.tendons[k]), a + len(tendon)
+            places.append((k, segment, segment + 1, float(curvature[k]), 1))
             for half in (proximal, proximal + 1):
                 coupling.append(routing.strand_coupling[half])
                 loads.append(routing.loads[:, half])
                 strands.append(len(tendon))
                 tendon.append(k)
-        friction_of, near, far, turn, count = (np.array(each) for each in zip(*places, strict=True))
+        friction_of, near_end, far_end, turn, count = (np.array(each) for each in zip(*places, strict=True))
         surface = tendons.surface[friction_of]
         return cls(
             coupling=np.array(coupling),
             loads=np.array(loads).T,
             tendon=np.array(tendon),
             strands=np.array(strands),
-            near=near,
-            far=far,
+            near_end=near_end,
+            far_end=far_end,
             friction_of=friction_of,
             loss=np.exp(-surface * turn),
             drag=tendons.drag[friction_of] / count / (1.0 + capstan_coefficient(surface, turn)),
@@ -177,9 +178,9 @@ class TipStatics:
         loss, drag = segments.loss[:, None], segments.drag[:, None]
         command, strand, joint, one = np.split(np.eye(a + s + n + 1), [a, a + s, a + s + n])
         ends, pins = np.vstack([command, strand]), finger.joint_friction
-        near, far = ends[segments.near], ends[segments.far]
+        near, far = ends[segments.near_end], ends[segments.far_end]
         reaction = pins.kinetic[:, None] * (segments.loads @ strand) + pins.drag[:, None] * one
-        more = (pins.drag * pins.drag_asymmetry)[:, None] * one
+        asymmetry = (pins.drag * pins.drag_asymmetry)[:, None] * one
         below: list[Array] = []
         if friction is Friction.NONE:
             equal = [far - near, joint]
@@ -189,12 +190,12 @@ class TipStatics:
             source, target = np.where(ahead, near, far), np.where(ahead, far, near)
             arriving = loss * source - drag * one
             sides = slip.joints[:, None]
-            equal = [np.where(idle, target, target - arriving), joint - sides * (reaction + sides * more)]
+            equal = [np.where(idle, target, target - arriving), joint - sides * (reaction + sides * asymmetry)]
             below = [arriving[idle[:, 0]]]
         else:
             equal = []
             below = [loss * near - far - drag * one, loss * far - near - drag * one]
-            below += [joint - more - reaction, more - joint - reaction]
+            below += [joint - asymmetry - reaction, asymmetry - joint - reaction]
         width = a + s + n
         return cls(
             jacobian=finger.rigid_body.jacobian(theta),
@@ -212,7 +213,7 @@ class TipStatics:
         extra: Array,
         bounds: list[tuple[float | None, float | None]],
         offset: Array,
-        further: Array | None = None,
+        extra_rows: Array | None = None,
     ) -> Any:
         """Minimise over (z, x): the torque rows are extra @ z = torque @ x - weight - offset.
 
@@ -221,14 +222,14 @@ class TipStatics:
             extra: Shape (n, z).
             bounds: Of z and f^a.
             offset: Shape (n,), N m.
-            further: Rows on z and f^a that are at most zero, shape (., z + a).
+            extra_rows: Rows on z and f^a that are at most zero, shape (., z + a).
         """
         _, s, n = self.sizes
         count = extra.shape[1]
         zeros = np.zeros((len(self.equal), count))
         below = np.hstack([np.zeros((len(self.below), count)), self.below])
-        if further is not None:
-            below = np.vstack([below, np.hstack([further, np.zeros((len(further), s + n + 1))])])
+        if extra_rows is not None:
+            below = np.vstack([below, np.hstack([extra_rows, np.zeros((len(extra_rows), s + n + 1))])])
         return scipy.optimize.linprog(
             cost,
             A_ub=below[:, :-1] if len(below) else None,
@@ -251,7 +252,7 @@ def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> 
         return [[None]]
     turn, size = jacobian.T @ force, float(np.linalg.norm(force))
     joints = [np.zeros(len(kinetic))]
-    if np.max(np.abs(turn)) > _UNTURNED * size * np.max(np.abs(jacobian)):
+    if np.max(np.abs(turn)) > _LEVER_TOLERANCE * size * np.max(np.abs(jacobian)):
         sides = [
             (np.sign(each),) if abs(each) >= least else (1.0, -1.0)
             for each, least in zip(turn, size * kinetic, strict=True)

@@ -57,17 +57,18 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
         return OpenLoopTensions.from_scenario(scenario, routing)
     if scenario.finger.through_space:
         return _routed(scenario, finger or Finger(scenario.finger))
-    taut = routing.force_closure().holds
-    if settings.is_paper and taut:
+    has_closure = routing.force_closure().holds
+    if settings.is_paper and has_closure:
         return ProportionalController.from_scenario(scenario, routing)
     finger = finger or Finger(scenario.finger)
     joints, tendons = len(finger.routing.joints), len(finger.routing.tendons)
+    springs = settings.spring_compensation or not has_closure
     controller = CompensatedController(
         routing=finger.routing,
         law=TorqueLaw(
             gain=expand(settings.gain, joints),
             damping=expand(settings.damping, joints),
-            static=_static(finger, settings.gravity_compensation, settings.spring_compensation or not taut),
+            static=_static_torque(finger, settings.gravity_compensation, springs),
         ),
         distribution=_distribution(scenario, finger),
         minimum=expand(settings.minimum_tension, tendons),
@@ -78,8 +79,8 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     loop = settings.passive_tension_loop
     if loop is None:
         return controller
-    wish = expand(settings.passive_tension, finger.routing.passive)
-    return PassiveTensionLoop(controller, wish, loop.proportional, loop.integral, loop.limit)
+    target = expand(settings.passive_tension, finger.routing.passive)
+    return PassiveTensionLoop(controller, target, loop.proportional, loop.integral, loop.limit)
 
 
 def _routed(scenario: Scenario, finger: Finger) -> RoutedController:
@@ -91,7 +92,7 @@ def _routed(scenario: Scenario, finger: Finger) -> RoutedController:
     law = TorqueLaw(
         gain=expand(settings.gain, size),
         damping=expand(settings.damping, size),
-        static=_static(finger, settings.gravity_compensation, settings.spring_compensation),
+        static=_static_torque(finger, settings.gravity_compensation, settings.spring_compensation),
     )
     minimum = expand(settings.minimum_tension, len(finger.routing.tendons))
     return RoutedController(finger, law, minimum, _fingertip(scenario, finger))
@@ -108,7 +109,7 @@ def _distribution(scenario: Scenario, finger: Finger) -> TensionDistribution:
     return LimitedDistribution(finger.routing, expand(maximum, len(finger.routing.tendons)))
 
 
-def _static(finger: Finger, gravity: bool, springs: bool) -> Callable[[Array], Array] | None:
+def _static_torque(finger: Finger, gravity: bool, springs: bool) -> Callable[[Array], Array] | None:
     """Return the static torque added to tau^d: G, the torque of the springs, or both."""
     if not springs or not finger.springs.present:
         return finger.rigid_body.gravity_torque if gravity else None
@@ -124,8 +125,8 @@ def _feedforward(scenario: Scenario, finger: Finger) -> TendonFeedforward | None
     tendons = finger.tendons
     believed = replace(
         tendons,
-        surface=_belief(settings.coulomb, tendons.surface),
-        stiction_ratio=_belief(settings.stiction_ratio, tendons.stiction_ratio),
+        surface=_believed(settings.coulomb, tendons.surface),
+        stiction_ratio=_believed(settings.stiction_ratio, tendons.stiction_ratio),
     )
     return TendonFeedforward(believed, settings.share, settings.reversal_speed)
 
@@ -135,15 +136,15 @@ def _joint_compensation(scenario: Scenario, finger: Finger) -> JointCompensation
     if settings is None:
         return None
     friction = finger.joint_friction
-    kinetic = _belief(settings.coulomb, friction.kinetic)
-    static = np.maximum(_belief(settings.stiction, friction.static), kinetic)
-    believed = replace(friction, kinetic=kinetic, static=static, viscous=_belief(settings.viscous, friction.viscous))
-    most, critical = settings.share * float(np.max(static)), critical_friction(finger).coefficient
-    if most >= critical:
+    kinetic = _believed(settings.coulomb, friction.kinetic)
+    static = np.maximum(_believed(settings.stiction, friction.static), kinetic)
+    believed = replace(friction, kinetic=kinetic, static=static, viscous=_believed(settings.viscous, friction.viscous))
+    largest, critical = settings.share * float(np.max(static)), critical_friction(finger).coefficient
+    if largest >= critical:
         raise InputError(
             "controller.joint_friction_compensation",
-            f"compensates joint friction up to {most:.3g} m; from {critical:.3g} m on, the tensions that overcome it "
-            "raise it by as much (self-locking): lower share, coulomb or stiction",
+            f"compensates joint friction up to {largest:.3g} m; from {critical:.3g} m on, the tensions that overcome "
+            "it raise it by as much (self-locking): lower share, coulomb or stiction",
         )
     return JointCompensation(believed, settings.share, settings.reversal_speed)
 
@@ -154,11 +155,11 @@ def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:
     if not any(tips):
         return None
     settings = [signals.get(axis, ForceSignal()) for signals in tips for axis in AXES]
-    wanted = Signal.from_settings(settings, scenario.simulation.rtol)
-    return FingertipForce(wanted.later(scenario.simulation.start_time), finger.rigid_body.jacobian)
+    force = Signal.from_settings(settings, scenario.simulation.rtol)
+    return FingertipForce(force.later(scenario.simulation.start_time), finger.rigid_body.jacobian)
 
 
-def _belief(setting: Numbers | None, actual: Array) -> Array:
+def _believed(setting: Numbers | None, actual: Array) -> Array:
     return actual if setting is None else expand(setting, len(actual))
 
 
@@ -167,9 +168,9 @@ def hand_controller(controllers: Sequence[LoopController], routing: Routing) -> 
 
     Controllers of one kind that has `from_fingers`, such as the paper's, become one of that kind, compiled like them.
     """
-    kind, *others = {type(each) for each in controllers}
-    whole = None if others else kind.from_fingers(controllers, routing)
-    return whole or HandController(controllers, routing)
+    kind, *other_kinds = {type(each) for each in controllers}
+    combined = None if other_kinds else kind.from_fingers(controllers, routing)
+    return combined or HandController(controllers, routing)
 
 
 class HandController(LoopController):
@@ -189,12 +190,12 @@ class HandController(LoopController):
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return the commands of all for shapes (..., n)."""
-        torque, lead = np.zeros_like(position), position.shape[:-1]
-        tension, torque_deficit = np.zeros((*lead, len(self.routing.tendons))), np.zeros_like(position)
+        torque, batch_shape = np.zeros_like(position), position.shape[:-1]
+        tension, torque_deficit = np.zeros((*batch_shape, len(self.routing.tendons))), np.zeros_like(position)
         limited = False
         for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
-            desired = ReferenceSignals(reference.position[..., joints], reference.velocity[..., joints])
-            signals = controller.command(time, desired, position[..., joints], velocity[..., joints])
+            finger_reference = ReferenceSignals(reference.position[..., joints], reference.velocity[..., joints])
+            signals = controller.command(time, finger_reference, position[..., joints], velocity[..., joints])
             torque[..., joints], tension[..., tendons] = signals.torque, signals.tension
             if signals.torque_deficit is not None:
                 limited = True
@@ -205,7 +206,7 @@ class HandController(LoopController):
         """Pass on the readings of each finger's sensors, with the time since the last ones, s."""
         for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
             indices = {"tendon_tension": tendons, "joint_position": joints, "joint_velocity": joints}
-            controller.sense({name: readings[name][places] for name, places in indices.items()}, elapsed)
+            controller.sense({name: readings[name][selection] for name, selection in indices.items()}, elapsed)
 
     def signals(self) -> tuple[Signal, ...]:
         """Return the signals that any of them follows."""
@@ -214,5 +215,5 @@ class HandController(LoopController):
     def stateless(self) -> HandController | None:
         """Return the stateless controllers of all fingers; None if one has a state."""
         controllers = [each.stateless() for each in self.controllers]
-        known = [each for each in controllers if each is not None]
-        return HandController(known, self.routing) if len(known) == len(controllers) else None
+        stateless = [each for each in controllers if each is not None]
+        return HandController(stateless, self.routing) if len(stateless) == len(controllers) else None

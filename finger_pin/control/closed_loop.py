@@ -7,7 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger_pin.control.interface import Controller, ControlSignals, Dynamics, LoopController
-from finger_pin.control.palm import Guides, PalmPath, PrescribedJoints, PrescribedPaths, at_start, with_paths
+from finger_pin.control.palm import (
+    PalmPath,
+    PrescribedJoints,
+    PrescribedMotion,
+    PrescribedPaths,
+    start_state,
+    with_paths,
+)
 from finger_pin.control.position_drive import DriveSignals, LoopMemory
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -24,11 +31,11 @@ from finger_pin.references.signal import HARMONIC, Signal
 from finger_pin.typing import Array
 
 _NO_FORCE = ForceSignal()
-# However close points are, steps need not be shorter than this, s.
-_SHORTEST = 1e-4
+# Least step between knots of signals, s, however close they are.
+_SHORTEST_STEP = 1e-4
 
 
-_Acting = tuple[Array, Array, Array | None]
+_Inputs = tuple[Array, Array, Array | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +62,7 @@ class ClosedLoop:
         drives: Loops of motors in position drive; None without any.
         last_samples: Of these loops, from the run that this one goes on from; None for loops that start.
         palm: Path of the palm of a hand; None at rest.
-        guides: Paths of moved objects and joints, or the motion of all joints; None without any.
+        prescribed_motion: Paths of moved objects and joints, or the motion of all joints; None without any.
     """
 
     finger: Finger
@@ -68,7 +75,7 @@ class ClosedLoop:
     drives: DriveSignals | None = None
     last_samples: LoopMemory | None = None
     palm: PalmPath | None = None
-    guides: Guides | None = None
+    prescribed_motion: PrescribedMotion | None = None
 
     @classmethod
     def from_scenario(
@@ -93,22 +100,22 @@ class ClosedLoop:
             InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape
                 or are not finite, or tensions are negative.
         """
-        start, acting = scenario.simulation.start_time, scenario.environments()
+        start, environments = scenario.simulation.start_time, scenario.environments()
         finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)
-        _refuse_other(finger, scenario)
-        alone = len(acting) == 1
+        _check_matches(finger, scenario)
+        single, forces = len(environments) == 1, np.array([each.fingertip_force for each in environments.values()])
         loop = cls(
             finger=finger,
             controller=choose_controller(controller, scenario, finger),
             reference=choose_reference(reference, scenario, finger.routing),
-            fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
+            fingertip_force=forces[0] if single else forces,
             dynamics=finger,
             palm=PalmPath.from_hand(scenario.hand, start, finger, scenario.simulation.rtol),
-            guides=PrescribedPaths.from_finger(finger, start, scenario.simulation.rtol),
+            prescribed_motion=PrescribedPaths.from_finger(finger, start, scenario.simulation.rtol),
         )
-        signals = [each.fingertip_force_signal or {} for each in acting.values()]
+        signals = [each.fingertip_force_signal or {} for each in environments.values()]
         if fingertip_force is not None:
-            columns = AXES if alone else [f"{name}.{axis}" for name in acting for axis in AXES]
+            columns = AXES if single else [f"{name}.{axis}" for name in environments for axis in AXES]
             force = Signal.from_samples("fingertip_force", fingertip_force, columns, scenario.simulation.rtol)
             loop = replace(loop, fingertip_force=np.zeros_like(loop.fingertip_force), varying_force=force.later(start))
         elif any(signals):
@@ -121,9 +128,9 @@ class ClosedLoop:
             speeds = (keyframe.velocity if keyframe else {}) | (initial.velocity if initial else {})
             joints = finger.routing.joints
             position = loop.reference.at(0.0).position
-            moved = [angles.get(name, angle) for name, angle in zip(joints, position, strict=True)]
+            start_position = [angles.get(name, angle) for name, angle in zip(joints, position, strict=True)]
             velocity = [speeds.get(name, 0.0) for name in joints]
-            loop = replace(loop, start=loop.rest_state(np.array(moved), np.array(velocity)))
+            loop = replace(loop, start=loop.rest_state(np.array(start_position), np.array(velocity)))
         return loop
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
@@ -133,18 +140,18 @@ class ClosedLoop:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
         x = self.finger.rest_state(position, velocity, tension)
-        return at_start(self.finger, x, self.palm, self.guides)
+        return start_state(self.finger, x, self.palm, self.prescribed_motion)
 
-    def started(self, x: Array, last_samples: LoopMemory | None = None) -> ClosedLoop:
+    def with_start(self, x: Array, last_samples: LoopMemory | None = None) -> ClosedLoop:
         """Return the same loop that starts at a packed state; a palm on a path has the world where it is then."""
         start = x if self.palm is None else self.palm.place_world(self.finger, x)
         return replace(self, start=start, last_samples=last_samples)
 
-    def along(self, motion: Signal) -> ClosedLoop:
+    def with_prescribed_motion(self, motion: Signal) -> ClosedLoop:
         """Return the same loop with its joints held to a motion, n functions of time, rad; bristles start relaxed."""
         finger = self.finger.with_prescribed_joints()
-        guides = PrescribedJoints(motion, np.array(finger.rigid_body.model.gravity.linear))
-        loop = replace(self, finger=finger, dynamics=finger, guides=guides)
+        prescribed = PrescribedJoints(motion, np.array(finger.rigid_body.model.gravity.linear))
+        loop = replace(self, finger=finger, dynamics=finger, prescribed_motion=prescribed)
         return replace(loop, start=loop.rest_state(*motion.at(0.0)))
 
     def compiled(self) -> ClosedLoop:
@@ -170,9 +177,9 @@ class ClosedLoop:
 
     def knots(self, tolerance: float) -> Array:
         """Return the times at which a signal bends or jumps by more than a relative tolerance, s, in order."""
-        prescribed = [each and each.signal for each in (self.palm, self.guides)]
-        other = [each for each in (self.varying_force, *prescribed) if each]
-        signals = (*self.reference.signals(), *self.controller.signals(), *other)
+        path_signals = [each and each.signal for each in (self.palm, self.prescribed_motion)]
+        signals_beside = [each for each in (self.varying_force, *path_signals) if each]
+        signals = (*self.reference.signals(), *self.controller.signals(), *signals_beside)
         return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
 
     def spool_goals(self, time: Array) -> Array | None:
@@ -180,22 +187,22 @@ class ClosedLoop:
         drives = None if self.drives is None else self.drives.compiled
         return None if drives is None else drives.zero_order_hold(drives.goals, time)
 
-    def wound(self, angle: Array) -> Array:
+    def wound_lengths(self, angle: Array) -> Array:
         """Return the lengths that spools at angles (m, k), rad, wind in of their k' cords, shape (m, k'), m."""
         return angle @ self.finger.actuators.spools.T
 
     def longest_step(self, tolerance: float) -> float:
-        """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
-        return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST)
+        """Return the longest step, s, in which no signal has more than one knot; infinite without knots."""
+        return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST_STEP)
 
     def evaluate(self, time: Array | float, x: Array, outputs: Outputs = "all") -> LoopSignals:
         """Return the signals at one time and state, or at times (m,) and states (m, size); see `Finger.evaluate`."""
-        reference, control, acting = self._acting(time, x)
+        reference, control, inputs = self._mechanism_inputs(time, x)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        return LoopSignals(reference, control, self.dynamics.evaluate(x, *acting, outputs))
+        return LoopSignals(reference, control, self.dynamics.evaluate(x, *inputs, outputs))
 
-    def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
+    def _mechanism_inputs(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Inputs]:
         """Return reference, plan, inputs of the mechanism, F, and the motion of palm or objects.
 
         Inputs are tensions, voltages of motors in position drive, inputs of a tree.
@@ -212,25 +219,25 @@ class ClosedLoop:
 
     def base(self, time: Array | float) -> Array | None:
         """Return the motion of palm and objects at one time, shape (27 + g,), or at times (m,); None at rest."""
-        mover = self.palm or self.guides
-        return None if mover is None else mover.base(time)
+        path = self.palm or self.prescribed_motion
+        return None if path is None else path.base(time)
 
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips, base frame, and energies in the world at times (m,) and states."""
-        base, around, objects = self.base(time), self.finger.scene, None
+        base, scene, objects = self.base(time), self.finger.scene, None
         motion = self.dynamics.motion(state.position, state.velocity, base)
-        if around is not None:
-            objects = around.energies(state.object_pose, state.object_velocity, base)
+        if scene is not None:
+            objects = scene.energies(state.object_pose, state.object_velocity, base)
         if self.palm is not None:
-            higher = motion.potential_energy + self.palm.lifted(time, self.finger.rigid_body.mass)
-            motion = motion._replace(potential_energy=higher)
-            if around is not None and objects is not None:
-                objects = objects[0], objects[1] + self.palm.lifted(time, float(np.sum(around.mass)))
+            potential_energy = motion.potential_energy + self.palm.gravity_energy(time, self.finger.rigid_body.mass)
+            motion = motion._replace(potential_energy=potential_energy)
+            if scene is not None and objects is not None:
+                objects = objects[0], objects[1] + self.palm.gravity_energy(time, float(np.sum(scene.mass)))
         return motion._replace(objects=objects)
 
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
-        rows, external = self.dynamics.powers(x, *self._acting(time, x)[2])
+        rows, external = self.dynamics.powers(x, *self._mechanism_inputs(time, x)[2])
         velocity = self.finger.layout.unpack(x).velocity
         fingertip = np.sum(external[:, : velocity.shape[-1]] * velocity, axis=-1)
         return np.concatenate([rows, fingertip[:, None]], axis=1)
@@ -240,7 +247,7 @@ class ClosedLoop:
         return self.evaluate(time, as_floats("x", x, self.finger.layout.size)).finger.rate
 
 
-def _refuse_other(finger: Finger, scenario: Scenario) -> None:
+def _check_matches(finger: Finger, scenario: Scenario) -> None:
     """Refuse a finger that has other joints, tendons or winches than a scenario's."""
     for kind, names, described in (
         ("joints", finger.routing.joints, scenario.finger.joints),
@@ -248,15 +255,15 @@ def _refuse_other(finger: Finger, scenario: Scenario) -> None:
     ):
         if names != tuple(described):
             raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(names))
-    for name, winched in zip(finger.routing.tendons, finger.routing.winched, strict=False):
-        if winched != (scenario.finger.tendons[name].winch is not None):
+    for name, has_winch in zip(finger.routing.tendons, finger.routing.winched, strict=False):
+        if has_winch != (scenario.finger.tendons[name].winch is not None):
             raise InputError(f"finger.tendons.{name}.winch", "must be that of the scenario's finger")
 
 
 def compiled_control(loop: ClosedLoop) -> InputTable | None:
     """Return a loop's controller, reference and varying force as arrays, or None if the first two are Python."""
     if len(loop.finger.actuators.positioned) == loop.finger.mechanism.channels:
-        # Nothing of what the controller plans goes to the finger at once.
+        # All inputs come from sampled drives: none directly from the controller.
         return sampled_control(loop)
     control = loop.controller.as_control(loop.reference, loop.finger)
     return None if control is None else with_force(control, loop)
@@ -270,7 +277,7 @@ def sampled_control(loop: ClosedLoop) -> InputTable:
 
 def with_force(control: InputTable, loop: ClosedLoop) -> InputTable:
     """Return inputs with the path of the palm and the force at the fingertip, its varying and its constant part."""
-    control = with_paths(control, loop.palm, loop.guides)
+    control = with_paths(control, loop.palm, loop.prescribed_motion)
     if loop.varying_force is None:
         return control
     force = core_signal(loop.varying_force)

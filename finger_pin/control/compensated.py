@@ -8,15 +8,15 @@ import numpy as np
 
 from finger_pin.control.distribution import TensionAllocation, TensionDistribution
 from finger_pin.control.interface import ControlSignals, LoopController
-from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward, undivided
+from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward, frictionless_strands
 from finger_pin.control.torque import FingertipForce, TorqueLaw
 from finger_pin.description.routing import Routing
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 
-# Newton's method converges in a few iterations; if it cycles, plain iteration takes over.
-_SETTLED, _NEWTON, _TURNS = 1e-9, 20, 200
+# Relative change at which tensions agree, Newton iterations, and all iterations: plain ones follow if Newton's cycle.
+_TENSION_TOLERANCE, _NEWTON_ITERATIONS, _MAX_ITERATIONS = 1e-9, 20, 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,58 +49,58 @@ class CompensatedController(LoopController):
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return the torque that is asked of the tendons and the commands, for shapes (..., n)."""
-        return self.command_above(self.minimum, time, reference, position, velocity)
+        return self.command_with_minimum(self.minimum, time, reference, position, velocity)
 
     def signals(self) -> tuple[Signal, ...]:
         """Return the functions of time of the wanted fingertip force."""
-        return () if self.fingertip is None else (self.fingertip.wanted,)
+        return () if self.fingertip is None else (self.fingertip.desired_force,)
 
     def stateless(self) -> CompensatedController:
         """Return itself: it remembers nothing."""
         return self
 
-    def command_above(
+    def command_with_minimum(
         self, minimum: Array, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return the commands with another minimum f0, shape (t,), N."""
-        wanted = self.law.torque(reference, position, velocity)
+        torque = self.law.torque(reference, position, velocity)
         if self.fingertip is not None:
-            wanted = wanted + self.fingertip.torque(time, position)
-        plan = self.distribution.plan(wanted, minimum)
+            torque = torque + self.fingertip.torque(time, position)
+        plan = self.distribution.plan(torque, minimum)
         if self.tendons is not None or self.joints is not None:
             if self.joints is not None:
-                wanted = wanted + self.joints.unloaded_torque(reference.velocity)
+                torque = torque + self.joints.unloaded_torque(reference.velocity)
             matrix = self._friction_matrix(position, reference.velocity)
-            wanted, plan = self._closed(wanted, matrix, minimum, plan)
+            torque, plan = self._consistent_plan(torque, matrix, minimum, plan)
         command = plan.tension
         if self.tendons is not None:
             command = self.tendons.command(command, position, reference.velocity)
-        return ControlSignals(wanted, command, plan.torque_deficit)
+        return ControlSignals(torque, command, plan.torque_deficit)
 
-    def _closed(
-        self, wanted: Array, matrix: Array, minimum: Array, plan: TensionAllocation
+    def _consistent_plan(
+        self, base_torque: Array, matrix: Array, minimum: Array, plan: TensionAllocation
     ) -> tuple[Array, TensionAllocation]:
-        """Return the torque and the plan that agree: tau = wanted + matrix f_hat, and f_hat is the plan for tau.
+        """Return the torque and the plan that agree: tau = base + matrix f_hat, and f_hat is the plan for tau.
 
         Newton's method: between changes of the tendons that are at a limit, all is linear.
         """
         tension: Array = plan.tension
         identity = np.eye(tension.shape[-1])
-        for turn in range(_TURNS):
-            torque = wanted + (matrix @ tension[..., None])[..., 0]
+        for iteration in range(_MAX_ITERATIONS):
+            torque = base_torque + (matrix @ tension[..., None])[..., 0]
             plan = self.distribution.plan(torque, minimum)
-            gap: Array = plan.tension - tension
-            if not np.any(np.abs(gap) > _SETTLED * np.max(plan.tension, axis=-1, keepdims=True)):
+            step: Array = plan.tension - tension
+            if not np.any(np.abs(step) > _TENSION_TOLERANCE * np.max(plan.tension, axis=-1, keepdims=True)):
                 break
-            if turn < _NEWTON:
-                gap = np.asarray(np.linalg.solve(identity - plan.slope @ matrix, gap[..., None])[..., 0], dtype=float)
-            tension = tension + gap
+            if iteration < _NEWTON_ITERATIONS:
+                step = np.asarray(np.linalg.solve(identity - plan.slope @ matrix, step[..., None])[..., 0], dtype=float)
+            tension = tension + step
         return torque, plan
 
     def _friction_matrix(self, position: Array, desired_velocity: Array) -> Array:
         """Return the slope by f_hat of the compensation of joints and passive tendons, shape (..., n, t), m."""
         routing = self.routing
-        strands = undivided(routing)
+        strands = frictionless_strands(routing)
         if self.tendons is not None:
             strands = self.tendons.strand_matrix(position, desired_velocity)
         matrix = routing.coupling.T - routing.strand_coupling.T @ strands

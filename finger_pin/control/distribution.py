@@ -13,10 +13,10 @@ from finger_pin.description.routing import Routing
 from finger_pin.laws.input_functions import internal_level
 from finger_pin.typing import Array
 
-# The solver meets feasible programmes of this size in about ten iterations.
-_ACCURACY, _ITERATIONS = 1e-10, 300
-# So near to a limit, N, a tension is at it.
-_TIGHT = 1e-6
+# Tolerance of the scaled programme, and its greatest number of iterations: feasible ones of this size take about ten.
+_QP_TOLERANCE, _QP_ITERATIONS = 1e-10, 300
+# Distance from a limit within which a tension is at it, N.
+_LIMIT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,9 +62,9 @@ class PseudoInverse:
         """Return f_hat of (21) with lambda of (22), and no torque deficit."""
         minimal = torque @ self.inverse.T
         levels = internal_level(minimum, minimal, self.internal)
-        tight = np.argmax(levels, axis=-1)
-        level = np.take_along_axis(levels, tight[..., None], axis=-1)
-        raised = self.inverse[tight] / self.internal[tight][..., None]
+        limiting = np.argmax(levels, axis=-1)
+        level = np.take_along_axis(levels, limiting[..., None], axis=-1)
+        raised = self.inverse[limiting] / self.internal[limiting][..., None]
         slope = self.inverse - self.internal[:, None] * raised[..., None, :]
         return TensionAllocation(minimal + level * self.internal, np.zeros_like(torque), slope)
 
@@ -88,7 +88,7 @@ class LimitedDistribution:
         self._shape = (joints, tendons)
         self._programme = proxqp.dense.QP(tendons, joints, 0, True)
         settings = self._programme.settings
-        settings.eps_abs, settings.eps_rel, settings.max_iter = _ACCURACY, 0.0, _ITERATIONS
+        settings.eps_abs, settings.eps_rel, settings.max_iter = _QP_TOLERANCE, 0.0, _QP_ITERATIONS
         settings.initial_guess = proxqp.InitialGuess.NO_INITIAL_GUESS
         self._programme.init(
             np.eye(tendons), np.zeros(tendons), self._matrix, np.zeros(joints), None, None, None, np.zeros(tendons),
@@ -98,16 +98,17 @@ class LimitedDistribution:
     def plan(self, torque: Array, minimum: Array) -> TensionAllocation:
         """Return the least tensions within the limits, and the torque that they fall short of."""
         joints, tendons = self._shape
-        wanted = torque.reshape(-1, joints)
-        floors = np.minimum(np.broadcast_to(minimum, (*torque.shape[:-1], tendons)), self.maximum)
-        rows = [self._one(each, floor) for each, floor in zip(wanted, floors.reshape(-1, tendons), strict=True)]
+        torques = torque.reshape(-1, joints)
+        minimums = np.minimum(np.broadcast_to(minimum, (*torque.shape[:-1], tendons)), self.maximum)
+        rows = [self._plan_one(each, floor) for each, floor in zip(torques, minimums.reshape(-1, tendons), strict=True)]
         tension = np.array([row[0] for row in rows])
-        free = (tension > floors.reshape(-1, tendons) + _TIGHT) & (tension < self.maximum - _TIGHT)
+        above_minimum = tension > minimums.reshape(-1, tendons) + _LIMIT_TOLERANCE
+        free = above_minimum & (tension < self.maximum - _LIMIT_TOLERANCE)
         slope = np.array([self._slope(each) for each in free])
         return TensionAllocation(
-            tension.reshape(floors.shape),
+            tension.reshape(minimums.shape),
             np.array([row[1] for row in rows]).reshape(torque.shape),
-            slope.reshape(*floors.shape, joints),
+            slope.reshape(*minimums.shape, joints),
         )
 
     def _slope(self, free: Array) -> Array:
@@ -116,26 +117,26 @@ class LimitedDistribution:
         slope[free] = np.linalg.pinv(self._matrix[:, free]) / self._scale
         return slope
 
-    def _one(self, torque: Array, minimum: Array) -> tuple[Array, Array]:
-        wanted = torque / self._scale
-        if not np.isfinite(wanted).all():
+    def _plan_one(self, torque: Array, minimum: Array) -> tuple[Array, Array]:
+        scaled_torque = torque / self._scale
+        if not np.isfinite(scaled_torque).all():
             return np.full(len(minimum), np.nan), np.full(len(torque), np.nan)
-        tension = self._least(wanted, minimum)
+        tension = self._least_tensions(scaled_torque, minimum)
         if tension is not None:
             return tension, np.zeros(len(torque))
         # A box of no width has one answer, which the solver below does not take.
         free = self.maximum > minimum
         nearest = minimum.copy()
-        rest = wanted - self._matrix[:, ~free] @ minimum[~free]
+        remaining = scaled_torque - self._matrix[:, ~free] @ minimum[~free]
         if free.any():
             bounds = (minimum[free], self.maximum[free])
-            nearest[free] = scipy.optimize.lsq_linear(self._matrix[:, free], rest, bounds, method="bvls").x
+            nearest[free] = scipy.optimize.lsq_linear(self._matrix[:, free], remaining, bounds, method="bvls").x
         exerted = self._matrix @ nearest
         # Of all tensions that exert the nearest torque, again the least.
-        tension = self._least(exerted, minimum)
-        return nearest if tension is None else tension, self._scale * (wanted - exerted)
+        tension = self._least_tensions(exerted, minimum)
+        return nearest if tension is None else tension, self._scale * (scaled_torque - exerted)
 
-    def _least(self, torque: Array, minimum: Array) -> Array | None:
+    def _least_tensions(self, torque: Array, minimum: Array) -> Array | None:
         programme = self._programme
         programme.update(b=torque, l_box=minimum, u_box=self.maximum)
         programme.solve()

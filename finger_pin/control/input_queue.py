@@ -8,8 +8,8 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.typing import Array
 
-# Arrivals this close together, s, are one: a step between them would be of no length.
-_COINCIDENT = 1e-12
+# Arrivals within this time, s, coincide: a step between them would have no length.
+_TIME_TOLERANCE = 1e-12
 
 
 def input_delays(finger: FingerDescription, routing: Routing) -> Array:
@@ -28,33 +28,33 @@ class InputQueue:
         """Create an empty queue."""
         self.delays, self._longest = delays, float(np.max(delays, initial=0.0))
         self._values = np.zeros(len(delays))
-        self._waiting: list[tuple[float, Array]] = []
+        self._pending: list[tuple[float, Array]] = []
 
     def add(self, time: float, values: Array) -> None:
         """Command values, shape (u,), at a time, s, not before those of earlier commands."""
         if self._longest:
-            self._waiting.append((time, values))
+            self._pending.append((time, values))
         else:
             self._values = values
 
     def at(self, time: float) -> Array:
         """Return the values that have arrived by a time, s, shape (u,); never ask for an earlier one again."""
-        if self._waiting:
-            now = time + _COINCIDENT
-            for commanded, values in self._waiting:
-                self._values = np.where(commanded + self.delays <= now, values, self._values)
-            self._waiting = [each for each in self._waiting if each[0] + self._longest > now]
+        if self._pending:
+            latest = time + _TIME_TOLERANCE
+            for commanded, values in self._pending:
+                self._values = np.where(commanded + self.delays <= latest, values, self._values)
+            self._pending = [each for each in self._pending if each[0] + self._longest > latest]
         return self._values
 
     def next_arrival(self, time: float, end: float) -> float:
         """Return when the next value arrives after a time, s, at most the end."""
-        if not self._waiting:
+        if not self._pending:
             return end
-        arrivals = [commanded + delay for commanded, _ in self._waiting for delay in set(self.delays.tolist())]
-        return min([each for each in arrivals if time + _COINCIDENT < each < end - _COINCIDENT], default=end)
+        arrivals = [commanded + delay for commanded, _ in self._pending for delay in set(self.delays.tolist())]
+        return min([each for each in arrivals if time + _TIME_TOLERANCE < each < end - _TIME_TOLERANCE], default=end)
 
     def copy(self) -> InputQueue:
         """Return a copy that goes on by itself."""
         twin = InputQueue(self.delays)
-        twin._values, twin._waiting = self._values, self._waiting[:]
+        twin._values, twin._pending = self._values, self._pending[:]
         return twin

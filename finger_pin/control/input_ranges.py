@@ -8,8 +8,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
-# Tension that may be asked for by default, and by which a tendon on a spool may be stretched, N.
-_STRONGEST = 20.0
+# Greatest tension by default, also that of stretched tendons on spools, N.
+_DEFAULT_MAXIMUM = 20.0
 
 
 def input_ranges(finger: Finger) -> tuple[Array, Array]:
@@ -19,22 +19,22 @@ def input_ranges(finger: Finger) -> tuple[Array, Array]:
         InputError: If an actuator's input has no range, and it holds no joint whose range would say.
     """
     description, winched = finger.description, finger.routing.winched
-    drawn = finger.excursion(_corners(finger)).T if winched.any() else np.zeros((len(winched), 1))
-    ends = [
-        (0.0, each.maximum_tension or _STRONGEST)
+    excursion = finger.excursion(_corners(finger)).T if winched.any() else np.zeros((len(winched), 1))
+    ranges = [
+        (0.0, each.maximum_tension or _DEFAULT_MAXIMUM)
         if each.winch is None
-        else (lengths.min(), lengths.max() + (each.maximum_tension or _STRONGEST) / each.winch.stiffness)
-        for each, lengths in zip(description.tendons.values(), drawn, strict=False)
+        else (lengths.min(), lengths.max() + (each.maximum_tension or _DEFAULT_MAXIMUM) / each.winch.stiffness)
+        for each, lengths in zip(description.tendons.values(), excursion, strict=False)
     ]
     for name, actuator in description.tree.actuators.items():
-        reach = actuator.reach(description.joints[actuator.joint].range if actuator.joint else None)
-        if reach is None:
+        limits = actuator.reach(description.joints[actuator.joint].range if actuator.joint else None)
+        if limits is None:
             raise InputError(
                 f"finger.tree.actuators.{name}.input_range",
                 "is missing: actions and sliders need a least and a largest",
             )
-        ends.append(reach)
-    low, high = np.array(ends, dtype=float).reshape(-1, 2).T
+        ranges.append(limits)
+    low, high = np.array(ranges, dtype=float).reshape(-1, 2).T
     return low, high
 
 
@@ -47,14 +47,14 @@ def _corners(finger: Finger) -> Array:
 def spool_ranges(finger: Finger) -> tuple[Array, Array]:
     """Return the least and the largest spool angles that postures need, and some stretch, shape (m,), rad."""
     actuators, corners = finger.actuators, _corners(finger)
-    drawn = finger.excursion(corners)
-    taut = actuators.angle(corners, None, drawn)
-    stretched = actuators.angle(corners, np.full(drawn.shape, _STRONGEST), drawn)
-    least, most = taut.min(axis=0), stretched.max(axis=0)
+    excursion = finger.excursion(corners)
+    taut = actuators.angle(corners, None, excursion)
+    stretched = actuators.angle(corners, np.full(excursion.shape, _DEFAULT_MAXIMUM), excursion)
+    lowest, highest = taut.min(axis=0), stretched.max(axis=0)
     # Of tendons that are wound in together the one that needs most decides, not all on average.
     for motor in np.flatnonzero(np.sum(actuators.spools > 0.0, axis=0) > 1):
-        wound = np.flatnonzero(actuators.spools[:, motor] > 0.0)
-        angles = (drawn[:, actuators.tendons[wound]] - actuators.slack[wound]) / actuators.spools[wound, motor]
-        stretch = _STRONGEST / actuators.stiffness[wound] / actuators.spools[wound, motor]
-        least[motor], most[motor] = angles.min(), (angles + stretch).max()
-    return least, most
+        cords = np.flatnonzero(actuators.spools[:, motor] > 0.0)
+        angles = (excursion[:, actuators.tendons[cords]] - actuators.slack[cords]) / actuators.spools[cords, motor]
+        stretch = _DEFAULT_MAXIMUM / actuators.stiffness[cords] / actuators.spools[cords, motor]
+        lowest[motor], highest[motor] = angles.min(), (angles + stretch).max()
+    return lowest, highest

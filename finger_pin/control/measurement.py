@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger_pin.control.interface import Instant, SampledSensor
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
-
-if TYPE_CHECKING:
-    pass
 
 
 def readings(sensors: Sequence[SampledSensor], now: Instant) -> dict[str, Array]:

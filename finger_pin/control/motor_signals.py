@@ -13,7 +13,7 @@ from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 
 
-def wound_spools(scenario: Scenario, finger: Finger) -> dict[int, tuple[Signal, float]]:
+def spool_windings(scenario: Scenario, finger: Finger) -> dict[int, tuple[Signal, float]]:
     """Return the windings of motors in position drive, by their number: rad, or m and the radius of the spool."""
     actuators, windings = finger.actuators, dict[int, tuple[SignalSettings, float]]()
     cords = [finger.routing.tendons[k] for k in actuators.tendons]
@@ -39,9 +39,9 @@ def voltage_signals(scenario: Scenario, finger: Finger, table: str) -> dict[int,
     }
 
 
-def sampled(signals: Mapping[int, Signal], times: Array, start_time: float, otherwise: Array) -> Array:
+def sampled_voltages(signals: Mapping[int, Signal], times: Array, start_time: float, default: Array) -> Array:
     """Return voltages of motors at times of a motion, shape (k, m), V; without a signal the others, shape (m,)."""
-    values: Array = np.tile(otherwise, (len(times), 1))
+    values: Array = np.tile(default, (len(times), 1))
     for motor, signal in signals.items():
         values[:, motor] = signal.later(start_time).at(times)[0][:, 0]
     return values

@@ -18,43 +18,43 @@ from finger_pin.typing import Array
 Inputs = ArrayLike | Mapping[str, float]
 
 
-def input_places(finger: Finger) -> dict[str, int]:
-    """Return the places of the inputs by name, as in ``tensions.T1``: those of winches are ``tendon_winding``.
+def input_indices(finger: Finger) -> dict[str, int]:
+    """Return the indices of the inputs by name, as in ``tensions.T1``: those of winches are ``tendon_winding``.
 
     ``motor_voltage`` is that of a motor in position drive, ``inputs`` are of a tree's actuators.
     """
     description, routing = finger.description, finger.routing
     tendons = list(routing.tendons[: routing.actuated])
     positioned = {name: each.tendons for name, each in description.actuators.items() if each.drive == "position"}
-    driven = {tendon for pulled in positioned.values() for tendon in pulled}
+    driven = {tendon for cords in positioned.values() for tendon in cords}
     kinds = ["tendon_winding" if winched else "tensions" for winched in routing.winched]
-    places = {f"{kinds[place]}.{tendon}": place for place, tendon in enumerate(tendons) if tendon not in driven}
-    places |= {f"motor_voltage.{name}": tendons.index(pulled[0]) for name, pulled in positioned.items()}
-    return places | {f"inputs.{name}": routing.actuated + k for k, name in enumerate(description.tree.actuators)}
+    indices = {f"{kinds[index]}.{tendon}": index for index, tendon in enumerate(tendons) if tendon not in driven}
+    indices |= {f"motor_voltage.{name}": tendons.index(cords[0]) for name, cords in positioned.items()}
+    return indices | {f"inputs.{name}": routing.actuated + k for k, name in enumerate(description.tree.actuators)}
 
 
-def inputs_by_name(entry: str, commands: Mapping[str, Any], finger: Finger, *, loops: bool = False) -> Array:
+def inputs_by_name(entry: str, commands: Mapping[str, Any], finger: Finger, *, with_loops: bool = False) -> Array:
     """Return the inputs that commands by name stand for, shape (channels,).
 
     Args:
         entry: That gives them, for messages.
-        commands: A number by name: of `input_places`, or of a tendon or an actuator of a tree alone.
+        commands: A number by name: of `input_indices`, or of a tendon or an actuator of a tree alone.
         finger: The finger.
-        loops: Whether motors in position drive have loops, which give them their voltages.
+        with_loops: Whether motors in position drive have loops, which give them their voltages.
 
     Raises:
         InputError: If a name is none of an input, or one is missing.
     """
-    places = {
-        name: place for name, place in input_places(finger).items() if not (loops and name.startswith("motor_voltage."))
-    }
-    inputs, missing = np.zeros(finger.mechanism.channels), dict(places)
+    indices = input_indices(finger)
+    if with_loops:
+        indices = {name: index for name, index in indices.items() if not name.startswith("motor_voltage.")}
+    inputs, missing = np.zeros(finger.mechanism.channels), dict(indices)
     for name, value in commands.items():
-        full = ".".join(command_place(name, finger.description.tree.actuators))
-        if full not in places:
-            raise InputError(f"{entry}.{name}", f"no such input; there are {choices(full, places)}")
-        inputs[places[full]] = value
-        missing.pop(full, None)
+        full_name = ".".join(command_place(name, finger.description.tree.actuators))
+        if full_name not in indices:
+            raise InputError(f"{entry}.{name}", f"no such input; there are {choices(full_name, indices)}")
+        inputs[indices[full_name]] = value
+        missing.pop(full_name, None)
     if missing:
-        raise InputError(entry, f"must have all of {', '.join(places)}; missing: {', '.join(missing)}")
+        raise InputError(entry, f"must have all of {', '.join(indices)}; missing: {', '.join(missing)}")
     return inputs

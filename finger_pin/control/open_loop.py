@@ -45,18 +45,20 @@ class OpenLoopTensions(LoopController):
 
         What has none holds the keyframe's, else the minimum or 0; of what is wound no tension is planned.
         """
-        signals: dict[str, SignalSettings] = dict.fromkeys(wound_tendons(scenario, scenario.controller), _constant(0.0))
+        wound = wound_tendons(scenario, scenario.controller)
+        signals: dict[str, SignalSettings] = dict.fromkeys(wound, _constant_tension(0.0))
         signals |= scenario.controller.tensions or {}
         winched = dict(zip(routing.tendons, routing.winched, strict=False))
         signals |= {name: each for name, each in (scenario.controller.tendon_winding or {}).items() if winched[name]}
         keyframe_inputs = scenario.keyframe.inputs if scenario.keyframe else {}
-        least = expand(scenario.controller.minimum_tension, len(routing.tendons))
+        minimum = expand(scenario.controller.minimum_tension, len(routing.tendons))
         settings: list[SignalSettings] = [
-            signals.get(name) or _constant(keyframe_inputs.get(name, float(tension)))
-            for name, tension in zip(routing.tendons[: routing.actuated], least, strict=False)
+            signals.get(name) or _constant_tension(keyframe_inputs.get(name, float(tension)))
+            for name, tension in zip(routing.tendons[: routing.actuated], minimum, strict=False)
         ]
-        driven = scenario.controller.inputs or {}
-        settings += [driven.get(name) or _input(keyframe_inputs.get(name, 0.0)) for name in _actuators(scenario)]
+        actuator_signals = scenario.controller.inputs or {}
+        for name in scenario.finger.tree.actuators:
+            settings.append(actuator_signals.get(name) or _constant_input(keyframe_inputs.get(name, 0.0)))
         return cls._from_signal(Signal.from_settings(settings, scenario.simulation.rtol), scenario, routing)
 
     @classmethod
@@ -70,11 +72,11 @@ class OpenLoopTensions(LoopController):
         Raises:
             InputError: If shapes or numbers are wrong, or a tension is negative.
         """
-        columns = (*routing.tendons[: routing.actuated], *_actuators(scenario))
+        columns = (*routing.tendons[: routing.actuated], *scenario.finger.tree.actuators)
         signal = Signal.from_samples("controller", samples, columns, scenario.simulation.rtol)
-        least = float(np.min(np.asarray(samples[1])[:, : routing.actuated][:, ~routing.winched], initial=0.0))
-        if least < 0.0:
-            raise InputError("controller", "tensions must not be negative: a tendon only pulls", least)
+        lowest = float(np.min(np.asarray(samples[1])[:, : routing.actuated][:, ~routing.winched], initial=0.0))
+        if lowest < 0.0:
+            raise InputError("controller", "tensions must not be negative: a tendon only pulls", lowest)
         return cls._from_signal(signal, scenario, routing)
 
     @classmethod
@@ -83,7 +85,7 @@ class OpenLoopTensions(LoopController):
         delays = input_delays(scenario.finger, routing)
         return cls(signal.delayed(delays).later(scenario.simulation.start_time), routing)
 
-    def as_commanded(self, finger: FingerDescription) -> OpenLoopTensions:
+    def without_delays(self, finger: FingerDescription) -> OpenLoopTensions:
         """Return the inputs as they are commanded, before the delays of a tree's actuators."""
         return OpenLoopTensions(self.signal.delayed(-input_delays(finger, self.routing)), self.routing)
 
@@ -124,14 +126,10 @@ class OpenLoopTensions(LoopController):
 
 
 @lru_cache
-def _constant(tension: float) -> ForceSignal:
+def _constant_tension(tension: float) -> ForceSignal:
     return ForceSignal(offset=tension)
 
 
 @lru_cache
-def _input(value: float) -> InputSignal:
+def _constant_input(value: float) -> InputSignal:
     return InputSignal(offset=value)
-
-
-def _actuators(scenario: Scenario) -> tuple[str, ...]:
-    return tuple(scenario.finger.tree.actuators)

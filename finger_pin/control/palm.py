@@ -17,7 +17,7 @@ from finger_pin.mechanism.object_scene import POSE, VELOCITY
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 
-_STILL = PathSignal()
+_NO_MOTION = PathSignal()
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +27,12 @@ class PalmPath:
     Attributes:
         signal: x, y, z, m, and roll, pitch, yaw, rad, over time.
         gravity: In the world, shape (3,), m/s2.
-        carries: Whether objects stand in the world that the palm sees.
+        has_world_objects: Whether objects stand in the world that the palm sees.
     """
 
     signal: Signal
     gravity: Array
-    carries: bool
+    has_world_objects: bool
 
     @classmethod
     def from_hand(
@@ -45,23 +45,23 @@ class PalmPath:
         if hand is None or hand.palm.path is None:
             return None
         settings = [hand.palm.on_path(name) for name in PATH]
-        carries = finger is not None and bool(finger.layout.names_of("world_position"))
-        return cls(Signal.from_settings(settings, tolerance).later(start), np.array(hand.gravity), carries)
+        has_world_objects = finger is not None and bool(finger.layout.names_of("world_position"))
+        return cls(Signal.from_settings(settings, tolerance).later(start), np.array(hand.gravity), has_world_objects)
 
     def place(self, time: Array | float) -> tuple[Array, Array]:
         """Return the palm's place, shape (..., 3), m, and rotation to the world, (..., 3, 3), at times (...)."""
-        at = self.signal.at(time)[0]
-        (a, b, c), (d, e, f) = (np.moveaxis(each(at[..., 3:]), -1, 0) for each in (np.cos, np.sin))
+        coordinates = self.signal.at(time)[0]
+        (a, b, c), (d, e, f) = (np.moveaxis(each(coordinates[..., 3:]), -1, 0) for each in (np.cos, np.sin))
         rows = [
             [b * c, e * d * c - a * f, e * a * c + d * f],
             [b * f, e * d * f + a * c, e * a * f - d * c],
             [-e, b * d, b * a],
         ]
-        return at[..., :3], np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+        return coordinates[..., :3], np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
     def place_world(self, finger: Finger, x: Array) -> Array:
         """Return a packed state with the world's placement at the start, seen from the palm."""
-        if self.carries:
+        if self.has_world_objects:
             state = finger.layout.unpack(x)
             state.world_position[:], state.world_velocity[:] = (self._world(order, 0.0) for order in range(2))
         return x
@@ -76,18 +76,19 @@ class PalmPath:
         turns = [each(angle) for angle in place[3:] for each in (np.sin, np.cos)]
         motion = base_motion(first, second, third, turns, self.gravity)
         numbers = np.stack(np.broadcast_arrays(*motion), axis=-1)
-        return np.concatenate([numbers, self._world(2, time)], axis=-1) if self.carries else numbers
+        return np.concatenate([numbers, self._world(2, time)], axis=-1) if self.has_world_objects else numbers
 
     def velocity(self, time: Array) -> tuple[Array, Array]:
         """Return the palm's velocity, m/s, and angular velocity, rad/s, along the world's axes, shape (m, 3)."""
-        at, rate = self.signal.at(time)
-        sp, cp, sy, cy = np.sin(at[..., 4]), np.cos(at[..., 4]), np.sin(at[..., 5]), np.cos(at[..., 5])
+        coordinates, rate = self.signal.at(time)
+        pitch_angle, yaw_angle = coordinates[..., 4], coordinates[..., 5]
+        sp, cp, sy, cy = np.sin(pitch_angle), np.cos(pitch_angle), np.sin(yaw_angle), np.cos(yaw_angle)
         roll, pitch, yaw = np.moveaxis(rate[..., 3:], -1, 0)
         # About the axes of yaw, pitch and roll, each turned by those before it.
-        turning = [roll * cp * cy - pitch * sy, roll * cp * sy + pitch * cy, yaw - roll * sp]
-        return rate[..., :3], np.stack(turning, axis=-1)
+        angular_velocity = [roll * cp * cy - pitch * sy, roll * cp * sy + pitch * cy, yaw - roll * sp]
+        return rate[..., :3], np.stack(angular_velocity, axis=-1)
 
-    def lifted(self, time: Array, mass: float) -> Array:
+    def gravity_energy(self, time: Array, mass: float) -> Array:
         """Return the potential energy that a mass gains with the palm's height at times (m,), J."""
         return np.asarray(-mass * self.place(time)[0] @ self.gravity)
 
@@ -139,16 +140,14 @@ class PrescribedPaths:
         The tolerance is that of `Signal.from_settings`.
         """
         moving = {} if finger.scene is None else finger.scene.free
-        on_paths, paths = (
-            finger.description.tree.on_paths,
-            {name: each.path for name, each in moving.items() if each.path},
-        )
+        on_paths = finger.description.tree.on_paths
+        paths = {name: each.path for name, each in moving.items() if each.path}
         if not on_paths and not paths:
             return None
-        settings = [path.get(axis, _STILL) for path in paths.values() for axis in (*OBJECT_PATH, "", "", "")]
+        settings = [path.get(axis, _NO_MOTION) for path in paths.values() for axis in (*OBJECT_PATH, "", "", "")]
         joints, objects = (
-            np.array([names.index(name) for name in led], dtype=np.int64)
-            for names, led in ((list(finger.routing.joints), on_paths), (list(moving), paths))
+            np.array([names.index(name) for name in selected], dtype=np.int64)
+            for names, selected in ((list(finger.routing.joints), on_paths), (list(moving), paths))
         )
         signal = Signal.from_settings([*on_paths.values(), *settings], tolerance).later(start)
         return cls(signal, joints, objects, np.array(finger.rigid_body.model.gravity.linear))
@@ -169,7 +168,7 @@ class PrescribedPaths:
 
 
 #: What moves coordinates along paths.
-Guides = PrescribedJoints | PrescribedPaths
+PrescribedMotion = PrescribedJoints | PrescribedPaths
 
 
 def _resting_base(gravity: Array, acceleration: Array) -> Array:
@@ -178,15 +177,15 @@ def _resting_base(gravity: Array, acceleration: Array) -> Array:
     return np.concatenate([rest, acceleration], axis=-1)
 
 
-def at_start(finger: Finger, x: Array, palm: PalmPath | None, guides: Guides | None) -> Array:
+def start_state(finger: Finger, x: Array, palm: PalmPath | None, prescribed: PrescribedMotion | None) -> Array:
     """Return a packed state with palm, joints and objects at the start of their paths."""
     if palm is not None:
         return palm.place_world(finger, x)
-    return x if guides is None else guides.place(finger, x)
+    return x if prescribed is None else prescribed.place(finger, x)
 
 
-def with_paths(control: InputTable, palm: PalmPath | None, guides: Guides | None) -> InputTable:
+def with_paths(control: InputTable, palm: PalmPath | None, prescribed: PrescribedMotion | None) -> InputTable:
     """Return inputs with the paths of palm, joints and objects."""
     if palm is not None:
         control = control._replace(palm=core_signal(palm.signal))
-    return control if guides is None else control._replace(guide=core_signal(guides.signal))
+    return control if prescribed is None else control._replace(guide=core_signal(prescribed.signal))

@@ -26,7 +26,7 @@ class PassiveTensionLoop(LoopController):
 
     Attributes:
         controller: The controller whose internal tension is set.
-        wish: f5^d, shape (p,), N.
+        target: f5^d, shape (p,), N.
         proportional: k_P.
         integral: k_I, 1/s.
         limit: Largest |I|, N.
@@ -36,21 +36,21 @@ class PassiveTensionLoop(LoopController):
     needs_sensors = True
 
     def __init__(
-        self, controller: CompensatedController, wish: Array, proportional: float, integral: float, limit: float
+        self, controller: CompensatedController, target: Array, proportional: float, integral: float, limit: float
     ) -> None:
         """Start with zero correction."""
         self.controller = controller
-        self.wish = np.asarray(wish, dtype=float)
+        self.target = np.asarray(target, dtype=float)
         self.proportional, self.integral, self.limit = proportional, integral, limit
-        self.correction = np.zeros(len(self.wish))
-        self._sum = np.zeros(len(self.wish))
+        self.correction = np.zeros(len(self.target))
+        self._sum = np.zeros(len(self.target))
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
         """Update from measured tensions, shape (t,), N, and the time since the last sample, s."""
         actuated = self.controller.routing.actuated
-        error = self.wish - readings["tendon_tension"][actuated:]
+        error = self.target - readings["tendon_tension"][actuated:]
         # Below its own f0 the desired tension has no effect; an integral that went there would take time to come back.
-        lowest = np.clip(self.controller.minimum[actuated:] - self.wish, -self.limit, 0.0)
+        lowest = np.clip(self.controller.minimum[actuated:] - self.target, -self.limit, 0.0)
         self._sum = np.clip(self._sum + self.integral * elapsed * error, lowest, self.limit)
         self.correction = self.proportional * error + self._sum
 
@@ -64,5 +64,5 @@ class PassiveTensionLoop(LoopController):
         """Return the commands for shapes (..., n) with the present correction."""
         actuated = self.controller.routing.actuated
         minimum = self.controller.minimum.copy()
-        minimum[actuated:] = np.maximum(minimum[actuated:], self.wish + self.correction)
-        return self.controller.command_above(minimum, time, reference, position, velocity)
+        minimum[actuated:] = np.maximum(minimum[actuated:], self.target + self.correction)
+        return self.controller.command_with_minimum(minimum, time, reference, position, velocity)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.interface import ControlSignals, LoopController
-from finger_pin.control.motor_signals import sampled, voltage_signals, wound_spools
+from finger_pin.control.motor_signals import sampled_voltages
 from finger_pin.core.drives import Drives, sample
 from finger_pin.description.actuators import Actuator
 from finger_pin.exceptions import InputError
@@ -27,9 +27,6 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
-
-__all__ = ["DriveSignals", "GivenVoltages", "LoopMemory", "PositionDrives", "SteppedDrives"]
-__all__ += ["build_drives", "loop_period", "spool_goals", "voltage_signals", "wound_spools"]
 
 
 class DriveSignals(Protocol):
@@ -53,7 +50,7 @@ class DriveSignals(Protocol):
 
 
 @dataclass(eq=False)
-class GivenVoltages:
+class PrescribedVoltages:
     """Voltages set by a caller such as `Simulator.step`, without planned tensions.
 
     Attributes:
@@ -105,12 +102,12 @@ class PositionDrives:
         reference: Reference,
         duration: float,
         start_time: float = 0.0,
-        wound: Mapping[int, tuple[Signal, float]] = {},
+        windings: Mapping[int, tuple[Signal, float]] = {},
         voltages: Mapping[int, Signal] = {},
         supplies: Mapping[int, Signal] = {},
         memory: LoopMemory | None = None,
     ) -> None:
-        """Work out the goals of a motion.
+        """Compute the goals of a motion.
 
         Args:
             finger: With motors in position drive.
@@ -118,9 +115,9 @@ class PositionDrives:
             reference: The desired motion.
             duration: Of the motion, s.
             start_time: Of the motion, s.
-            wound: From `motor_signals.wound_spools`.
-            voltages: From `voltage_signals`, in place of the loops.
-            supplies: From `voltage_signals`, in place of the motors' own.
+            windings: From `motor_signals.spool_windings`.
+            voltages: From `motor_signals.voltage_signals`, in place of the loops.
+            supplies: From there, in place of the motors' own.
             memory: Of the sample that was taken last, where a run goes on.
 
         Raises:
@@ -128,35 +125,35 @@ class PositionDrives:
         """
         period = loop_period(finger)
         self._controller, actuators = controller, finger.actuators
-        self._positioned = np.isin(np.arange(finger.routing.actuated), actuators.positioned)
-        prescribed = actuators.tendons[np.any(actuators.spools[:, [*wound, *voltages]] != 0.0, axis=1)]
-        self._wound = np.isin(np.arange(len(finger.routing.tendons)), prescribed)
+        self._is_positioned = np.isin(np.arange(finger.routing.actuated), actuators.positioned)
+        prescribed = actuators.tendons[np.any(actuators.spools[:, [*windings, *voltages]] != 0.0, axis=1)]
+        self._prescribed = np.isin(np.arange(len(finger.routing.tendons)), prescribed)
         self.channels = actuators.voltages
-        first = 0.0 if memory is None else -memory.age
-        times: Array = first + period * np.arange(math.ceil((duration - first) / period) + 1.0)
-        goals = spool_goals(finger, controller, times, reference.at(times), wound, start_time)
+        first_sample = 0.0 if memory is None else -memory.age
+        times: Array = first_sample + period * np.arange(math.ceil((duration - first_sample) / period) + 1.0)
+        goals = spool_goals(finger, controller, times, reference.at(times), windings, start_time)
         goals[:, list(voltages)] = 0.0
         nominal = np.array([each.motor.voltage for each in finger.description.actuators.values()])
-        volts = sampled(voltages, times, start_time, np.full(len(nominal), np.nan))
-        supply = sampled(supplies, times, start_time, nominal)
-        goals, volts, supply = (np.ascontiguousarray(each[:, actuators.holds]) for each in (goals, volts, supply))
-        for (name, actuator), goal in zip(_positioned(finger), goals.T, strict=True):
+        voltage = sampled_voltages(voltages, times, start_time, np.full(len(nominal), np.nan))
+        supply = sampled_voltages(supplies, times, start_time, nominal)
+        goals, voltage, supply = (np.ascontiguousarray(each[:, actuators.holds]) for each in (goals, voltage, supply))
+        for (name, actuator), goal in zip(_positioned_actuators(finger), goals.T, strict=True):
             encoder = actuator.motor.encoder
-            least, most = float(goal.min()), float(goal.max())
-            if encoder is not None and not encoder.range[0] <= least <= most <= encoder.range[1]:
-                allowed = f"the motion takes the spool from {least:.4g} to {most:.4g} rad"
+            lowest, highest = float(goal.min()), float(goal.max())
+            if encoder is not None and not encoder.range[0] <= lowest <= highest <= encoder.range[1]:
+                allowed = f"the motion takes the spool from {lowest:.4g} to {highest:.4g} rad"
                 raise InputError(f"finger.actuators.{name}.motor.encoder.range", allowed, list(encoder.range))
-        self.compiled = build_drives(finger, goals, start_time, volts, memory, supply)
+        self.compiled = build_drives(finger, goals, start_time, voltage, memory, supply)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return the commands with the tensions of the goals in place of those of the errors."""
         plan = self._controller.command(time, reference, reference.position, reference.velocity)
-        if self._wound.any():
-            plan = replace(plan, tension=np.where(self._wound, 0.0, plan.tension))
-        if self._positioned.all():
+        if self._prescribed.any():
+            plan = replace(plan, tension=np.where(self._prescribed, 0.0, plan.tension))
+        if self._is_positioned.all():
             return plan
-        chosen = np.append(self._positioned, np.zeros(plan.tension.shape[-1] - len(self._positioned), dtype=bool))
-        return replace(control, tension=np.where(chosen, plan.tension, control.tension))
+        mask = np.append(self._is_positioned, np.zeros(plan.tension.shape[-1] - len(self._is_positioned), dtype=bool))
+        return replace(control, tension=np.where(mask, plan.tension, control.tension))
 
     def voltages(self, time: Array | float) -> Array:
         """Return the voltages held at one time, or at times (m,), by motor, V; an instant belongs to its sample.
@@ -170,8 +167,8 @@ def spool_goals(
     finger: Finger,
     controller: LoopController,
     times: Array,
-    wanted: ReferenceSignals,
-    wound: Mapping[int, tuple[Signal, float]] = {},
+    desired: ReferenceSignals,
+    windings: Mapping[int, tuple[Signal, float]] = {},
     start_time: float = 0.0,
 ) -> Array:
     """Return theta_m^d of all motors for a desired motion, shape (k, m), rad.
@@ -180,15 +177,15 @@ def spool_goals(
         finger: The finger.
         controller: Plans tensions.
         times: Shape (k,), s.
-        wanted: The desired motion then, shape (k, n).
-        wound: From `wound_spools`.
+        desired: The desired motion then, shape (k, n).
+        windings: From `motor_signals.spool_windings`.
         start_time: Of the motion, s.
     """
     actuators = finger.actuators
-    planned = controller.command(times, wanted, wanted.position, wanted.velocity).tension
-    drawn = finger.excursion(wanted.position)
-    goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated], drawn)
-    for motor, (signal, radius) in wound.items():
+    planned = controller.command(times, desired, desired.position, desired.velocity).tension
+    excursion = finger.excursion(desired.position)
+    goals = actuators.angle(desired.position, planned[:, : finger.routing.actuated], excursion)
+    for motor, (signal, radius) in windings.items():
         goals[:, motor] = signal.later(start_time).at(times)[0][:, 0] / radius
     return goals
 
@@ -216,12 +213,12 @@ class SteppedDrives:
     def voltages(self, time: float, x: Array, goals: Array, supplies: Mapping[int, Signal] = {}) -> Array:
         """Return the voltages of a sample, shape (m,), V, at a packed state, for goals of spools, shape (m,), rad."""
         self._drives.goals[0] = goals
-        self._drives.supply[0] = sampled(supplies, np.array([time]), 0.0, self._nominal)[0, self._holds]
+        self._drives.supply[0] = sampled_voltages(supplies, np.array([time]), 0.0, self._nominal)[0, self._holds]
         sample(self._drives, time, x, self._tension)
         return np.array(self._drives.voltages[0])
 
 
-def _positioned(finger: Finger) -> list[tuple[str, Actuator]]:
+def _positioned_actuators(finger: Finger) -> list[tuple[str, Actuator]]:
     return [each for each in finger.description.actuators.items() if each[1].drive == "position"]
 
 
@@ -231,9 +228,9 @@ def loop_period(finger: Finger) -> float:
     Raises:
         InputError: If drives differ in their period.
     """
-    chosen = _positioned(finger)
-    period = chosen[0][1].position_loop.period
-    for name, actuator in chosen:
+    positioned = _positioned_actuators(finger)
+    period = positioned[0][1].position_loop.period
+    for name, actuator in positioned:
         if actuator.position_loop.period != period:
             entry = f"finger.actuators.{name}.position_loop.period"
             raise InputError(entry, f"must be that of the others, {period:g} s", actuator.position_loop.period)
@@ -258,11 +255,11 @@ def build_drives(
         memory: Of the sample that was taken last, where a run goes on.
         supply: V in place of the motors' own, shape (k, m), V.
     """
-    chosen = [actuator for _, actuator in _positioned(finger)]
-    loops, encoders = [each.position_loop for each in chosen], [each.motor.encoder for each in chosen]
+    positioned = [actuator for _, actuator in _positioned_actuators(finger)]
+    loops, encoders = [each.position_loop for each in positioned], [each.motor.encoder for each in positioned]
     actuators = finger.actuators
     drives = Drives(
-        motors=np.arange(len(chosen)),
+        motors=np.arange(len(positioned)),
         places=finger.mechanism.coordinates - len(actuators.names) + np.flatnonzero(actuators.holds),
         channels=actuators.voltages,
         period=loop_period(finger),
@@ -272,10 +269,10 @@ def build_drives(
         resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
         gains=np.ascontiguousarray(np.array([[e.proportional, e.derivative, e.integral] for e in loops]).T),
         torque_off=np.array([np.inf if each.torque_off is None else each.torque_off for each in loops]) - start_time,
-        supply=np.tile([each.motor.voltage for each in chosen], (len(goals), 1)) if supply is None else supply,
+        supply=np.tile([each.motor.voltage for each in positioned], (len(goals), 1)) if supply is None else supply,
         sample_count=np.zeros(1, dtype=np.int64),
-        integral=np.zeros(len(chosen)),
-        last=np.zeros(len(chosen)),
+        integral=np.zeros(len(positioned)),
+        last=np.zeros(len(positioned)),
         voltages=np.zeros(goals.shape),
         errors=np.zeros(goals.shape),
         integrals=np.zeros(goals.shape),

@@ -83,11 +83,11 @@ class ProportionalController(LoopController):
         if desired is None:
             return None
         tendons = np.arange(len(routing.tendons))
-        further = mechanism.coordinates - len(routing.joints)
+        extra = mechanism.coordinates - len(routing.joints)
         positioned = np.isin(tendons, finger.actuators.positioned)
 
         def padded(values: Array) -> Array:
-            return np.concatenate([values, np.zeros((*values.shape[:-1], further))], axis=-1)
+            return np.concatenate([values, np.zeros((*values.shape[:-1], extra))], axis=-1)
 
         matrix = desired.coupling.matrix
         return planned_control(
@@ -98,7 +98,7 @@ class ProportionalController(LoopController):
             internal=self.internal,
             channel=np.where((tendons < routing.actuated) & ~positioned, tendons, -1),
             reference=core_signal(desired.signal),
-            coupling=np.concatenate([matrix, np.zeros((further, len(matrix)))]),
+            coupling=np.concatenate([matrix, np.zeros((extra, len(matrix)))]),
             offset=padded(desired.coupling.offset),
             damping=padded(self.damping),
             loop=self.loop,
@@ -114,10 +114,10 @@ class ProportionalController(LoopController):
         tendons, joints = len(routing.tendons), len(routing.joints)
         gain, damping, minimum, internal = np.zeros(joints), np.zeros(joints), np.zeros(tendons), np.zeros(tendons)
         inverse, loop = np.zeros((tendons, joints)), np.zeros(tendons, dtype=np.int64)
-        for index, (controller, (turned, pulled)) in enumerate(zip(controllers, routing.fingers, strict=True)):
-            gain[turned], damping[turned] = controller.gain, controller.damping
-            minimum[pulled], internal[pulled] = controller.minimum, controller.internal
-            inverse[np.ix_(pulled, turned)], loop[pulled] = controller.inverse, index
+        for index, (controller, (j, t)) in enumerate(zip(controllers, routing.fingers, strict=True)):
+            gain[j], damping[j] = controller.gain, controller.damping
+            minimum[t], internal[t] = controller.minimum, controller.internal
+            inverse[np.ix_(t, j)], loop[t] = controller.inverse, index
         return cls(gain, minimum, inverse, internal, damping, loop)
 
 
@@ -141,7 +141,7 @@ class RoutedController(LoopController):
 
     def signals(self) -> tuple[Signal, ...]:
         """Return the functions of time of the wanted fingertip force."""
-        return () if self.fingertip is None else (self.fingertip.wanted,)
+        return () if self.fingertip is None else (self.fingertip.desired_force,)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array

@@ -17,8 +17,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.typing import Array
 
-# A delay this close to a multiple of the period, in periods, is one: a step between the two would be of no length.
-_COINCIDENT = 1e-9
+# A delay within this of a multiple of the period, in periods, is that multiple: no step of no length between the two.
+_PERIOD_TOLERANCE = 1e-9
 
 
 class SampledController(LoopController):
@@ -38,17 +38,17 @@ class SampledController(LoopController):
         self.period = settings.period
         self.instant = 0.0
         self._loop = loop
-        resolution, listens = settings.encoder_resolution, loop.controller.needs_sensors
-        tension = [TensionSensor(settings.tension_noise, settings.seed)] if listens else []
+        resolution, needs_sensors = settings.encoder_resolution, loop.controller.needs_sensors
+        tension = [TensionSensor(settings.tension_noise, settings.seed)] if needs_sensors else []
         encoders = JointEncoder(resolution), JointSpeed(settings.period, resolution)
         self.sensors: tuple[SampledSensor, ...] = (*encoders, *tension, *loop.controller.sensors)
         self._samples: list[ControlSignals] = []
         self._readings: list[dict[str, Array]] = []
-        whole = math.floor(settings.delay / settings.period + _COINCIDENT)
-        rest = settings.delay - whole * settings.period
-        self._late = whole
-        self._rest = rest if rest > _COINCIDENT * settings.period else 0.0
-        self._acting = 0
+        delay_periods = math.floor(settings.delay / settings.period + _PERIOD_TOLERANCE)
+        remainder = settings.delay - delay_periods * settings.period
+        self._delay_periods = delay_periods
+        self._remainder = remainder if remainder > _PERIOD_TOLERANCE * settings.period else 0.0
+        self._active = 0
         delays, actuated = loop.controller.delays, loop.finger.routing.actuated
         self._queue = None if delays is None else InputQueue(settings.delay + delays[actuated:])
 
@@ -58,34 +58,34 @@ class SampledController(LoopController):
             self._samples.append(self._sample(self.instant, x))
             if self._queue is not None and (commanded := self._samples[-1].inputs) is not None:
                 self._queue.add(self.instant, commanded)
-        while self._acting + 1 < len(self._samples) and self._arrival(self._acting + 1) <= self.instant:
-            self._acting += 1
+        while self._active + 1 < len(self._samples) and self._arrival(self._active + 1) <= self.instant:
+            self._active += 1
         now, self.instant = self.instant, len(self._samples) * self.period
-        if self._acting + 1 < len(self._samples):
-            self.instant = min(self.instant, self._arrival(self._acting + 1))
-        inputs = self._samples[self._acting].inputs
+        if self._active + 1 < len(self._samples):
+            self.instant = min(self.instant, self._arrival(self._active + 1))
+        inputs = self._samples[self._active].inputs
         if self._queue is not None:
             inputs, self.instant = self._queue.at(now), self._queue.next_arrival(now, self.instant)
-        return self._tension() if inputs is None else np.concatenate([self._tension(), inputs])
+        return self._active_tension() if inputs is None else np.concatenate([self._active_tension(), inputs])
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return the tensions held at the given times; an instant belongs to the tensions that arrive at it."""
-        index = np.floor((np.asarray(time) - self._rest) / self.period * (1.0 + 1e-12)).astype(int) - self._late
-        index = np.clip(index, 0, len(self._samples) - 1)
+        index = np.floor((np.asarray(time) - self._remainder) / self.period * (1.0 + 1e-12)).astype(int)
+        index = np.clip(index - self._delay_periods, 0, len(self._samples) - 1)
         torques = np.array([sample.torque for sample in self._samples])
         tensions = np.array([sample.tension for sample in self._samples])
-        missing = [sample.torque_deficit for sample in self._samples if sample.torque_deficit is not None]
-        torque_deficit = np.array(missing)[index] if len(missing) == len(self._samples) else None
+        deficits = [sample.torque_deficit for sample in self._samples if sample.torque_deficit is not None]
+        torque_deficit = np.array(deficits)[index] if len(deficits) == len(self._samples) else None
         inputs = np.array([sample.inputs for sample in self._samples if sample.inputs is not None])
-        acting = inputs[index] if len(inputs) else None
+        active_inputs = inputs[index] if len(inputs) else None
         if self._queue is not None:
             instants = np.asarray(time)[..., None] * (1.0 + 1e-12)
-            arrived = np.floor((instants - self._queue.delays) / self.period + _COINCIDENT).astype(int)
+            arrived = np.floor((instants - self._queue.delays) / self.period + _PERIOD_TOLERANCE).astype(int)
             latest = inputs[np.clip(arrived, 0, len(inputs) - 1), np.arange(inputs.shape[1])]
-            acting = np.where(arrived < 0, 0.0, latest)
-        return ControlSignals(torques[index], tensions[index], torque_deficit, acting)
+            active_inputs = np.where(arrived < 0, 0.0, latest)
+        return ControlSignals(torques[index], tensions[index], torque_deficit, active_inputs)
 
     def measured(self, name: str, times: Array) -> Array:
         """Return the last readings of a sensor at times (m,), shape (m,) or (m, k)."""
@@ -94,15 +94,15 @@ class SampledController(LoopController):
         return latest
 
     def _arrival(self, sample: int) -> float:
-        return (sample + self._late) * self.period + self._rest
+        return (sample + self._delay_periods) * self.period + self._remainder
 
-    def _tension(self) -> Array:
-        return self._samples[self._acting].tension[: self._loop.finger.routing.actuated]
+    def _active_tension(self) -> Array:
+        return self._samples[self._active].tension[: self._loop.finger.routing.actuated]
 
     def _sample(self, time: float, x: Array) -> ControlSignals:
         loop, controller = self._loop, self._loop.controller
-        acting = self._tension() if self._samples else np.zeros(loop.finger.routing.actuated)
-        now = Instant(loop, time, x.copy(), acting)
+        tension = self._active_tension() if self._samples else np.zeros(loop.finger.routing.actuated)
+        now = Instant(loop, time, x.copy(), tension)
         values = readings(self.sensors, now)
         self._readings.append(values)
         if controller.needs_sensors:

@@ -14,11 +14,11 @@ from finger_pin.mechanism.joints import JointFriction
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 
-# A tendon whose friction exceeds its tension cannot be moved by pulling harder: compensation stops short of that.
-_MOST = 0.9
+# Greatest |x| that is compensated: from 1 on, no tension overcomes the friction that it causes.
+_MAX_COEFFICIENT = 0.9
 
 
-def undivided(routing: Routing) -> Array:
+def frictionless_strands(routing: Routing) -> Array:
     """Return W, shape (s, t), without friction: both halves of a passive tendon carry its planned tension."""
     return routing.strand_tension(np.eye(len(routing.tendons))).T
 
@@ -54,7 +54,7 @@ class TendonFeedforward:
         signed = signed_coefficient(
             velocity, kinetic, static, tendons.stribeck_velocity, tendons.stribeck_exponent, self.reversal_speed
         )
-        clipped: Array = np.clip(signed, -_MOST, _MOST)
+        clipped: Array = np.clip(signed, -_MAX_COEFFICIENT, _MAX_COEFFICIENT)
         return clipped
 
     def command(self, planned: Array, position: Array, desired_velocity: Array) -> Array:
@@ -62,21 +62,21 @@ class TendonFeedforward:
         actuated = self.tendons.routing.actuated
         x = self.coefficient(position, desired_velocity)[..., :actuated]
         velocity = self._velocity(desired_velocity)[..., :actuated]
-        lost = self.tendons.viscous[:actuated] * velocity
-        lost = lost + self.tendons.drag[:actuated] * direction(velocity, self.reversal_speed)
+        loss = self.tendons.viscous[:actuated] * velocity
+        loss = loss + self.tendons.drag[:actuated] * direction(velocity, self.reversal_speed)
         delivered = planned[..., :actuated]
-        needed = (delivered * (1.0 + x) + lost) / (1.0 - x)
-        command = np.maximum(0.0, delivered + self.share * (needed - delivered))
+        required = (delivered * (1.0 + x) + loss) / (1.0 - x)
+        command = np.maximum(0.0, delivered + self.share * (required - delivered))
         return np.concatenate([command, planned[..., actuated:]], axis=-1)
 
     def strand_matrix(self, position: Array, desired_velocity: Array) -> Array:
         """Return W, shape (..., s, t): the strands' tensions are W f_hat for a delivered plan f_hat."""
         routing = self.tendons.routing
-        plain = undivided(routing)
-        rows = np.arange(routing.actuated, len(plain))
-        columns = np.argmax(plain[rows], axis=1)
+        frictionless = frictionless_strands(routing)
+        rows = np.arange(routing.actuated, len(frictionless))
+        columns = np.argmax(frictionless[rows], axis=1)
         x = self.share * self.coefficient(position, desired_velocity)[..., columns]
-        matrix = np.broadcast_to(plain, (*position.shape[:-1], *plain.shape)).copy()
+        matrix = np.broadcast_to(frictionless, (*position.shape[:-1], *frictionless.shape)).copy()
         matrix[..., rows, columns] += np.where((rows - routing.actuated) % 2 == 0, x, -x)
         return matrix
 

@@ -49,17 +49,17 @@ class FingertipForce:
     Where it touches nothing, the finger yields to the torque until K_P holds it.
 
     Attributes:
-        wanted: F, three signals for each of t tips, N, base frame.
+        desired_force: F, three signals for each of t tips, N, base frame.
         jacobian: J of (6), from one position of shape (n,) to shape (3, n), or (t, 3, n).
     """
 
-    wanted: Signal
+    desired_force: Signal
     jacobian: Callable[[Array], Array]
 
     def torque(self, time: Array | float, position: Array) -> Array:
         """Return J^T F for motion of shape (..., n) at times of shape (...,), N m."""
         rows = position.reshape(-1, position.shape[-1])
-        force: Array = self.wanted.at(time)[0]
+        force: Array = self.desired_force.at(time)[0]
         force = np.broadcast_to(force, (*position.shape[:-1], force.shape[-1]))
         jacobians = np.array([self.jacobian(row) for row in rows]).reshape(*force.shape, -1)
         return np.asarray((force[..., None, :] @ jacobians)[..., 0, :])

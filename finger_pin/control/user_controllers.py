@@ -34,8 +34,8 @@ Samples = tuple[ArrayLike, ArrayLike]
 #: Times, and columns by name.
 Columns = tuple[ArrayLike, Mapping[str, ArrayLike]]
 
-# Rounding, N.
-_LEAST = -1e-6
+# Least tension, N: below zero by rounding.
+_LEAST_TENSION = -1e-6
 
 
 class UserReference:
@@ -65,8 +65,8 @@ class UserReference:
             InputError: If either is not n finite numbers.
         """
         if np.ndim(time) == 0:
-            return self._one(float(time))
-        answers = [self._one(float(each)) for each in np.asarray(time)]
+            return self._at_instant(float(time))
+        answers = [self._at_instant(float(each)) for each in np.asarray(time)]
         return ReferenceSignals(
             np.array([each.position for each in answers]), np.array([each.velocity for each in answers])
         )
@@ -78,13 +78,13 @@ class UserReference:
     def planned(self) -> None:
         """Return None: a custom reference has no plan for the compiled core."""
 
-    def _one(self, time: float) -> ReferenceSignals:
+    def _at_instant(self, time: float) -> ReferenceSignals:
         answer = self.reference.at(time + self.start)
         values = []
         for name in ("position", "velocity"):
             if not hasattr(answer, name):
                 raise InputError("reference", "at(time) must return ReferenceSignals(position, velocity)")
-            value = _numbers(getattr(answer, name))
+            value = _as_floats(getattr(answer, name))
             if value.shape != (len(self.joints),) or not np.isfinite(value).all():
                 allowed = f"{name} at t = {time:g} s must be {len(self.joints)} finite numbers, one per joint"
                 raise InputError("reference", allowed, value.tolist())
@@ -119,7 +119,7 @@ class UserController(LoopController):
         self.controller, self.problem, self.problem_time = controller, "", -np.inf
         self.needs_sensors = callable(getattr(controller, "sense", None))
         self.sensors = tuple(getattr(controller, "sensors", ()))
-        self._finger, self._routing, self._start, self._asked = finger, finger.routing, start, False
+        self._finger, self._routing, self._start, self._called = finger, finger.routing, start, False
         self._actuators = tuple(finger.description.tree.actuators)
         delays = input_delays(finger.description, finger.routing)
         self.delays = delays if delays.any() else None
@@ -133,10 +133,10 @@ class UserController(LoopController):
             InputError: If the first answer has a wrong size, or a tension that is negative or not finite.
         """
         if np.ndim(position) == 1:
-            return self._one(float(time), reference, position, velocity)
+            return self._at_instant(float(time), reference, position, velocity)
         times = np.broadcast_to(time, len(position))
         rows = zip(times, reference.position, reference.velocity, position, velocity, strict=True)
-        answers = [self._one(float(t), ReferenceSignals(p, v), *motion) for t, p, v, *motion in rows]
+        answers = [self._at_instant(float(t), ReferenceSignals(p, v), *motion) for t, p, v, *motion in rows]
         missing = [each.torque_deficit for each in answers if each.torque_deficit is not None]
         return ControlSignals(
             np.array([each.torque for each in answers]),
@@ -149,11 +149,11 @@ class UserController(LoopController):
         """Pass on the sensors' readings."""
         self.controller.sense(readings, elapsed)  # type: ignore[attr-defined]
 
-    def _one(self, time: float, reference: ReferenceSignals, position: Array, velocity: Array) -> ControlSignals:
-        first, self._asked = not self._asked, True
+    def _at_instant(self, time: float, reference: ReferenceSignals, position: Array, velocity: Array) -> ControlSignals:
+        first, self._called = not self._called, True
         try:
-            signals = self._complete(self.controller.command(time + self._start, reference, position, velocity))
-            # A step that is tried in vain may ask about a motion that is no number; then the answer may be none.
+            signals = self._to_signals(self.controller.command(time + self._start, reference, position, velocity))
+            # A rejected trial step may have a motion that is not finite; then the answer need not be finite.
             self._check(signals, first or bool(np.isfinite(position).all() and np.isfinite(velocity).all()))
             return signals
         except Exception as error:
@@ -171,11 +171,11 @@ class UserController(LoopController):
             inputs = np.full(len(actuators), np.nan) if actuators else None
             return ControlSignals(np.zeros(len(routing.joints)), unknown, inputs=inputs)
 
-    def _complete(self, answer: object) -> ControlSignals:
+    def _to_signals(self, answer: object) -> ControlSignals:
         routing, actuators = self._routing, self._actuators
         if isinstance(answer, Mapping):
-            answer = inputs_by_name("controller", answer, self._finger, loops=True)
-        tension, inputs = _numbers(getattr(answer, "tension", answer)), getattr(answer, "inputs", None)
+            answer = inputs_by_name("controller", answer, self._finger, with_loops=True)
+        tension, inputs = _as_floats(getattr(answer, "tension", answer)), getattr(answer, "inputs", None)
         if actuators and inputs is None and tension.shape == (routing.actuated + len(actuators),):
             tension, inputs = np.split(tension, [routing.actuated])
         if actuators and (inputs is None or np.shape(inputs) != (len(actuators),)):
@@ -187,19 +187,19 @@ class UserController(LoopController):
             allowed = f"command() must return {sizes} tensions ({names}) for one time, not shape {tension.shape}"
             raise InputError("controller", allowed)
         pulled = np.where(routing.winched, 0.0, tension[: routing.actuated])
-        torque = _numbers(getattr(answer, "torque", pulled @ routing.actuated_coupling))
+        torque = _as_floats(getattr(answer, "torque", pulled @ routing.actuated_coupling))
         if torque.shape != (len(routing.joints),):
             allowed = f"command() must return {len(routing.joints)} torques for one time, not shape {torque.shape}"
             raise InputError("controller", allowed)
         # A passive tendon without a planned tension is planned to carry none.
         tension = np.append(tension, np.zeros(len(routing.tendons) - len(tension)))
-        inputs = _numbers(inputs) if actuators else None
+        inputs = _as_floats(inputs) if actuators else None
         return ControlSignals(torque, tension, getattr(answer, "torque_deficit", None), inputs)
 
     def _check(self, signals: ControlSignals, finite: bool) -> None:
         routing = self._routing
         for k, (name, tension) in enumerate(zip(routing.tendons, signals.tension, strict=True)):
-            pushes = tension < _LEAST and not (k < routing.actuated and routing.winched[k])
+            pushes = tension < _LEAST_TENSION and not (k < routing.actuated and routing.winched[k])
             if pushes or (finite and not np.isfinite(tension)):
                 allowed = f"tensions must be finite and not negative, that of {name} is not; clip it at 0 or above"
                 raise InputError("controller", allowed, float(tension))
@@ -207,14 +207,14 @@ class UserController(LoopController):
             raise InputError("controller", "inputs of actuators must be finite", signals.inputs.tolist())
 
 
-def _numbers(value: object) -> Array:
+def _as_floats(value: object) -> Array:
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         return np.full((), np.nan)
 
 
-def with_columns(
+def with_named_samples(
     scenario: Scenario, controller: Controller | Samples | Columns | None
 ) -> tuple[Scenario, Controller | Samples | None]:
     """Return a scenario with samples given by name, times and columns, and the controller that is left, if any.
@@ -228,9 +228,9 @@ def with_columns(
         actuators = scenario.finger.tree.actuators
         table, label = command_place(name, actuators)
         if table == "tensions" and label not in scenario.finger.tendons:
-            known = (*scenario.finger.actuated_names, *actuators)
-            raise InputError(f"controller.{name}", f"no such tendon or actuator; there are {choices(name, known)}")
-        samples = {"kind": "samples", "times": Series(_numbers(times)), "values": Series(_numbers(values))}
+            allowed = (*scenario.finger.actuated_names, *actuators)
+            raise InputError(f"controller.{name}", f"no such tendon or actuator; there are {choices(name, allowed)}")
+        samples = {"kind": "samples", "times": Series(_as_floats(times)), "values": Series(_as_floats(values))}
         overrides[f"controller.{table}.{label}"] = samples
         if table in ("tensions", "inputs"):
             overrides["controller.kind"] = "tensions"

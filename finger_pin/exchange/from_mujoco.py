@@ -21,19 +21,19 @@ from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.exchange.mujoco_actuators import ActuatorReader
 from finger_pin.exchange.mujoco_compliance import read_stops
 from finger_pin.exchange.mujoco_equalities import linked_bodies, read_equalities
-from finger_pin.exchange.mujoco_free import FreeBodies, LedBodies
+from finger_pin.exchange.mujoco_free import FreeBodies, MocapBodies
 from finger_pin.exchange.mujoco_keyframes import read_keyframes
-from finger_pin.exchange.mujoco_names import Names, Table, entry_name, free_name, quaternion
+from finger_pin.exchange.mujoco_names import Names, Table, entry_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
 from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies, within_margin
-from finger_pin.exchange.mujoco_unsupported import ElementReader, Rest, apply_flags
+from finger_pin.exchange.mujoco_unsupported import ElementReader, LeftOutElements, apply_flags
 from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.version import installing
 
 _LEAST_FRICTION = 1e-7
 # Groups from this one on are hidden in MuJoCo's viewer, unless one asks for them.
-_HIDDEN = 3
+_FIRST_HIDDEN_GROUP = 3
 
 
 def from_mujoco(
@@ -85,7 +85,7 @@ def from_mujoco(
         raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
     reader = _Reader(mujoco, model, plugins)
     description = reader.with_tips(validate(FingerDescription, reader.table(name), ("finger",)))
-    if moving := reader.rest.moving():
+    if moving := reader.left_out.moving_lines():
         warnings.warn(LeftOutWarning(f"{name}: not carried over: {'; '.join(moving)}"), stacklevel=2)
     return description
 
@@ -96,35 +96,35 @@ class _Reader:
     def __init__(self, mujoco: Any, model: Any, plugins: list[str]) -> None:
         self.mujoco, self.model = mujoco, apply_flags(mujoco, model)
         model = self.model
-        self.rest, self.names = Rest(mujoco, model), Names.from_model(model, plugins)
-        self._read = ElementReader(mujoco, model, self.names, self.rest)
-        self.shapes = Shapes(self._read)
+        self.left_out, self.names = LeftOutElements(mujoco, model), Names.from_model(model, plugins)
+        self._reader = ElementReader(mujoco, model, self.names, self.left_out)
+        self.shapes = Shapes(self._reader)
         kinds = mujoco.mjtJoint
         for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
             allowed = "is a ball joint; joints have to turn or slide about one axis"
             raise InputError(f"joint {self.names.joints[i]}", allowed)
-        self.actuators = ActuatorReader(*vars(self._read).values())
+        self.actuators = ActuatorReader(*vars(self._reader).values())
         self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
-        self.free = FreeBodies(self._read, passed_bodies(self._read))
+        self.free = FreeBodies(self._reader, passed_bodies(self._reader))
         self.bodies = self._bodies()
-        self.led = LedBodies(self._read, self.bodies, set(self.names.joints).union(*self.free.labels.values()))
+        self.mocap = MocapBodies(self._reader, self.bodies, set(self.names.joints).union(*self.free.labels.values()))
 
     def table(self, name: str) -> Table:
         """Return the description as a table."""
         model = self.model
-        if not self.kept_joints and not self.free.kept:
+        if not self.kept_joints and not self.free.converted:
             allowed = "has no joint that turns or slides, nor a free body of several shapes or held by a tendon or loop"
             raise InputError("model", allowed)
-        reader = TendonReader(*vars(self._read).values())
+        reader = TendonReader(*vars(self._reader).values())
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self.bodies
-        actuators, pulled = self.actuators.table(), self.actuators.pulled()
-        used = {*tendons, *pulled}
-        couplings, loops, differences = read_equalities(self._read)
+        actuators, pulled = self.actuators.table(), self.actuators.pulled_tendons()
+        used_names = {*tendons, *pulled}
+        couplings, loops, differences = read_equalities(self._reader)
         joints, moving, loss = self._joints()
-        stops = read_stops(self._read, joints)
-        objects, pairs = self.shapes.objects(self.free.loose), self.shapes.pairs(bodies)
-        keyframes = read_keyframes(self._read, self.actuators, self.free, self.led, self.shapes, self.kept_joints)
+        stops = read_stops(self._reader, joints)
+        objects, pairs = self.shapes.objects(self.free.object_bodies), self.shapes.pairs(bodies)
+        keyframes = read_keyframes(self._reader, self.actuators, self.free, self.mocap, self.shapes, self.kept_joints)
         self.shapes.set_apart(objects, bodies)
         return {
             "name": entry_name(name),
@@ -135,9 +135,10 @@ class _Reader:
             **({"stroke_limiter": stops} if stops else {}),
             "touches_itself": bool(pairs),
             "tree": {
-                "bodies": self._still() | {self.names.bodies[i]: self._body(i) for i in bodies},
+                "bodies": self._world_body() | {self.names.bodies[i]: self._body(i) for i in bodies},
                 "joints": moving,
-                "tendons": tendons | {free_name(name, used, "equality"): each for name, each in differences.items()},
+                "tendons": tendons
+                | {unused_name(name, used_names, "equality"): each for name, each in differences.items()},
                 "couplings": couplings,
                 "loops": loops,
                 "actuators": actuators,
@@ -145,7 +146,7 @@ class _Reader:
                 "objects": objects,
                 "touching": pairs,
                 "meshes": self._meshes(bodies),
-                "left_out": self.rest.listed(),
+                "left_out": self.left_out.lines(),
             },
         }
 
@@ -154,31 +155,32 @@ class _Reader:
         rows, model = list[tuple[int, str, Table, Table, float]](), self.model
         for i in self.kept_joints:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[i]])
-            rows.append((int(model.jnt_bodyid[i]), self.names.joints[i], self._joint(i), self._moving(i), loss))
-        sixes = [(int(model.jnt_bodyid[i]), self.free.joints(i)) for i in self.free.kept]
-        sixes += [(body, self.led.joints(body)) for body in self.led.labels]
-        rows += [(body, *joint, 0.0) for body, six in sixes for joint in six]
+            rows.append((int(model.jnt_bodyid[i]), self.names.joints[i], self._joint(i), self._tree_joint(i), loss))
+        free_joints = [(int(model.jnt_bodyid[i]), self.free.joints(i)) for i in self.free.converted]
+        free_joints += [(body, self.mocap.joints(body)) for body in self.mocap.labels]
+        rows += [(body, *joint, 0.0) for body, joints in free_joints for joint in joints]
         rows.sort(key=lambda row: row[0])
         return {row[1]: row[2] for row in rows}, {row[1]: row[3] for row in rows}, [row[4] for row in rows]
 
     def _bodies(self) -> list[int]:
         """Return the bodies that move, are passed by tendons, or carry such bodies, parents first."""
         model = self.model
-        needed = passed_bodies(self._read, sides=True) | self.shapes.still() | linked_bodies(self.mujoco, model)
-        moved: set[int] = set()
+        bodies = passed_bodies(self._reader, sides=True) | linked_bodies(self.mujoco, model)
+        bodies |= self.shapes.fixed_bodies()
+        moving: set[int] = set()
         for i in range(1, model.nbody):
-            has_joints = any(model.jnt_bodyid[j] == i for j in (*self.kept_joints, *self.free.kept))
-            if has_joints or int(model.body_parentid[i]) in moved:
-                moved.add(i)
-        needed |= moved
+            has_joints = any(model.jnt_bodyid[j] == i for j in (*self.kept_joints, *self.free.converted))
+            if has_joints or int(model.body_parentid[i]) in moving:
+                moving.add(i)
+        bodies |= moving
         for i in range(model.nbody - 1, 0, -1):
-            if i in needed:
-                needed.add(int(model.body_parentid[i]))
-        return sorted(needed - {0})
+            if i in bodies:
+                bodies.add(int(model.body_parentid[i]))
+        return sorted(bodies - {0})
 
-    def _still(self) -> Table:
+    def _world_body(self) -> Table:
         """Return the body that has the shapes of the world; none without any."""
-        shapes = self.shapes.of_body(0)
+        shapes = self.shapes.body_shapes(0)
         return {self.names.bodies[0]: {"shapes": shapes, "solids": self._solids(0)}} if shapes else {}
 
     def _body(self, i: int) -> Table:
@@ -188,54 +190,54 @@ class _Reader:
             "position": model.body_pos[i].tolist(),
             "orientation": quaternion(model.body_quat[i]),
             # A motion that is prescribed takes no mass.
-            **({} if i in self.led else self._inertia(i)),
+            **({} if i in self.mocap else self._inertia(i)),
             "solids": self._solids(i),
-            "shapes": self.shapes.of_body(i),
+            "shapes": self.shapes.body_shapes(i),
         }
 
     def _inertia(self, i: int) -> Table:
-        model, turned = self.model, rotation(quaternion(self.model.body_iquat[i]))
-        moments = turned @ np.diag(model.body_inertia[i]) @ turned.T
+        model, axes = self.model, rotation(quaternion(self.model.body_iquat[i]))
+        moments = axes @ np.diag(model.body_inertia[i]) @ axes.T
         return {
             "mass": float(model.body_mass[i]),
             "gravity_compensation": float(model.body_gravcomp[i]),
             "centre": model.body_ipos[i].tolist(),
-            "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            "inertia": [float(moments[indices]) for indices in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
         }
 
     def _solids(self, body: int) -> Table:
         """Return the visible geoms of a body, or all if none is; meshes of moving bodies only."""
         model, kinds, solids = self.model, self.mujoco.mjtGeom, {}
         geoms = np.flatnonzero(model.geom_bodyid == body)
-        shown = geoms[model.geom_group[geoms] < _HIDDEN]
-        for i in shown if len(shown) else geoms:
+        visible = geoms[model.geom_group[geoms] < _FIRST_HIDDEN_GROUP]
+        for i in visible if len(visible) else geoms:
             kind, size = model.geom_type[i], model.geom_size[i]
-            place = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
+            pose = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
             radius, length = float(size[0]), 2.0 * float(size[1])
             if kind == kinds.mjGEOM_SPHERE:
-                solids[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+                solids[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **pose}
             elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
                 name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
-                solids[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+                solids[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **pose}
             elif kind == kinds.mjGEOM_ELLIPSOID:
-                solids[self.names.geoms[i]] = {"kind": "ellipsoid", "semi_axes": size.tolist(), **place}
+                solids[self.names.geoms[i]] = {"kind": "ellipsoid", "semi_axes": size.tolist(), **pose}
             elif kind == kinds.mjGEOM_BOX:
-                solids[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+                solids[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **pose}
             elif kind == kinds.mjGEOM_MESH and model.body_weldid[body]:
                 # A forearm that stands still would be in the way.
                 name = self.names.meshes[model.geom_dataid[i]]
-                solids[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **place}
+                solids[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **pose}
         return solids
 
     def _meshes(self, bodies: list[int]) -> Table:
         """Return the meshes that the solids of bodies are made of."""
         model, names = self.model, self.names.meshes
-        used = {solid.get("mesh") for i in bodies for solid in self._solids(i).values()}
+        used_meshes = {solid.get("mesh") for i in bodies for solid in self._solids(i).values()}
         meshes = {}
         for i in range(model.nmesh):
             points = slice(model.mesh_vertadr[i], model.mesh_vertadr[i] + model.mesh_vertnum[i])
             faces = slice(model.mesh_faceadr[i], model.mesh_faceadr[i] + model.mesh_facenum[i])
-            if names[i] in used:
+            if names[i] in used_meshes:
                 meshes[names[i]] = Mesh.packed(model.mesh_vert[points], model.mesh_face[faces])
         return meshes
 
@@ -249,17 +251,17 @@ class _Reader:
         limited, ends = bool(model.jnt_limited[i]), within_margin(model.jnt_range[i], float(model.jnt_margin[i]))
         if limited and max(map(abs, ends)) > MOST_ANGLE:
             name = self.names.joints[i]
-            self.rest.add(f"joint {name}: its range {ends} is cut to {-MOST_ANGLE} and {MOST_ANGLE}")
+            self.left_out.add(f"joint {name}: its range {ends} is cut to {-MOST_ANGLE} and {MOST_ANGLE}")
             ends = np.clip(ends, -MOST_ANGLE, MOST_ANGLE).tolist()
             limited = ends[0] < ends[1]
-        reach = math.pi if model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE else 1.0
+        half_range = math.pi if model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE else 1.0
         return {
-            "range": ends if limited else [-reach, reach],
+            "range": ends if limited else [-half_range, half_range],
             "limited": limited,
             **({"spring": spring} if spring["stiffness"] or spring["damping"] else {}),
         }
 
-    def _moving(self, i: int) -> Table:
+    def _tree_joint(self, i: int) -> Table:
         model, hinge = self.model, self.mujoco.mjtJoint.mjJNT_HINGE
         return {
             "body": self.names.bodies[model.jnt_bodyid[i]],
@@ -273,20 +275,21 @@ class _Reader:
     def with_tips(self, description: FingerDescription) -> FingerDescription:
         """Return a description with fingertips: the first site called one on every link, and ends without such."""
         model, tree, sites = self.model, description.tree, dict[str, dict[str, Tip]]()
-        moved = self._moved_by_joints()
+        jointed = self._jointed_bodies()
         for i in range(model.nsite):
             body = int(model.site_bodyid[i])
-            carrier = tree.link_of(self.names.bodies[body]) if body in moved else None
+            carrier = tree.link_of(self.names.bodies[body]) if body in jointed else None
             if "tip" in model.site(i).name.lower() and carrier is not None:
                 tip = Tip(body=self.names.bodies[body], position=model.site_pos[i].tolist())
-                named = entry_name(model.site(i).name).removesuffix("_fingertip")
-                sites.setdefault(carrier, {named: tip})
-        loose = {self.names.bodies[i] for i in (*self.free.labels, *self.led.labels)}
-        ends = {name: {name: each} for name, each in tree.tips.items() if name not in loose or not self.kept_joints}
+                tip_name = entry_name(model.site(i).name).removesuffix("_fingertip")
+                sites.setdefault(carrier, {tip_name: tip})
+        free_names = {self.names.bodies[i] for i in (*self.free.labels, *self.mocap.labels)}
+        every = not self.kept_joints
+        ends = {name: {name: each} for name, each in tree.tips.items() if every or name not in free_names}
         tips = {name: tip for each in (ends | sites).values() for name, tip in each.items()}
         return description.updated(tree=tree.updated(tips=tips))
 
-    def _moved_by_joints(self) -> set[int]:
+    def _jointed_bodies(self) -> set[int]:
         """Return the bodies that joints move which turn or slide."""
         parents, bodies = self.model.body_parentid, {int(self.model.jnt_bodyid[j]) for j in self.kept_joints}
         for i in range(1, self.model.nbody):

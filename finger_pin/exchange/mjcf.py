@@ -32,12 +32,12 @@ from finger_pin.typing import Array
 #: Time step, s, of a model without lumped masses.
 TIMESTEP = 1e-4
 
-# A dead band that a tendon never leaves at its lower end, m.
-_SLACK = 1000.0
+# Lower end of a tendon's dead band, m below zero: never reached.
+_NO_LOWER_END = 1000.0
 # A slide does not turn, but MuJoCo wants a positive inertia of every body that moves, kg m2.
 _NO_INERTIA = 1e-12
 
-_NOTES = """
+_HEADER = """
   {title}
 
   Controls are tendon tensions f^a, N. The length of an actuated tendon is l = H_c theta, m, positive when the tendon is
@@ -50,21 +50,21 @@ _NOTES = """
   - an external force at the fingertip: apply it to the site "{tip}".{servos}
   Added: controls are clamped to 0 to {limit:g} N; shapes touch other objects, not each other.
 """
-_SMOOTH = """
+_FRICTION_LEFT_OUT = """
   - stiction and Coulomb friction of tendons and joints (the dynamic friction law; only its viscous part is here);"""
-_ROUGH = """
+_FRICTION_PLUGIN = """
   Friction of tendons and joints (the dynamic friction law) is the plugin "finger_pin.friction": import
   finger_pin.mujoco in Python before loading this file.
 """
-_OPEN = 'the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false"'
-_SOFT = "what stops take of an impact by its depth (Hunt-Crossley); they are critically damped soft constraints"
-_HELD = """
+_NO_STOPS = 'the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false"'
+_SOFT_STOPS = "what stops take of an impact by its depth (Hunt-Crossley); they are critically damped soft constraints"
+_HYSTERESIS_LEFT_OUT = """
   - what springs of joints and passive tendons hold against their motion (hysteresis);"""
-_SERVOS = """
+_SERVOS_LEFT_OUT = """
   - servos, their spools and what stretches on the way: controls pull at the entrance of the canals."""
-_MASSIVE = """
+_WITH_MASS = """
   A passive tendon is a slide joint, its lumped mass, between two springs that only pull."""
-_MASSLESS = """
+_WITHOUT_MASS = """
   A passive tendon is one spring that only pulls, without its lumped mass and the drag on it."""
 
 
@@ -105,22 +105,24 @@ def to_mjcf(
         raise InputError("timestep", "must be above 0", timestep)
     if description.tree.bodies:
         if friction:
-            way = "finger_pin.mujoco.add_friction(mujoco.MjSpec.from_string(text), of=hand)"
-            raise InputError("friction", f"of a tree is added to what is written without: {way}")
+            call = "finger_pin.mujoco.add_friction(mujoco.MjSpec.from_string(text), of=hand)"
+            raise InputError("friction", f"of a tree is added to what is written without: {call}")
         return tree_to_mjcf(description, posture, timestep, integrator, limits is not False, shapes)
     tendons = Tendons.from_description(description)
     links = _links(description)
     position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)
     if position.shape != (len(links),):
         raise InputError("posture", f"must be {len(links)} numbers, one per joint", posture)
-    step = _stable_step(tendons, massless) if timestep is None else timestep
+    time_step = _stable_step(tendons, massless) if timestep is None else timestep
     root = ET.Element("mujoco", model=description.name)
-    root.append(ET.Comment(_notes(description, tendons, massless, friction, bool(limits))))
+    root.append(ET.Comment(_header(description, tendons, massless, friction, bool(limits))))
     ET.SubElement(root, "compiler", angle="radian", eulerseq="XYZ")
-    option = {"timestep": _numbers(step), "gravity": _numbers(*description.gravity), "integrator": integrator}
+    option = {"timestep": _numbers(time_step), "gravity": _numbers(*description.gravity), "integrator": integrator}
     ET.SubElement(root, "option", option)
     if shapes:
-        root.append(_materials())
+        assets = ET.SubElement(root, "asset")
+        for name, colour in MATERIALS.items():
+            ET.SubElement(assets, "material", name=name, rgba=_numbers(*colour))
     world = ET.SubElement(root, "worldbody")
     if description.hand is not None:
         _add_hand(world, description.hand, shapes, bool(limits))
@@ -137,25 +139,17 @@ def to_mjcf(
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _notes(description: FingerDescription, tendons: Tendons, massless: bool, friction: bool, limits: bool) -> str:
+def _header(description: FingerDescription, tendons: Tendons, massless: bool, friction: bool, limits: bool) -> str:
     """Return the comment that says what of the description the model has and lacks."""
     notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
-    notes |= {"friction": _ROUGH, "rough": ""} if friction else {"friction": "", "rough": _SMOOTH}
+    notes |= {"friction": _FRICTION_PLUGIN, "rough": ""} if friction else {"friction": "", "rough": _FRICTION_LEFT_OUT}
     springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
-    notes["held"] = _HELD if any(springs) or tendons.hysteresis.any() else ""
-    notes["stops"] = _SOFT if limits else _OPEN
-    notes["servos"] = _SERVOS if description.actuators else ""
+    notes["held"] = _HYSTERESIS_LEFT_OUT if any(springs) or tendons.hysteresis.any() else ""
+    notes["stops"] = _SOFT_STOPS if limits else _NO_STOPS
+    notes["servos"] = _SERVOS_LEFT_OUT if description.actuators else ""
     if tendons.routing.passive:
-        notes["passive"] = _MASSLESS if massless else _MASSIVE
-    return _NOTES.format(**notes).replace("--", "- -")
-
-
-def _materials() -> ET.Element:
-    """Return the materials of the shapes."""
-    assets = ET.Element("asset")
-    for name, colour in MATERIALS.items():
-        ET.SubElement(assets, "material", name=name, rgba=_numbers(*colour))
-    return assets
+        notes["passive"] = _WITHOUT_MASS if massless else _WITH_MASS
+    return _HEADER.format(**notes).replace("--", "- -")
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:
@@ -181,9 +175,9 @@ def _add_hand(world: ET.Element, hand: HandSettings, shapes: bool, limits: bool)
     if shapes and all(hand.palm.size):
         _add_shapes(palm, [Shape("box", hand.palm.size, hand.palm.centre, material="palm")])
     for name, finger in hand.built().items():
-        placed = hand.fingers[name]
-        place = {"pos": _numbers(*placed.position), "euler": _numbers(*placed.orientation)}
-        base = ET.SubElement(palm, "body", {"name": f"{name}.{BASE_FRAME}", **place})
+        mount = hand.fingers[name]
+        pose = {"pos": _numbers(*mount.position), "euler": _numbers(*mount.orientation)}
+        base = ET.SubElement(palm, "body", {"name": f"{name}.{BASE_FRAME}", **pose})
         _add_links(base, finger, _links(finger), shapes, limits, f"{name}.")
 
 
@@ -198,18 +192,16 @@ def _add_links(
     """Nest the links: a body's frame is its joint's, the axis is z and the link runs along x."""
     size = len(links)
     first, last = next(iter(links)), next(reversed(links.values()))
-    drawn = link_shapes(description, links)
+    shapes_of_link = link_shapes(description, links)
     damping = expand(description.joint_friction.viscous, size)
-    stops, mobility = (
-        description.stroke_limiter,
-        np.linalg.inv(build_rigid_body(description).mass_matrix(np.zeros(size))),
-    )
-    stiffness, damper = expand(stops.stiffness, size), expand(stops.viscous, size)
+    limiter = description.stroke_limiter
+    mobility = np.linalg.inv(build_rigid_body(description).mass_matrix(np.zeros(size)))
+    stiffness, damper = expand(limiter.stiffness, size), expand(limiter.viscous, size)
     if shapes:
         _add_shapes(body, palm_shapes(description, first, links[first]))
-    place, twist = (0.0, 0.0, 0.0), 0.0
+    position, twist = (0.0, 0.0, 0.0), 0.0
     for index, (name, link) in enumerate(links.items()):
-        frame = {"name": f"{prefix}{name}_link", "pos": _numbers(*place), "euler": _numbers(twist, 0, 0)}
+        frame = {"name": f"{prefix}{name}_link", "pos": _numbers(*position), "euler": _numbers(twist, 0, 0)}
         body = ET.SubElement(body, "body", frame)
         axial, transverse = link.inertia
         inertia = {"pos": _numbers(link.mass_centre, 0, link.offset), "mass": _numbers(link.mass)}
@@ -225,11 +217,11 @@ def _add_links(
         drag = damping[index] + (spring.damping if spring else 0.0)
         ET.SubElement(body, "joint", {**hinge, "damping": _numbers(drag)})
         if shapes:
-            _add_shapes(body, drawn[name])
-        place, twist = (link.length, 0.0, link.offset), link.twist
+            _add_shapes(body, shapes_of_link[name])
+        position, twist = (link.length, 0.0, link.offset), link.twist
     if shapes:
-        _add_shapes(body, pad_shapes(last), place)
-    ET.SubElement(body, "site", name=f"{prefix}{TIP_FRAME}", pos=_numbers(*place), euler=_numbers(twist, 0, 0))
+        _add_shapes(body, pad_shapes(last), position)
+    ET.SubElement(body, "site", name=f"{prefix}{TIP_FRAME}", pos=_numbers(*position), euler=_numbers(twist, 0, 0))
 
 
 def _add_masses(world: ET.Element, description: FingerDescription, tendons: Tendons) -> None:
@@ -277,10 +269,10 @@ def _add_tendon(
     stiffness: float = 0.0,
 ) -> None:
     """Add a tendon; one with stiffness pulls at positive lengths and is slack at negative ones."""
-    law = {"damping": _numbers(damping)} if stiffness == 0.0 else {"stiffness": _numbers(stiffness)}
+    attributes = {"damping": _numbers(damping)} if stiffness == 0.0 else {"stiffness": _numbers(stiffness)}
     if stiffness != 0.0:
-        law["springlength"] = _numbers(-_SLACK, 0)
-    tendon = ET.SubElement(table, "fixed", {"name": name, **law})
+        attributes["springlength"] = _numbers(-_NO_LOWER_END, 0)
+    tendon = ET.SubElement(table, "fixed", {"name": name, **attributes})
     for coordinate, factor in zip(coordinates, coupling, strict=True):
         if factor != 0.0:
             ET.SubElement(tendon, "joint", joint=coordinate, coef=_numbers(factor))
@@ -289,7 +281,7 @@ def _add_tendon(
 def _add_shapes(body: ET.Element, shapes: Iterable[Shape], place: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
     """Add shapes, moved to a place, m; those that collide meet objects of MuJoCo's default type, but not each other."""
     for shape in shapes:
-        centre = [at + by for at, by in zip(shape.position, place, strict=True)]
+        centre = [coordinate + shift for coordinate, shift in zip(shape.position, place, strict=True)]
         size = [0.5 * side for side in shape.size]
         if shape.kind != "box":
             size[0] = shape.size[0]

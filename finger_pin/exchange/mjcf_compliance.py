@@ -13,7 +13,7 @@ import pinocchio as pin
 from scipy.optimize import brentq
 
 from finger_pin.description.tree import Tree
-from finger_pin.exchange.mujoco_compliance import IMPACT, LEAST_SHARE, impact_damping, restitution
+from finger_pin.exchange.mujoco_compliance import IMPACT_SPEED, LEAST_RESTITUTION, impact_damping, restitution
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.tendon_paths import Placed, TendonPaths
 from finger_pin.mechanism.xml_numbers import numbers
@@ -30,7 +30,7 @@ def quaternion(orientation: Sequence[float]) -> str:
 
 
 def soft(
-    stiffness: float, damping: float, mobility: float, suffix: str = "", *, stop: bool = False, damped: bool = False
+    stiffness: float, damping: float, mobility: float, suffix: str = "", *, stop: bool = False, is_ratio: bool = False
 ) -> dict[str, str]:
     """Return ``solref`` and ``solimp`` with which a constraint is a spring beside a damper under loads, or a stop.
 
@@ -44,14 +44,14 @@ def soft(
         mobility: A, acceleration per force along the constraint, 1/kg or 1/(kg m2).
         suffix: Of the attributes' names.
         stop: Whether it bounces.
-        damped: Whether the damping is a ratio, 1 for critical.
+        is_ratio: Whether the damping is a ratio, 1 for critical.
     """
-    share = 1.0 - IMPEDANCE
-    reference = share * mobility * stiffness
-    damper = share * mobility * damping
+    compliance_share = 1.0 - IMPEDANCE
+    reference = compliance_share * mobility * stiffness
+    damper = compliance_share * mobility * damping
     if stop:
-        damper = mobility * damping * math.sqrt(share) or 2.0 * math.sqrt(reference)
-    if damped:
+        damper = mobility * damping * math.sqrt(compliance_share) or 2.0 * math.sqrt(reference)
+    if is_ratio:
         damper = 2.0 * damping * math.sqrt(reference)
     if not reference > 0.0:
         return {}
@@ -64,13 +64,13 @@ def soft(
 def impact_ratio(damping: float) -> float:
     """Return the damping ratio that throws back as much of an impact at 0.1 m/s as a contact's damping c, s/m, does."""
 
-    def gap(ratio: float) -> float:
-        return impact_damping(restitution(ratio)) - damping * IMPACT
+    def excess(ratio: float) -> float:
+        return impact_damping(restitution(ratio)) - damping * IMPACT_SPEED
 
-    low, high = 1e-3, float(brentq(lambda ratio: restitution(ratio) - LEAST_SHARE, 1.0, 10.0))
-    if gap(low) > 0.0:
+    low, high = 1e-3, float(brentq(lambda ratio: restitution(ratio) - LEAST_RESTITUTION, 1.0, 10.0))
+    if excess(low) > 0.0:
         return low
-    return float(brentq(gap, low, high)) if gap(high) > 0.0 else high
+    return float(brentq(excess, low, high)) if excess(high) > 0.0 else high
 
 
 class Mobility:
@@ -85,33 +85,33 @@ class Mobility:
     def __init__(self, tree: Tree, body: RigidBody, paths: TendonPaths) -> None:
         """Evaluate the rigid body of a tree, and its tendons."""
         q = paths.references
-        inverse = np.linalg.inv(body.mass_matrix(q))
+        inverse_mass = np.linalg.inv(body.mass_matrix(q))
         # What a path moves gives way to nothing.
-        inverse *= ~np.isin([*tree.joints], [*tree.on_paths])
+        inverse_mass *= ~np.isin([*tree.joints], [*tree.on_paths])
         arms = paths.arms(q) if tree.tendons else np.zeros((0, len(q)))
-        along = np.einsum("ti,ij,tj->t", arms, inverse, arms)
-        self.joints = dict(zip(tree.joints, np.diag(inverse).tolist(), strict=True))
-        self.tendons = dict(zip(tree.tendons, along.tolist(), strict=True))
+        tendon_mobility = np.einsum("ti,ij,tj->t", arms, inverse_mass, arms)
+        self.joints = dict(zip(tree.joints, np.diag(inverse_mass).tolist(), strict=True))
+        self.tendons = dict(zip(tree.tendons, tendon_mobility.tolist(), strict=True))
         data = body.model.createData()
         pin.computeJointJacobians(body.model, data, q)
-        self.bodies = {name: 1.0 / each.mass if each.mass else 0.0 for name, each in tree.objects.items()}
-        for name, each in tree.bodies.items():
-            jacobian = _jacobian(body.model, data, paths.placed[name], each.centre)
-            self.bodies[name] = float(np.trace(jacobian @ inverse @ jacobian.T)) / 3.0
+        self.bodies = {name: 1.0 / part.mass if part.mass else 0.0 for name, part in tree.objects.items()}
+        for name, part in tree.bodies.items():
+            jacobian = _jacobian(body.model, data, paths.placed[name], part.centre)
+            self.bodies[name] = float(np.trace(jacobian @ inverse_mass @ jacobian.T)) / 3.0
             if _is_slider(tree, name):
                 # MuJoCo takes these without their armatures, and alike in all directions.
-                self.bodies[name] = 1.0 / each.mass
+                self.bodies[name] = 1.0 / part.mass
                 moved = [joint for joint, moved in tree.joints.items() if moved.body == name]
-                self.joints |= dict.fromkeys(moved, 1.0 / each.mass)
+                self.joints |= dict.fromkeys(moved, 1.0 / part.mass)
 
 
 def _is_slider(tree: Tree, name: str) -> bool:
     """Return whether a body is what MuJoCo calls simple: alone on slides along its axes, about its mass centre."""
-    moved = [joint for joint in tree.joints.values() if joint.body == name]
-    aligned = all(joint.kind == "slide" and np.count_nonzero(joint.axis) == 1 for joint in moved)
+    joints = [joint for joint in tree.joints.values() if joint.body == name]
+    aligned = all(joint.kind == "slide" and np.count_nonzero(joint.axis) == 1 for joint in joints)
     on_base = tree.link_of(tree.bodies[name].parent) is None
-    alone = on_base and not any(body.parent == name for body in tree.bodies.values())
-    return bool(moved) and aligned and alone and not any(tree.bodies[name].centre) and tree.bodies[name].mass > 0.0
+    is_alone = on_base and not any(body.parent == name for body in tree.bodies.values())
+    return bool(joints) and aligned and is_alone and not any(tree.bodies[name].centre) and tree.bodies[name].mass > 0.0
 
 
 def _jacobian(model: pin.Model, data: pin.Data, placed: Placed, point: Sequence[float]) -> Array:
@@ -119,6 +119,6 @@ def _jacobian(model: pin.Model, data: pin.Data, placed: Placed, point: Sequence[
     if not placed.joint:
         return np.zeros((3, model.nv))
     frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    along, about = pin.getJointJacobian(model, data, placed.joint, frame).reshape(2, 3, -1)
-    away = data.oMi[placed.joint].rotation @ placed.frame.act(np.array(point))
-    return np.asarray(along - pin.skew(away) @ about)
+    linear, angular = pin.getJointJacobian(model, data, placed.joint, frame).reshape(2, 3, -1)
+    lever = data.oMi[placed.joint].rotation @ placed.frame.act(np.array(point))
+    return np.asarray(linear - pin.skew(lever) @ angular)

@@ -18,12 +18,12 @@ from finger_pin.exchange.mjcf_compliance import Mobility, soft
 from finger_pin.mechanism.xml_numbers import numbers
 from finger_pin.typing import Array
 
-# The highest power of a coupling in MJCF.
-_POWERS = 4
-# Controls that come late are kept for steps of this length at least, s.
-_SAMPLED = 1e-4
-# What a pull of an ideal source without a largest tension is limited to, N.
-_PULL = 1e3
+# Highest power of a coupling in MJCF.
+_MAX_POWER = 4
+# Least step for which delayed controls are buffered, s.
+_DELAY_STEP = 1e-4
+# Greatest tension of an ideal source without a limit, N.
+_MAX_TENSION = 1e3
 
 
 def add_equalities(
@@ -44,26 +44,26 @@ def add_equalities(
     table = ET.SubElement(root, "equality")
     for name, coupling in tree.couplings.items():
         joints = [coupling.joint, *([coupling.other] if coupling.other else [])]
-        held = soft(coupling.stiffness, coupling.damping, sum(mobility.joints[joint] for joint in joints))
-        named = {f"joint{k + 1}": joint for k, joint in enumerate(joints)}
-        course = _course(f"finger.tree.couplings.{name}.powers", coupling, description)
-        ET.SubElement(table, "joint", {"name": name, **named, "polycoef": numbers(*course), **held})
+        softness = soft(coupling.stiffness, coupling.damping, sum(mobility.joints[joint] for joint in joints))
+        joint_names = {f"joint{k + 1}": joint for k, joint in enumerate(joints)}
+        polynomial = _polynomial(f"finger.tree.couplings.{name}.powers", coupling, description)
+        ET.SubElement(table, "joint", {"name": name, **joint_names, "polycoef": numbers(*polynomial), **softness})
     for name, loop in tree.loops.items():
         ends = ((loop.body, loop.position), (loop.other, loop.other_position))
-        for k, (body, place) in enumerate(ends, 1):
-            ET.SubElement(bodies[body], "site", name=f"{name}_{k}", pos=numbers(*place))
-        held = soft(loop.stiffness, loop.damping, sum(mobility.bodies[body] for body, _ in ends if body))
-        ET.SubElement(table, "connect", {"name": name, "site1": f"{name}_1", "site2": f"{name}_2", **held})
+        for k, (body, position) in enumerate(ends, 1):
+            ET.SubElement(bodies[body], "site", name=f"{name}_{k}", pos=numbers(*position))
+        softness = soft(loop.stiffness, loop.damping, sum(mobility.bodies[body] for body, _ in ends if body))
+        ET.SubElement(table, "connect", {"name": name, "site1": f"{name}_1", "site2": f"{name}_2", **softness})
 
 
-def _course(entry: str, coupling: Coupling, description: FingerDescription) -> list[float]:
+def _polynomial(entry: str, coupling: Coupling, description: FingerDescription) -> list[float]:
     """Return the polynomial of a coupling in MuJoCo's terms: both joints count from their references."""
     tree, absolute = description.tree, Polynomial([coupling.offset, coupling.slope, *coupling.higher])
     start = tree.joints[coupling.other].reference if coupling.other else 0.0
-    course = (absolute(Polynomial([start, 1.0])) - tree.joints[coupling.joint].reference).coef
-    if np.any(course[_POWERS + 1 :]):
-        raise InputError(entry, f"is not written: MuJoCo has powers up to {_POWERS}", list(coupling.higher))
-    return [*course[: _POWERS + 1].tolist(), *[0.0] * (_POWERS + 1 - len(course))]
+    coefficients = (absolute(Polynomial([start, 1.0])) - tree.joints[coupling.joint].reference).coef
+    if np.any(coefficients[_MAX_POWER + 1 :]):
+        raise InputError(entry, f"is not written: MuJoCo has powers up to {_MAX_POWER}", list(coupling.higher))
+    return [*coefficients[: _MAX_POWER + 1].tolist(), *[0.0] * (_MAX_POWER + 1 - len(coefficients))]
 
 
 def add_actuators(root: ET.Element, description: FingerDescription, step: float) -> None:
@@ -76,23 +76,23 @@ def add_actuators(root: ET.Element, description: FingerDescription, step: float)
     for name, tendon in description.tendons.items():
         entry = f"finger.tendons.{name}"
         if tendon.kind == "passive" or tendon.winch is not None:
-            what = "winch" if tendon.winch else "kind"
-            raise InputError(f"{entry}.{what}", "is not written: a tendon beside a tree is pulled by an ideal source")
-        limits = {"ctrllimited": "true", "ctrlrange": numbers(0.0, tendon.maximum_tension or _PULL)}
+            key = "winch" if tendon.winch else "kind"
+            raise InputError(f"{entry}.{key}", "is not written: a tendon beside a tree is pulled by an ideal source")
+        limits = {"ctrllimited": "true", "ctrlrange": numbers(0.0, tendon.maximum_tension or _MAX_TENSION)}
         ET.SubElement(table, "motor", {"name": name, "tendon": tendon.along or name, "gear": "-1", **limits})
     for name, actuator in description.tree.actuators.items():
         attributes = {"name": name, "gear": numbers(actuator.gear)}
         attributes |= {"joint": actuator.joint} if actuator.joint else {"tendon": str(actuator.tendon)}
         attributes |= _limits("ctrl", actuator.input_range) | _limits("force", actuator.force_range)
         if actuator.delay:
-            samples = math.ceil(actuator.delay / min(step, _SAMPLED)) + 2
+            samples = math.ceil(actuator.delay / min(step, _DELAY_STEP)) + 2
             attributes |= {"delay": numbers(actuator.delay), "nsample": str(samples)}
         kind, law = _law(f"finger.tree.actuators.{name}", actuator)
         ET.SubElement(table, kind, attributes | law)
 
 
-def _limits(what: str, ends: Sequence[float] | None) -> dict[str, str]:
-    return {f"{what}limited": "true", f"{what}range": numbers(*ends)} if ends is not None else {}
+def _limits(prefix: str, ends: Sequence[float] | None) -> dict[str, str]:
+    return {f"{prefix}limited": "true", f"{prefix}range": numbers(*ends)} if ends is not None else {}
 
 
 def _law(entry: str, actuator: TreeActuator) -> tuple[str, dict[str, str]]:
@@ -127,7 +127,7 @@ def add_keyframes(
     root: ET.Element,
     description: FingerDescription,
     posture: Sequence[float] | None,
-    place: Callable[[str, Array], pin.SE3],
+    body_pose: Callable[[str, Array], pin.SE3],
 ) -> None:
     """Add the keyframes, or one called start with a posture, shape (n,), rad, on top of the first.
 
@@ -155,15 +155,15 @@ def add_keyframes(
                 qpos += [*free.position, *np.roll(free.quaternion, 1).tolist()]
                 qvel += [*free.velocity, *free.angular_velocity]
         q = np.array([keyframe.position.get(name, joint.reference) for name, joint in tree.joints.items()])
-        led = [place(body.get("name", ""), q) for body in bodies if body.get("mocap")]
-        driven = root.findall("actuator/*")
+        mocap_poses = [body_pose(body.get("name", ""), q) for body in bodies if body.get("mocap")]
+        actuators = root.findall("actuator/*")
         ctrl = list[float]()
-        for element in driven:
+        for element in actuators:
             # The second control of pid is a speed.
             ctrl += [keyframe.inputs.get(element.get("name", ""), 0.0), *[0.0] * (element.tag == "pid")]
-        states = {"qpos": numbers(*qpos), "qvel": numbers(*qvel)} | ({"ctrl": numbers(*ctrl)} if driven else {})
-        if led:
-            states["mpos"] = numbers(*np.concatenate([each.translation for each in led]))
-            turns = [np.roll(pin.Quaternion(each.rotation).coeffs(), 1) for each in led]
+        states = {"qpos": numbers(*qpos), "qvel": numbers(*qvel)} | ({"ctrl": numbers(*ctrl)} if actuators else {})
+        if mocap_poses:
+            states["mpos"] = numbers(*np.concatenate([each.translation for each in mocap_poses]))
+            turns = [np.roll(pin.Quaternion(each.rotation).coeffs(), 1) for each in mocap_poses]
             states["mquat"] = numbers(*np.concatenate(turns))
         ET.SubElement(table, "key", {"name": name, **states})

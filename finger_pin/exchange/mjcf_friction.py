@@ -32,11 +32,11 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
             joints by another law.
     """
     check_friction(description, tendons.at_bends)
-    frictions = [*_of_tendons(description, tendons, massless), *_of_joints(description, tendons)]
+    frictions = [*_tendon_frictions(description, tendons, massless), *_joint_frictions(description, tendons)]
     elements = {(each.tag, each.get("name")): each for kind in ("joint", "fixed") for each in root.iter(kind)}
     for friction in frictions:
         owner = elements["joint" if friction.of_joint else "fixed", friction.name]
-        owner.set("frictionloss", repr(max(friction.least, LEAST_LOSS)))
+        owner.set("frictionloss", repr(max(friction.least_level, LEAST_LOSS)))
         # Viscous friction is part of it; a joint's spring keeps its damping.
         spring = description.joints[friction.name].spring if friction.kind == PIN else None
         owner.set("damping", repr(float(spring.damping) if spring else 0.0))
@@ -60,10 +60,10 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
             ET.SubElement(table, "element", objtype=kind, objname=name, prm=repr(float(value)))
 
 
-def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool) -> list[PluginFriction]:
+def _tendon_frictions(description: FingerDescription, tendons: Tendons, massless: bool) -> list[PluginFriction]:
     frictions = []
     for index, (name, tendon) in enumerate(description.tendons.items()):
-        law = _coefficients(tendons, _TENDON, index, float(tendons.routing.curvature_offset[index]))
+        law = _coefficients(tendons, _TENDON_NAMES, index, float(tendons.routing.curvature_offset[index]))
         crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
         if tendon.kind == "actuated":
             frictions.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
@@ -74,14 +74,15 @@ def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool
         else:
             split, mass = tendon.proximal_crossings, f"{name}_mass"
             halves = [(False, f"{name}_{half}", 0.0) for half in ("proximal", "distal")]
-            more = (halves[0], *crossed[:split], halves[1], *crossed[split:])
-            frictions.append(PluginFriction(MASS, mass, mass, True, 1.0, law, more))
+            elements = (halves[0], *crossed[:split], halves[1], *crossed[split:])
+            frictions.append(PluginFriction(MASS, mass, mass, True, 1.0, law, elements))
     return frictions
 
 
 # Coefficients that have other names in tendons and in joints, and those that have the same.
-_TENDON, _JOINT = {"coulomb": "surface", "stiction": "stiction_ratio"}, {"coulomb": "kinetic", "stiction": "static"}
-_ALIKE = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "drag", "hardening")
+_TENDON_NAMES = {"coulomb": "surface", "stiction": "stiction_ratio"}
+_JOINT_NAMES = {"coulomb": "kinetic", "stiction": "static"}
+_SAME_NAMES = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "drag", "hardening")
 
 
 def _coefficients(
@@ -90,15 +91,15 @@ def _coefficients(
     """Return the coefficients of one tendon or joint, of which some have other names."""
     return Coefficients(
         **{key: float(getattr(friction, name)[index]) for key, name in names.items()},
-        **{key: float(getattr(friction, key)[index]) for key in _ALIKE},
+        **{key: float(getattr(friction, key)[index]) for key in _SAME_NAMES},
         micro_damping=float(friction.lag[index] * friction.stiffness[index]),
         curvature_offset=curvature_offset,
     )
 
 
-def _of_joints(description: FingerDescription, tendons: Tendons) -> list[PluginFriction]:
+def _joint_frictions(description: FingerDescription, tendons: Tendons) -> list[PluginFriction]:
     friction = JointFriction.from_description(description, tendons.routing.loads)
     frictions = []
     for index, name in enumerate(description.joints):
-        frictions.append(PluginFriction(PIN, name, name, True, 1.0, _coefficients(friction, _JOINT, index, 0.0)))
+        frictions.append(PluginFriction(PIN, name, name, True, 1.0, _coefficients(friction, _JOINT_NAMES, index, 0.0)))
     return frictions

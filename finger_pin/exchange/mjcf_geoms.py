@@ -15,10 +15,10 @@ from finger_pin.mechanism.contact_rows import law_numbers
 from finger_pin.mechanism.solids import pairs_apart
 from finger_pin.mechanism.xml_numbers import numbers
 
-#: What touches nothing, and the group of what MuJoCo's viewer does not show.
+#: Attributes of geoms that touch nothing, and the group that MuJoCo's viewer hides.
 IDLE, HIDDEN = {"contype": "0", "conaffinity": "0"}, "4"
-# What touches objects of MuJoCo's default type, and not each other.
-_TOUCHED = {"contype": "0", "conaffinity": "1"}
+# Attributes of geoms that touch objects of MuJoCo's default type, and not each other.
+_CONTACT = {"contype": "0", "conaffinity": "1"}
 
 
 def add_meshes(root: ET.Element, tree: Tree) -> None:
@@ -34,15 +34,15 @@ def add_body_geoms(element: ET.Element, body: Body) -> None:
     """Add the solids and shapes of a body; those of one name are one geom."""
     for key, solid in body.solids.items():
         if key not in body.shapes and solid.kind == "mesh":
-            place = {"pos": numbers(*solid.position), "quat": quaternion(solid.orientation)}
-            drawn = {"name": key, "type": "mesh", "mesh": str(solid.mesh), "mass": "0"}
-            ET.SubElement(element, "geom", drawn | place | IDLE)
+            pose = {"pos": numbers(*solid.position), "quat": quaternion(solid.orientation)}
+            mesh_attributes = {"name": key, "type": "mesh", "mesh": str(solid.mesh), "mass": "0"}
+            ET.SubElement(element, "geom", mesh_attributes | pose | IDLE)
         elif key not in body.shapes:
             sizes = {"box": solid.sides, "ellipsoid": solid.semi_axes}.get(solid.kind, (solid.radius, solid.length))
             add_geom(element, key, solid.kind, sizes, solid.position, solid.orientation, IDLE)
     for key, shape in body.shapes.items():
-        touches = _TOUCHED | _friction(shape.surface) | ({} if key in body.solids else {"group": HIDDEN})
-        add_geom(element, key, shape.shape, shape.sizes, shape.position, shape.orientation, touches)
+        contact = _CONTACT | _friction(shape.surface) | ({} if key in body.solids else {"group": HIDDEN})
+        add_geom(element, key, shape.shape, shape.sizes, shape.position, shape.orientation, contact)
 
 
 def add_geom(
@@ -61,8 +61,8 @@ def add_geom(
     shape = {"type": kind, "size": numbers(*size)}
     if kind == "half_space":
         shape = {"type": "plane", "size": "1 1 0.1"}
-    place = {"pos": numbers(*position), "quat": quaternion(orientation)}
-    ET.SubElement(element, "geom", {"name": name, "mass": "0", **shape, **place, **attributes})
+    pose = {"pos": numbers(*position), "quat": quaternion(orientation)}
+    ET.SubElement(element, "geom", {"name": name, "mass": "0", **shape, **pose, **attributes})
 
 
 def add_objects(world: ET.Element, tree: Tree) -> dict[str, str]:
@@ -72,21 +72,21 @@ def add_objects(world: ET.Element, tree: Tree) -> dict[str, str]:
         InputError: If one is moved along a path.
     """
     geoms = {}
-    for name, each in tree.objects.items():
-        if each.path:
+    for name, item in tree.objects.items():
+        if item.path:
             raise InputError(f"finger.tree.objects.{name}.path", "is not written: MuJoCo moves no body along a path")
-        touches = _TOUCHED | _friction(each.surface)
+        contact = _CONTACT | _friction(item.surface)
         geoms[name] = name
-        if each.mass is None:
-            add_geom(world, name, each.shape, each.sizes, each.position, each.orientation, touches)
+        if item.mass is None:
+            add_geom(world, name, item.shape, item.sizes, item.position, item.orientation, contact)
             continue
-        place = {"pos": numbers(*each.position), "quat": quaternion(each.orientation)}
-        body = ET.SubElement(world, "body", {"name": name, **place})
+        pose = {"pos": numbers(*item.position), "quat": quaternion(item.orientation)}
+        body = ET.SubElement(world, "body", {"name": name, **pose})
         ET.SubElement(body, "freejoint")
-        inertia = {"pos": numbers(*each.centre), "mass": numbers(each.mass), "fullinertia": numbers(*each.moments)}
+        inertia = {"pos": numbers(*item.centre), "mass": numbers(item.mass), "fullinertia": numbers(*item.moments)}
         ET.SubElement(body, "inertial", inertia)
         geoms[name] = f"{name}_geom"
-        add_geom(body, geoms[name], each.shape, each.sizes, (0.0,) * 3, (0.0, 0.0, 0.0, 1.0), touches)
+        add_geom(body, geoms[name], item.shape, item.sizes, (0.0,) * 3, (0.0, 0.0, 0.0, 1.0), contact)
     return geoms
 
 
@@ -98,17 +98,17 @@ def add_pairs(
     solids: dict[str, Shaped] = {key: tree.bodies[name].shapes[key] for key, name in owner.items()} | dict(tree.objects)
     apart = pairs_apart(tree.objects, [*solids, *tree.bodies])
     pairs = [*tree.touching] if description.touches_itself else []
-    for k, (name, each) in enumerate(tree.objects.items()):
-        before = [other for other in [*tree.objects][:k] if each.moves or tree.objects[other].moves]
-        pairs += [(other, name) for other in (*owner, *before) if frozenset((name, other)) not in apart]
+    for k, (name, item) in enumerate(tree.objects.items()):
+        earlier = [other for other in [*tree.objects][:k] if item.moves or tree.objects[other].moves]
+        pairs += [(other, name) for other in (*owner, *earlier) if frozenset((name, other)) not in apart]
     for pair in pairs:
-        stiffness, damping, exponent, _, mu, *_, radius = law_numbers(*(solids[each].surface for each in pair))
-        sliding = _rubbing(mu, radius * mu, numbers(mu, mu, radius * mu or 0.005, 1e-4, 1e-4))
-        meeting = sum(mobility.bodies[owner.get(each, each)] for each in pair)
+        stiffness, damping, exponent, _, mu, *_, radius = law_numbers(*(solids[item].surface for item in pair))
+        friction = _rubbing(mu, radius * mu, numbers(mu, mu, radius * mu or 0.005, 1e-4, 1e-4))
+        pair_mobility = sum(mobility.bodies[owner.get(item, item)] for item in pair)
         # A spring of Hertz's exponent has no stiffness of its own.
-        held = soft(stiffness, impact_ratio(damping), meeting, damped=True) if exponent == 1.0 else {}
-        named = {f"geom{k}": geoms.get(each, each) for k, each in enumerate(pair, 1)}
-        ET.SubElement(contact, "pair", named | sliding | held)
+        softness = soft(stiffness, impact_ratio(damping), pair_mobility, is_ratio=True) if exponent == 1.0 else {}
+        geom_names = {f"geom{k}": geoms.get(item, item) for k, item in enumerate(pair, 1)}
+        ET.SubElement(contact, "pair", geom_names | friction | softness)
 
 
 def _friction(surface: Surface | None) -> dict[str, str]:

@@ -27,14 +27,14 @@ from finger_pin.mechanism.tree_mechanism import build_body
 from finger_pin.mechanism.xml_numbers import numbers
 from finger_pin.typing import Array
 
-# Steps of MuJoCo's are at most so long, s, and this part of the time 1 / omega of its stiffest spring.
-_LONGEST, _PART = 1e-3, 0.2
+# Longest step of MuJoCo, s, and its share of the time 1 / omega of the stiffest spring.
+_MAX_STEP, _STEP_SHARE = 1e-3, 0.2
 # The least friction loss that MuJoCo keeps, N m, the length of a wrap, which has none here, m, and the inertia that
 # MuJoCo wants of all that moves, kg m2.
-_LEAST_LOSS, _LENGTH, _NO_INERTIA = 1e-6, 0.02, 1e-12
+_LEAST_LOSS, _CYLINDER_LENGTH, _NO_INERTIA = 1e-6, 0.02, 1e-12
 _WORLD = "world"
 
-_NOTES = """
+_HEADER = """
   {title}
 
   Written from a tree of bodies. Tendons that an ideal source pulls have a motor: its control is their tension, N.
@@ -60,9 +60,9 @@ def tree_to_mjcf(
         InputError: If MuJoCo cannot have an entry: it names it.
     """
     writer = _Writer(description, limits, shapes)
-    step = min(_LONGEST, float(f"{_PART / writer.fastest:.0e}")) if timestep is None else timestep
+    step = min(_MAX_STEP, float(f"{_STEP_SHARE / writer.fastest:.0e}")) if timestep is None else timestep
     root = ET.Element("mujoco", model=description.name)
-    root.append(ET.Comment(_notes(description)))
+    root.append(ET.Comment(_header(description)))
     ET.SubElement(root, "compiler", angle="radian", autolimits="false")
     option = {"timestep": numbers(step), "gravity": numbers(*description.gravity), "integrator": integrator}
     ET.SubElement(root, "option", option | {"cone": "elliptic", "impratio": "10"})
@@ -72,16 +72,16 @@ def tree_to_mjcf(
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _notes(description: FingerDescription) -> str:
-    rest = [f"{line};" for line in description.tree.left_out]
-    rest += ["servos, their spools and what stretches on the way;"] if description.actuators else []
+def _header(description: FingerDescription) -> str:
+    left_out = [f"{line};" for line in description.tree.left_out]
+    left_out += ["servos, their spools and what stretches on the way;"] if description.actuators else []
     if np.any(description.joint_friction.drag_asymmetry):
-        rest += ["by how much the drag of joints differs by direction (drag_asymmetry): frictionloss is the mean;"]
-    rest += (
+        left_out += ["by how much the drag of joints differs by direction (drag_asymmetry): frictionloss is the mean;"]
+    left_out += (
         ["paths of joints, whose bodies are mocap bodies: lead them by mocap_pos;"] if description.tree.on_paths else []
     )
-    lines = "".join(f"\n  - {line}" for line in rest)
-    return _NOTES.format(title=description.title or description.name, rest=lines).replace("--", "- -")
+    lines = "".join(f"\n  - {line}" for line in left_out)
+    return _HEADER.format(title=description.title or description.name, rest=lines).replace("--", "- -")
 
 
 class _Writer:
@@ -93,7 +93,7 @@ class _Writer:
         self.mobility = Mobility(self.tree, self.rigid_body, self.paths)
         self.elements: dict[str | None, ET.Element] = {}
         self.names = {name for each in self.tree.bodies.values() for name in (*each.solids, *each.shapes)}
-        self.placed: dict[tuple[str, Waypoint], dict[str, str]] = {}
+        self.waypoint_attributes: dict[tuple[str, Waypoint], dict[str, str]] = {}
 
     @property
     def fastest(self) -> float:
@@ -102,9 +102,9 @@ class _Writer:
         springs = {name: joint.spring.stiffness for name, joint in self.description.joints.items() if joint.spring}
         squares = [tendon.stiffness * of_tendons[name] for name, tendon in tendons]
         squares += [stiffness * of_joints[name] for name, stiffness in springs.items()]
-        for each in self.tree.actuators.values():
-            mobility = of_joints[each.joint] if each.joint else of_tendons[str(each.tendon)]
-            squares.append(abs(each.by_length) * each.gear**2 * mobility)
+        for actuator in self.tree.actuators.values():
+            mobility = of_joints[actuator.joint] if actuator.joint else of_tendons[str(actuator.tendon)]
+            squares.append(abs(actuator.by_length) * actuator.gear**2 * mobility)
         stops = [tendon.limit_stiffness * of_tendons[name] for name, tendon in tendons if tendon.range]
         if self.limits:
             stiffness = expand(self.description.stroke_limiter.stiffness, len(of_joints))
@@ -146,42 +146,42 @@ class _Writer:
 
     def _add_body(self, name: str, body: Body) -> None:
         parent = self.elements[body.parent]
-        still = body.parent is None and not any(joint.body == name for joint in self.tree.joints.values())
-        if still and name == _WORLD:
+        is_fixed = body.parent is None and not any(joint.body == name for joint in self.tree.joints.values())
+        if is_fixed and name == _WORLD:
             self.elements[name] = parent
             if self.shapes:
                 add_body_geoms(parent, body)
             return
-        place = {"pos": numbers(*body.position), "quat": quaternion(body.orientation)}
-        led = self._led(name, body)
-        lifted = {"mocap": "true"} if led else {}
-        lifted |= {"gravcomp": numbers(body.gravity_compensation)} if body.gravity_compensation else {}
-        element = self.elements[name] = ET.SubElement(parent, "body", {"name": name, **place, **lifted})
+        pose = {"pos": numbers(*body.position), "quat": quaternion(body.orientation)}
+        is_mocap = self._is_mocap(name, body)
+        attributes = {"mocap": "true"} if is_mocap else {}
+        attributes |= {"gravcomp": numbers(body.gravity_compensation)} if body.gravity_compensation else {}
+        element = self.elements[name] = ET.SubElement(parent, "body", {"name": name, **pose, **attributes})
         if body.mass or any(body.inertia):
             inertia = {"pos": numbers(*body.centre), "mass": numbers(body.mass), "fullinertia": numbers(*body.inertia)}
             ET.SubElement(element, "inertial", inertia)
-        elif not still and not led:
+        elif not is_fixed and not is_mocap:
             least = {"pos": "0 0 0", "mass": numbers(_NO_INERTIA), "diaginertia": numbers(*[_NO_INERTIA] * 3)}
             ET.SubElement(element, "inertial", least)
         friction, size = self.description.joint_friction, len(self.tree.joints)
         loss = np.maximum(expand(friction.floor, size), expand(friction.drag, size))
         for k, (joint, moved) in enumerate(self.tree.joints.items()):
-            if moved.body == name and not led:
-                about = {"name": joint, "type": moved.kind, "axis": numbers(*moved.axis), "pos": numbers(*moved.anchor)}
-                about |= {"ref": numbers(moved.reference), "armature": numbers(moved.armature)}
-                about["frictionloss"] = numbers(loss[k] if moved.bearing and loss[k] >= _LEAST_LOSS else 0.0)
-                ET.SubElement(element, "joint", about | self._joint(k, joint))
+            if moved.body == name and not is_mocap:
+                place = {"axis": numbers(*moved.axis), "pos": numbers(*moved.anchor), "ref": numbers(moved.reference)}
+                attributes = {"name": joint, "type": moved.kind, **place, "armature": numbers(moved.armature)}
+                attributes["frictionloss"] = numbers(loss[k] if moved.bearing and loss[k] >= _LEAST_LOSS else 0.0)
+                ET.SubElement(element, "joint", attributes | self._joint(k, joint))
         if self.shapes:
             add_body_geoms(element, body)
 
-    def _led(self, name: str, body: Body) -> bool:
+    def _is_mocap(self, name: str, body: Body) -> bool:
         """Return whether a body is written as a mocap body, whose path the user gives by ``mocap_pos``."""
         joints = [key for key, joint in self.tree.joints.items() if joint.body == name]
-        led = [key for key in joints if key in self.tree.on_paths]
-        if led and (body.parent is not None or led != joints):
+        on_paths = [key for key in joints if key in self.tree.on_paths]
+        if on_paths and (body.parent is not None or on_paths != joints):
             allowed = "is not written: a mocap body of MuJoCo stands in the world, and all of its joints have paths"
-            raise InputError(f"finger.tree.joints.{led[0]}.path", allowed)
-        return bool(led)
+            raise InputError(f"finger.tree.joints.{on_paths[0]}.path", allowed)
+        return bool(on_paths)
 
     def _joint(self, k: int, name: str) -> dict[str, str]:
         """Return spring, damper and range of a joint."""
@@ -220,34 +220,34 @@ class _Writer:
         for point, waypoint in (tendon.path or {}).items():
             self._add_waypoint(element, f"{name}_{point}", point, waypoint)
 
-    def _add_waypoint(self, path: ET.Element, full: str, name: str, waypoint: Waypoint) -> None:
+    def _add_waypoint(self, path: ET.Element, full_name: str, name: str, waypoint: Waypoint) -> None:
         """Add a piece of a path; tendons share the sites and wraps of one name at one place."""
         if waypoint.kind == "pulley":
             ET.SubElement(path, "pulley", divisor=numbers(waypoint.divisor))
             return
-        if (name, waypoint) not in self.placed:
-            self.placed[name, waypoint] = self._place_waypoint(name, full, waypoint)
-        ET.SubElement(path, "site" if waypoint.kind == "point" else "geom", self.placed[name, waypoint])
+        if (name, waypoint) not in self.waypoint_attributes:
+            self.waypoint_attributes[name, waypoint] = self._place_waypoint(name, full_name, waypoint)
+        ET.SubElement(path, "site" if waypoint.kind == "point" else "geom", self.waypoint_attributes[name, waypoint])
 
     def _is_drawn(self, name: str, wrap: Waypoint) -> bool:
         """Return whether a wrap is a solid of its body, which is written already."""
         solid = self.tree.bodies[wrap.body].solids.get(name) if wrap.body and self.shapes else None
-        placed = ("kind", "radius", "position", "orientation")
-        return solid is not None and all(getattr(solid, key) == getattr(wrap, key) for key in placed)
+        compared = ("kind", "radius", "position", "orientation")
+        return solid is not None and all(getattr(solid, key) == getattr(wrap, key) for key in compared)
 
-    def _place_waypoint(self, name: str, full: str, waypoint: Waypoint) -> dict[str, str]:
+    def _place_waypoint(self, name: str, full_name: str, waypoint: Waypoint) -> dict[str, str]:
         """Add the site or geom of a waypoint, and the site at its side; return what its path says of them."""
-        carrier, wraps = self.elements[waypoint.body], waypoint.kind != "point"
-        drawn = wraps and self._is_drawn(name, waypoint)
-        label = full if name in self.names and not drawn else name
+        carrier, is_wrap = self.elements[waypoint.body], waypoint.kind != "point"
+        is_drawn = is_wrap and self._is_drawn(name, waypoint)
+        label = full_name if name in self.names and not is_drawn else name
         self.names.add(label)
-        if not wraps:
+        if not is_wrap:
             ET.SubElement(carrier, "site", name=label, pos=numbers(*waypoint.position))
             return {"site": label}
-        if not drawn:
-            sizes = (waypoint.radius, _LENGTH)[: 1 + (waypoint.kind == "cylinder")]
-            place, hidden = (waypoint.position, waypoint.orientation), {**IDLE, "group": HIDDEN}
-            add_geom(carrier, label, waypoint.kind, sizes, *place, hidden)
+        if not is_drawn:
+            sizes = (waypoint.radius, _CYLINDER_LENGTH)[: 1 + (waypoint.kind == "cylinder")]
+            pose, hidden = (waypoint.position, waypoint.orientation), {**IDLE, "group": HIDDEN}
+            add_geom(carrier, label, waypoint.kind, sizes, *pose, hidden)
         position = np.array(waypoint.position)
         if waypoint.side is not None:
             position = position + rotation(waypoint.orientation) @ np.array(waypoint.side)
@@ -255,7 +255,7 @@ class _Writer:
             carrier, position = self.elements[waypoint.side_point.body], np.array(waypoint.side_point.position)
         else:
             return {"geom": label}
-        side = f"{full}_side" if f"{label}_side" in self.names else f"{label}_side"
+        side = f"{full_name}_side" if f"{label}_side" in self.names else f"{label}_side"
         self.names.add(side)
         ET.SubElement(carrier, "site", name=side, pos=numbers(*position))
         return {"geom": label, "sidesite": side}

@@ -8,12 +8,12 @@ from pydantic import ValidationError
 from finger_pin.description.caching import cached_property
 from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.description.tree_actuators import Muscle
-from finger_pin.exchange.mujoco_names import Table, free_name, model_name
+from finger_pin.exchange.mujoco_names import Table, model_name, unused_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
 from finger_pin.typing import Array
 
-# What forces are at most, N.
-_LARGE = 1e9
+# Limit of a force that has none, N.
+_LARGEST_FORCE = 1e9
 
 
 def _affine(gain: float, offset: float, by_length: float, by_speed: float) -> Table:
@@ -24,14 +24,14 @@ def _affine(gain: float, offset: float, by_length: float, by_speed: float) -> Ta
 _PID = ("kp", "ki", "kd", "imax", "slewmax")
 
 
-def _pid(kp: float, ki: float, kd: float, most: float, slew: float, offset: float = 0.0) -> Table | str:
+def _pid(kp: float, ki: float, kd: float, limit: float, slew: float, offset: float = 0.0) -> Table | str:
     """Return the law of a PID actuator, with the derivative of the length alone, or the reason for its lack.
 
     Args:
         kp: Proportional gain.
         ki: Gain of the sum of the error.
         kd: Gain of the speed.
-        most: Of the sum of the error; 0 for no limit.
+        limit: Of the sum of the error; 0 for no limit.
         slew: Largest rate of its input; 0 for no limit.
         offset: Force without input at length zero.
     """
@@ -42,7 +42,7 @@ def _pid(kp: float, ki: float, kd: float, most: float, slew: float, offset: floa
         law["slew"] = slew
     if ki:
         law["integral"] = ki
-    return law | ({"state_range": [-most, most]} if ki and most else {})
+    return law | ({"state_range": [-limit, limit]} if ki and limit else {})
 
 
 class ActuatorReader(ElementReader):
@@ -53,8 +53,8 @@ class ActuatorReader(ElementReader):
         """Supported actuator laws as entries of a description; unsupported ones are listed."""
         laws = {}
         for i in range(getattr(self.model, "nactuator", self.model.nu)):
-            why = is_disabled(self.mujoco, self.model, i) or self._foreign(i)
-            law = self._law(i) if why is None else why
+            reason = is_disabled(self.mujoco, self.model, i) or self._target_problem(i)
+            law = self._law(i) if reason is None else reason
             if isinstance(law, str):
                 self._leave_out(i, law)
             else:
@@ -62,105 +62,108 @@ class ActuatorReader(ElementReader):
         return laws
 
     @cached_property
-    def pulling(self) -> list[int]:
+    def tendon_motors(self) -> list[int]:
         """The motors that can only pull a tendon, through space or around joints."""
-        return [i for i in self.laws if self._pulls(i)]
+        return [i for i in self.laws if self._only_pulls(i)]
 
     def table(self) -> Table:
         """Return all actuators but the motors that only pull tendons, by name."""
         model, actuators = self.model, {}
         self._list_shared_limits()
         for i in self.laws:
-            if i in self.pulling:
+            if i in self.tendon_motors:
                 continue
-            kind, at = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
+            kind, target = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
             of_tendon = kind == self.mujoco.mjtTrn.mjTRN_TENDON
             actuators[i] = {
-                **({"tendon": self.names.tendons[at]} if of_tendon else {"joint": self.names.joints[at]}),
+                **({"tendon": self.names.tendons[target]} if of_tendon else {"joint": self.names.joints[target]}),
                 "gear": float(model.actuator_gear[i, 0]),
                 **self.laws[i],
             }
             if model.actuator_ctrllimited[self._control(i)]:
-                ends = model.actuator_ctrlrange[self._control(i)]
-                actuators[i]["input_range"] = (np.clip(ends, 0.0, 1.0) if "muscle" in actuators[i] else ends).tolist()
-            bounds = self._bounds(i)
-            if np.isfinite(bounds).any() and "muscle" in actuators[i]:
+                limits = model.actuator_ctrlrange[self._control(i)]
+                limits = np.clip(limits, 0.0, 1.0) if "muscle" in actuators[i] else limits
+                actuators[i]["input_range"] = limits.tolist()
+            force_range = self._force_limits(i)
+            if np.isfinite(force_range).any() and "muscle" in actuators[i]:
                 self._leave_out(i, "the limit on a muscle's force")
-            elif np.isfinite(bounds).any():
-                actuators[i]["force_range"] = np.clip(bounds, -_LARGE, _LARGE).tolist()
+            elif np.isfinite(force_range).any():
+                actuators[i]["force_range"] = np.clip(force_range, -_LARGEST_FORCE, _LARGEST_FORCE).tolist()
         return {self.names.actuators[i]: actuator for i, actuator in actuators.items()}
 
     def inputs(self, controls: Array) -> dict[str, float]:
         """Return the inputs for a model's controls, by the names of actuators and of tendons that are pulled."""
         inputs = {}
-        for i in sorted(self.laws, key=self.pulling.__contains__):
+        for i in sorted(self.laws, key=self.tendon_motors.__contains__):
             value = float(controls[self._control(i)])
-            pulls = -float(self.model.actuator_gear[i, 0]) * self.laws[i].get("gain", 0.0)
-            inputs[self._name(i)] = value * pulls if i in self.pulling else value
+            tension_per_input = -float(self.model.actuator_gear[i, 0]) * self.laws[i].get("gain", 0.0)
+            inputs[self._name(i)] = value * tension_per_input if i in self.tendon_motors else value
         return inputs
 
-    def _leave_out(self, i: int, why: str) -> None:
-        self.rest.add(f"actuator {model_name(self.model, 'actuator', i)}: {why}")
+    def _leave_out(self, i: int, reason: str) -> None:
+        self.left_out.add(f"actuator {model_name(self.model, 'actuator', i)}: {reason}")
 
-    def pulled(self) -> Table:
+    def pulled_tendons(self) -> Table:
         """Return the tendons that motors pull, by the names of these."""
         tendons = {}
-        for i in self.pulling:
+        for i in self.tendon_motors:
             name, tendon = self._name(i), int(self.model.actuator_trnid[i, 0])
             same = name == self.names.tendons[tendon]
-            tendons[name] = self._route(tendon, same) | {"maximum_tension": float(max(self._ends(i)))}
+            tendons[name] = self._route(tendon, same) | {"maximum_tension": float(max(self._tension_ends(i)))}
         return tendons
 
     def _name(self, i: int) -> str:
         """Return the name of an actuator, made unique if a motor has that of a tendon it does not pull."""
         name, tendons = self.names.actuators[i], self.names.tendons
-        if i not in self.pulling or name == tendons[self.model.actuator_trnid[i, 0]]:
+        if i not in self.tendon_motors or name == tendons[self.model.actuator_trnid[i, 0]]:
             return name
-        return name if name not in tendons else free_name(name, {*self.names.actuators, *tendons}, "motor")
+        return name if name not in tendons else unused_name(name, {*self.names.actuators, *tendons}, "motor")
 
-    def _ends(self, i: int) -> Array:
+    def _tension_ends(self, i: int) -> Array:
         """Return the tensions of a motor at both ends of its control's range, within its limits, shape (2,), N."""
         exerted = self.laws[i]["gain"] * self.model.actuator_ctrlrange[self._control(i)]
-        return np.asarray(-self.model.actuator_gear[i, 0] * np.clip(exerted, *self._bounds(i)))
+        return np.asarray(-self.model.actuator_gear[i, 0] * np.clip(exerted, *self._force_limits(i)))
 
-    def _bounds(self, i: int) -> tuple[float, float]:
+    def _force_limits(self, i: int) -> tuple[float, float]:
         """Return the limits of an actuator's force, its own and those of the joint or tendon that it alone drives."""
         model, mujoco = self.model, self.mujoco
         low, high = model.actuator_forcerange[i] if model.actuator_forcelimited[i] else (-np.inf, np.inf)
-        at, gear = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0])
-        what = "tendon" if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON else "joint"
-        prefix = "tendon_actfrc" if what == "tendon" else "jnt_actfrc"
-        if getattr(model, f"{prefix}limited")[at] and gear and self._drivers(what, at) == [i]:
-            ends = sorted(getattr(model, f"{prefix}range")[at] / gear)
+        target, gear = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0])
+        kind = "tendon" if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON else "joint"
+        prefix = "tendon_actfrc" if kind == "tendon" else "jnt_actfrc"
+        if getattr(model, f"{prefix}limited")[target] and gear and self._drivers(kind, target) == [i]:
+            ends = sorted(getattr(model, f"{prefix}range")[target] / gear)
             low, high = max(low, ends[0]), min(high, ends[1])
         return float(low), float(high)
 
     def _list_shared_limits(self) -> None:
         """List the joints and tendons with a limit on what actuators exert, other than that of their only drive."""
         model = self.model
-        for what, limited in (("joint", model.jnt_actfrclimited), ("tendon", model.tendon_actfrclimited)):
-            for at in (int(each) for each in np.flatnonzero(limited)):
-                drivers, name = self._drivers(what, at), model_name(model, what, at)
-                if len(drivers) > 1 or any(self._drives(i) != (what, at) for i in drivers):
-                    self.rest.add(f"{what} {name}: a limit on what actuators exert on it together")
-                if what == "joint" and model.jnt_actgravcomp[at] and model.body_gravcomp.any():
-                    self.rest.add(f"joint {name}: its gravity compensation counts as its actuators', which are limited")
+        for kind, limited in (("joint", model.jnt_actfrclimited), ("tendon", model.tendon_actfrclimited)):
+            for target in (int(each) for each in np.flatnonzero(limited)):
+                drivers, name = self._drivers(kind, target), model_name(model, kind, target)
+                if len(drivers) > 1 or any(self._drives(i) != (kind, target) for i in drivers):
+                    self.left_out.add(f"{kind} {name}: a limit on what actuators exert on it together")
+                if kind == "joint" and model.jnt_actgravcomp[target] and model.body_gravcomp.any():
+                    reason = "its gravity compensation counts as its actuators', which are limited"
+                    self.left_out.add(f"joint {name}: {reason}")
 
-    def _drivers(self, what: str, at: int) -> list[int]:
+    def _drivers(self, kind: str, target: int) -> list[int]:
         """Return the actuators that exert a force on a tendon, or on a joint by itself or by tendons."""
-        targets = {(what, at)}
-        if what == "joint":
-            targets |= {("tendon", i) for i, moved in enumerate(self._moved) if int(self.model.jnt_dofadr[at]) in moved}
+        targets = {(kind, target)}
+        if kind == "joint":
+            dof = int(self.model.jnt_dofadr[target])
+            targets |= {("tendon", i) for i, moved in enumerate(self._moved_dofs) if dof in moved}
         return [i for i in self.laws if self._drives(i) in targets]
 
     @cached_property
-    def _moved(self) -> list[set[int]]:
+    def _moved_dofs(self) -> list[set[int]]:
         """The degrees of freedom that each tendon's force acts on."""
         data = self.mujoco.MjData(self.model)
         self.mujoco.mj_fwdPosition(self.model, data)
         # Older versions have the pattern in the data.
-        where = self.model if hasattr(self.model, "ten_J_rowadr") else data
-        first, count, column = where.ten_J_rowadr, where.ten_J_rownnz, where.ten_J_colind
+        source = self.model if hasattr(self.model, "ten_J_rowadr") else data
+        first, count, column = source.ten_J_rowadr, source.ten_J_rownnz, source.ten_J_colind
         return [set(column.ravel()[a : a + n].tolist()) for a, n in zip(first, count, strict=True)]
 
     def _drives(self, i: int) -> tuple[str, int]:
@@ -168,27 +171,27 @@ class ActuatorReader(ElementReader):
         of_tendon = self.model.actuator_trntype[i] == self.mujoco.mjtTrn.mjTRN_TENDON
         return "tendon" if of_tendon else "joint", int(self.model.actuator_trnid[i, 0])
 
-    def _route(self, tendon: int, same: bool) -> Table:
+    def _route(self, tendon: int, same_name: bool) -> Table:
         """Return the path of a tendon; if it has another name, the joints that it crosses and that bend it."""
-        around = self._around(tendon)
-        if same or not around:
+        fixed_joints = self._fixed_joints(tendon)
+        if same_name or not fixed_joints:
             return {"along": self.names.tendons[tendon]}
-        return {"crossings": {self.names.joints[j]: {"radius": -arm, "bends": True} for j, arm in around.items()}}
+        return {"crossings": {self.names.joints[j]: {"radius": -arm, "bends": True} for j, arm in fixed_joints.items()}}
 
-    def _around(self, tendon: int) -> dict[int, float]:
+    def _fixed_joints(self, tendon: int) -> dict[int, float]:
         """Return the joints that a fixed tendon runs over, and its coefficients; none of one through space."""
         model = self.model
         pieces = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
         fixed = model.wrap_type[pieces[0]] == self.mujoco.mjtWrap.mjWRAP_JOINT
         return {int(model.wrap_objid[k]): float(model.wrap_prm[k]) for k in pieces} if fixed else {}
 
-    def _foreign(self, i: int) -> str | None:
+    def _target_problem(self, i: int) -> str | None:
         """Return the reason against carrying an actuator's target or computation over, or None."""
         model, mujoco = self.model, self.mujoco
-        driven = mujoco.mjtTrn(int(model.actuator_trntype[i])).name.removeprefix("mjTRN_").lower()
-        if driven not in ("joint", "jointinparent", "tendon"):
-            return f"it drives a {driven}"
-        if driven != "tendon" and model.jnt_type[model.actuator_trnid[i, 0]] == mujoco.mjtJoint.mjJNT_FREE:
+        target = mujoco.mjtTrn(int(model.actuator_trntype[i])).name.removeprefix("mjTRN_").lower()
+        if target not in ("joint", "jointinparent", "tendon"):
+            return f"it drives a {target}"
+        if target != "tendon" and model.jnt_type[model.actuator_trnid[i, 0]] == mujoco.mjtJoint.mjJNT_FREE:
             return "it drives a free joint"
         return None
 
@@ -202,8 +205,8 @@ class ActuatorReader(ElementReader):
         if kind == "muscle":
             return self._muscle(i)
         if kind == "pid" and not any(bias[3:]):
-            most, slew = model.actuator_dynprm[i, :2].tolist()
-            return _pid(-bias[1], gain[0], -bias[2], most, slew, bias[0])
+            limit, slew = model.actuator_dynprm[i, :2].tolist()
+            return _pid(-bias[1], gain[0], -bias[2], limit, slew, bias[0])
         state = self._state(i)
         if isinstance(state, str):
             return state + (f", of kind {kind}" if kind != "fixed" else "")
@@ -221,8 +224,8 @@ class ActuatorReader(ElementReader):
         """Return the numbers of a muscle, or the reason for their lack."""
         model, gain = self.model, self.model.actuator_gainprm[i]
         same_bias = np.array_equal(gain[:9], model.actuator_biasprm[i, :9])
-        whole = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_MUSCLE and model.actuator_actnum[i] == 1
-        if not (same_bias and whole and model.actuator_dyntype[i] == self.mujoco.mjtDyn.mjDYN_MUSCLE):
+        is_muscle = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_MUSCLE and model.actuator_actnum[i] == 1
+        if not (same_bias and is_muscle and model.actuator_dyntype[i] == self.mujoco.mjtDyn.mjDYN_MUSCLE):
             return "only a part of it is a muscle"
         if model.actuator_actlimited[i] and (model.actuator_actrange[i] != [0.0, 1.0]).any():
             return "the activation of a muscle is limited to other than 0 and 1"
@@ -265,9 +268,9 @@ class ActuatorReader(ElementReader):
             return "a plugin computes it"
         if model.actuator_dyntype[i] != self.mujoco.mjtDyn.mjDYN_NONE:
             return "its PID has an input that comes late"
-        kp, ki, kd, most, slew = (numbers.get(key, 0.0) for key in _PID)
+        kp, ki, kd, limit, slew = (numbers.get(key, 0.0) for key in _PID)
         # The plugin limits the force of the sum, actuators of kind pid the sum itself.
-        return _pid(kp, ki, kd, most / (ki or 1.0), slew)
+        return _pid(kp, ki, kd, limit / (ki or 1.0), slew)
 
     def _delay(self, i: int) -> Table:
         delay = getattr(self.model, "actuator_delay", None)
@@ -278,9 +281,9 @@ class ActuatorReader(ElementReader):
         first = getattr(self.model, "actuator_ctrladr", None)
         return i if first is None else int(first[i])
 
-    def _pulls(self, i: int) -> bool:
+    def _only_pulls(self, i: int) -> bool:
         model, mujoco = self.model, self.mujoco
-        at, control = int(model.actuator_trnid[i, 0]), self._control(i)
+        tendon, control = int(model.actuator_trnid[i, 0]), self._control(i)
         if (
             model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_TENDON
             or set(key for key, value in self.laws[i].items() if value) - {"gain"}
@@ -288,9 +291,9 @@ class ActuatorReader(ElementReader):
         ):
             return False
         # What is no radius of a hinge is a transmission, and no tendon.
-        for joint, arm in self._around(at).items():
+        for joint, arm in self._fixed_joints(tendon).items():
             if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or abs(arm) > LARGEST_RADIUS:
                 return False
-        ends = self._ends(i)
+        ends = self._tension_ends(i)
         # One that never lets go has a range of inputs, as other actuators.
         return bool(np.min(ends) == 0.0 and np.any(ends))

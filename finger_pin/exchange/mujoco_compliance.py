@@ -10,16 +10,16 @@ from finger_pin.exchange.mujoco_names import Table
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
 
-# Between these MuJoCo keeps the impedance.
-_IMPEDANCES = 1e-4, 0.9999
-#: Speed of an impact that contacts throw back alike, m/s, and the least share of it.
-IMPACT, LEAST_SHARE = 0.1, 0.05
-# What descriptions have at most, N/m or N m/rad.
-_STIFFEST = 1e7
+# Range to which MuJoCo clips the impedance.
+_IMPEDANCE_RANGE = 1e-4, 0.9999
+#: Speed of the impact at which restitution is matched, m/s, and the least restitution.
+IMPACT_SPEED, LEAST_RESTITUTION = 0.1, 0.05
+# Greatest stiffness of descriptions, N/m or N m/rad.
+_MAX_STIFFNESS = 1e7
 
 
 def soft_spring(
-    read: ElementReader, what: str, solref: Array, solimp: Array, mobility: float, stop: bool = False
+    reader: ElementReader, element: str, solref: Array, solimp: Array, mobility: float, stop: bool = False
 ) -> tuple[float, float]:
     """Return stiffness and damping of a constraint that gives by more than the width in `solimp`, SI.
 
@@ -30,30 +30,31 @@ def soft_spring(
     of the inertia that meets it. What is stiffer than descriptions have is listed, by the name of its element.
 
     Args:
-        read: The model.
-        what: Name of the element, for the list.
+        reader: The model.
+        element: Name of the element, for the list.
         solref: Time constant and damping ratio, or stiffness and damping per mass, both negative.
         solimp: Impedance; the second number is that of large deflections.
         mobility: Acceleration per force along the constraint, as MuJoCo approximates it, 1/kg or 1/(kg m2).
         stop: Whether it bounces.
     """
-    spring, damper, stiffness, damping = _unbounded(read, solref, solimp, mobility)
-    if spring > _STIFFEST:
-        read.rest.add(f"{what}: stiffness {spring:.2g} by its solref and solimp, {_STIFFEST:.2g} here", moves=False)
-        spring = _STIFFEST
+    spring, damper, stiffness, damping = _springs(reader, solref, solimp, mobility)
+    if spring > _MAX_STIFFNESS:
+        line = f"{element}: stiffness {spring:.2g} by its solref and solimp, {_MAX_STIFFNESS:.2g} here"
+        reader.left_out.add(line, moves=False)
+        spring = _MAX_STIFFNESS
     if stop and mobility > 0.0:
         damper = damping * math.sqrt(spring / (stiffness * mobility))
-    return spring, min(damper, _STIFFEST)
+    return spring, min(damper, _MAX_STIFFNESS)
 
 
-def contact_numbers(read: ElementReader, solref: Array, solimp: Array, mobility: float) -> tuple[float, float]:
+def contact_numbers(reader: ElementReader, solref: Array, solimp: Array, mobility: float) -> tuple[float, float]:
     """Return the stiffness of a contact without friction, N/m, as that of `soft_spring`, and its damping, s/m.
 
     Damping grows with the depth here, and does not in MuJoCo: an impact at 0.1 m/s is thrown back at the same speed.
     """
-    spring, _, stiffness, damping = _unbounded(read, solref, solimp, mobility)
+    spring, _, stiffness, damping = _springs(reader, solref, solimp, mobility)
     share = restitution(0.5 * damping / math.sqrt(stiffness))
-    return spring, impact_damping(max(share, LEAST_SHARE)) / IMPACT
+    return spring, impact_damping(max(share, LEAST_RESTITUTION)) / IMPACT_SPEED
 
 
 def restitution(ratio: float) -> float:
@@ -79,20 +80,20 @@ def impact_damping(share: float) -> float:
     if share > 0.999:
         return 1.5 * (1.0 - share)
 
-    def gap(speed: float) -> float:
+    def residual(speed: float) -> float:
         return speed * (1.0 + share) - math.log((1.0 + speed) / (1.0 - share * speed))
 
-    return float(brentq(gap, 1e-6, (1.0 - 1e-15) / share))
+    return float(brentq(residual, 1e-6, (1.0 - 1e-15) / share))
 
 
-def _unbounded(read: ElementReader, solref: Array, solimp: Array, mobility: float) -> tuple[float, float, float, float]:
+def _springs(reader: ElementReader, solref: Array, solimp: Array, mobility: float) -> tuple[float, float, float, float]:
     """Return stiffness and damping at any mobility, and MuJoCo's k and b."""
-    impedance = min(max(float(solimp[1]), _IMPEDANCES[0]), _IMPEDANCES[1])
+    impedance = min(max(float(solimp[1]), _IMPEDANCE_RANGE[0]), _IMPEDANCE_RANGE[1])
     first, second = float(solref[0]), float(solref[1])
     if first > 0.0:
-        if not read.model.opt.disableflags & int(read.mujoco.mjtDisableBit.mjDSBL_REFSAFE):
+        if not reader.model.opt.disableflags & int(reader.mujoco.mjtDisableBit.mjDSBL_REFSAFE):
             # MuJoCo takes no shorter time constant.
-            first = max(first, 2.0 * float(read.model.opt.timestep))
+            first = max(first, 2.0 * float(reader.model.opt.timestep))
         stiffness, damping = 1.0 / (impedance * first * second) ** 2, 2.0 / (impedance * first)
     else:
         stiffness, damping = -first / impedance**2, abs(second) / impedance
@@ -100,13 +101,14 @@ def _unbounded(read: ElementReader, solref: Array, solimp: Array, mobility: floa
     return stiffness * impedance * inertia, damping * inertia, stiffness, damping
 
 
-def read_stops(read: ElementReader, joints: Table) -> Table:
+def read_stops(reader: ElementReader, joints: Table) -> Table:
     """Return the stroke limiters of joints by their names; free bodies have none."""
-    model, numbers = read.model, []
+    model, numbers = reader.model, []
     for name in joints:
-        i = read.names.joints.index(name) if joints[name]["limited"] else None
-        soft = None if i is None else (model.jnt_solref[i], model.jnt_solimp[i])
+        i = reader.names.joints.index(name) if joints[name]["limited"] else None
+        softness = None if i is None else (model.jnt_solref[i], model.jnt_solimp[i])
         mobility = 0.0 if i is None else float(model.dof_invweight0[model.jnt_dofadr[i]])
-        numbers.append(soft_spring(read, f"stops of joint {name}", *soft, mobility, stop=True) if soft else (0.0, 0.0))
+        stop = f"stops of joint {name}"
+        numbers.append(soft_spring(reader, stop, *softness, mobility, stop=True) if softness else (0.0, 0.0))
     stiffness, viscous = zip(*numbers, strict=True)
     return {"stiffness": [*stiffness], "damping": 0.0, "viscous": [*viscous]} if any(stiffness) else {}

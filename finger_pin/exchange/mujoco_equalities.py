@@ -12,8 +12,8 @@ from finger_pin.exchange.mujoco_compliance import soft_spring
 from finger_pin.exchange.mujoco_names import Table, distinct, model_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader
 
-# Of the points that a weld holds, the least distance from their middle, m.
-_WELD = 1e-3
+# Least distance of a weld's three points from their middle, m.
+_LEAST_ARM = 1e-3
 
 
 def linked_bodies(mujoco: Any, model: Any) -> set[int]:
@@ -28,13 +28,13 @@ def linked_bodies(mujoco: Any, model: Any) -> set[int]:
 def _bodies(mujoco: Any, model: Any, i: int) -> list[int]:
     """Return the bodies of a connection or weld."""
     of_sites = model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE
-    both = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
-    return [int(model.site_bodyid[each]) if of_sites else each for each in both]
+    ids = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+    return [int(model.site_bodyid[each]) if of_sites else each for each in ids]
 
 
-def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
+def read_equalities(reader: ElementReader) -> tuple[Table, Table, Table]:
     """Return couplings of joints, loops, and the tendons that stand for equalities of tendons, each by name."""
-    mujoco, model, rest = read.mujoco, read.model, read.rest
+    mujoco, model, left_out = reader.mujoco, reader.model, reader.left_out
     couplings: Table = {}
     loops: Table = {}
     tendons: Table = {}
@@ -42,32 +42,32 @@ def read_equalities(read: ElementReader) -> tuple[Table, Table, Table]:
         name = model_name(model, "equality", i)
         kind = mujoco.mjtEq(int(model.eq_type[i])).name.removeprefix("mjEQ_").lower()
         if kind in ("connect", "weld"):
-            points = _points(read, i)
+            points = _points(reader, i)
             loops |= {f"{name}_{k}" if len(points) > 1 else name: point for k, point in enumerate(points)}
         elif kind == "joint":
-            couplings[name] = _coupling(read, i)
+            couplings[name] = _coupling(reader, i)
         elif kind != "tendon":
-            rest.add(f"equality {name}: of kind {kind}")
+            left_out.add(f"equality {name}: of kind {kind}")
         elif np.any(model.eq_data[i, 2:5]):
-            rest.add(f"equality {name}: its polynomial is not linear")
-        elif any(_spatial(mujoco, model, t) for t in _both(model, i)):
-            rest.add(f"equality {name}: of tendons through space")
+            left_out.add(f"equality {name}: its polynomial is not linear")
+        elif any(model.wrap_type[model.tendon_adr[_elements(model, i)]] != mujoco.mjtWrap.mjWRAP_JOINT):
+            left_out.add(f"equality {name}: of tendons through space")
         else:
-            tendons[name] = _difference(read, i)
-    return _renamed(couplings), _renamed(loops), _renamed(tendons)
+            tendons[name] = _difference(reader, i)
+    return _with_entry_names(couplings), _with_entry_names(loops), _with_entry_names(tendons)
 
 
-def _points(read: ElementReader, i: int) -> list[Table]:
+def _points(reader: ElementReader, i: int) -> list[Table]:
     """Return the points that a connection holds together, three for a weld."""
-    mujoco, model = read.mujoco, read.model
+    mujoco, model = reader.mujoco, reader.model
     first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     of_sites, bodies = model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE, _bodies(mujoco, model, i)
-    if not any(read.moves[bodies]):
+    if not any(reader.moves[bodies]):
         return []  # Both stand still.
     numbers = model.eq_data[i]
     if model.eq_type[i] == mujoco.mjtEq.mjEQ_CONNECT:
         places = [model.site_pos[first], model.site_pos[second]] if of_sites else [numbers[:3], numbers[3:6]]
-        return [_loop(read, i, bodies, places)]
+        return [_loop(reader, i, bodies, places)]
     # A frame of the second body and one of the first stay together: three points of them do.
     frames = [np.eye(3), np.eye(3)]
     if of_sites:
@@ -79,12 +79,10 @@ def _points(read: ElementReader, i: int) -> list[Table]:
     # Three springs of k / 3 at a distance s turn back with k s^2 / 2 about axes in their plane, and k s^2 across it.
     # MuJoCo has the scaled sine of half the angle, which is 1/4 of a spring of the turns' mobility.
     along, about = np.sum(model.body_invweight0[bodies], axis=0)
-    size = float(numbers[10]) * math.sqrt(along / (3.0 * about)) if about > 0.0 else _WELD
-    corners = max(size, _WELD) * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
-    return [
-        _loop(read, i, bodies, [place + frame @ corner for place, frame in zip(places, frames, strict=True)], 3.0)
-        for corner in corners
-    ]
+    size = float(numbers[10]) * math.sqrt(along / (3.0 * about)) if about > 0.0 else _LEAST_ARM
+    corners = max(size, _LEAST_ARM) * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
+    poses = list(zip(places, frames, strict=True))
+    return [_loop(reader, i, bodies, [place + frame @ corner for place, frame in poses], 3.0) for corner in corners]
 
 
 def _matrix(mujoco: Any, quaternion: Any) -> Any:
@@ -93,47 +91,43 @@ def _matrix(mujoco: Any, quaternion: Any) -> Any:
     return matrix.reshape(3, 3)
 
 
-def _loop(read: ElementReader, i: int, bodies: list[int], places: list[Any], shared: float = 1.0) -> Table:
+def _loop(reader: ElementReader, i: int, bodies: list[int], places: list[Any], divisor: float = 1.0) -> Table:
     """Return two points that stay together; the body that moves is the first."""
-    model, names = read.model, read.names
-    pairs = sorted(zip(bodies, places, strict=True), key=lambda pair: (not read.moves[pair[0]], -pair[0]))
-    (body, place), (other, there) = pairs
+    model, names = reader.model, reader.names
+    pairs = sorted(zip(bodies, places, strict=True), key=lambda pair: (not reader.moves[pair[0]], -pair[0]))
+    (body, place), (other, other_place) = pairs
     mobility = float(np.sum(model.body_invweight0[bodies, 0]))
     # A body that turns about its mass centre alone has none.
     mobility = mobility or 1.0 / float(np.sum(model.body_mass[bodies]))
-    spring = _spring(read, i, mobility)
+    spring = _spring(reader, i, mobility)
     return {
         "body": names.bodies[body],
         **names.carrier(other, "other"),
         "position": [float(each) for each in place],
-        "other_position": [float(each) for each in there],
-        **{key: each / shared for key, each in spring.items()},
+        "other_position": [float(each) for each in other_place],
+        **{key: each / divisor for key, each in spring.items()},
     }
 
 
-def _renamed(entries: Table) -> Table:
+def _with_entry_names(entries: Table) -> Table:
     return dict(zip(distinct("equality", list(entries)), entries.values(), strict=True))
 
 
-def _both(model: Any, i: int) -> list[int]:
+def _elements(model: Any, i: int) -> list[int]:
     """Return the elements of an equality: one or two."""
     return [int(each[i]) for each in (model.eq_obj1id, model.eq_obj2id) if each[i] >= 0]
 
 
-def _spatial(mujoco: Any, model: Any, tendon: int) -> bool:
-    return bool(model.wrap_type[model.tendon_adr[tendon]] != mujoco.mjtWrap.mjWRAP_JOINT)
-
-
-def _spring(read: ElementReader, i: int, mobility: float) -> Table:
-    model = read.model
-    what = f"equality {model_name(read.model, 'equality', i)}"
-    stiffness, damping = soft_spring(read, what, model.eq_solref[i], model.eq_solimp[i], mobility)
+def _spring(reader: ElementReader, i: int, mobility: float) -> Table:
+    model = reader.model
+    element = f"equality {model_name(reader.model, 'equality', i)}"
+    stiffness, damping = soft_spring(reader, element, model.eq_solref[i], model.eq_solimp[i], mobility)
     return {"stiffness": stiffness, "damping": damping}
 
 
-def _coupling(read: ElementReader, i: int) -> Table:
+def _coupling(reader: ElementReader, i: int) -> Table:
     """Return an equality of a joint with another, or with a number."""
-    model, names = read.model, read.names
+    model, names = reader.model, reader.names
     first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     q0 = model.qpos0[model.jnt_qposadr]
     # From the references of both.
@@ -147,32 +141,32 @@ def _coupling(read: ElementReader, i: int) -> Table:
         offset = float(q0[first]) + coefficients[0]
         if any(coefficients[2:]):
             other["powers"] = coefficients[2 : len(powers.coef)]
-            _list_turns(read, i, second)
-    both = model.jnt_dofadr[[each for each in (first, second) if each >= 0]]
-    spring = _spring(read, i, float(np.sum(model.dof_invweight0[both])))
+            _list_multiturn(reader, i, second)
+    dofs = model.jnt_dofadr[[each for each in (first, second) if each >= 0]]
+    spring = _spring(reader, i, float(np.sum(model.dof_invweight0[dofs])))
     return {"joint": names.joints[first], "offset": offset, **spring, **other}
 
 
-def _list_turns(read: ElementReader, i: int, joint: int) -> None:
+def _list_multiturn(reader: ElementReader, i: int, joint: int) -> None:
     """List a polynomial of the angle of a hinge that may turn by more than half a turn from its range's middle."""
-    model = read.model
-    hinge = model.jnt_type[joint] == read.mujoco.mjtJoint.mjJNT_HINGE
+    model = reader.model
+    hinge = model.jnt_type[joint] == reader.mujoco.mjtJoint.mjJNT_HINGE
     half = 0.5 * float(np.ptp(model.jnt_range[joint])) if model.jnt_limited[joint] else math.inf
     if hinge and half > math.pi:
-        name, what = model_name(model, "equality", i), model_name(model, "joint", joint)
-        read.rest.add(f"equality {name}: powers of the angle of {what} repeat beyond half a turn")
+        name, joint_name = model_name(model, "equality", i), model_name(model, "joint", joint)
+        reader.left_out.add(f"equality {name}: powers of the angle of {joint_name} repeat beyond half a turn")
 
 
-def _difference(read: ElementReader, i: int) -> Table:
+def _difference(reader: ElementReader, i: int) -> Table:
     """Return an equality of fixed tendons as a spring of a tendon as long as their difference."""
-    model = read.model
-    tendons, ratios = _both(model, i), (1.0, -float(model.eq_data[i, 1]))
+    model = reader.model
+    tendons, ratios = _elements(model, i), (1.0, -float(model.eq_data[i, 1]))
     coefficients: dict[str, float] = {}
     rest, mobility = float(model.eq_data[i, 0]), 0.0
     for tendon, ratio in zip(tendons, ratios, strict=False):
         rest += ratio * float(model.tendon_length0[tendon])
         mobility += float(model.tendon_invweight0[tendon])
         for k in range(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon]):
-            joint = read.names.joints[model.wrap_objid[k]]
+            joint = reader.names.joints[model.wrap_objid[k]]
             coefficients[joint] = coefficients.get(joint, 0.0) + ratio * float(model.wrap_prm[k])
-    return {"joints": coefficients, "rest": [rest, rest], **_spring(read, i, mobility)}
+    return {"joints": coefficients, "rest": [rest, rest], **_spring(reader, i, mobility)}

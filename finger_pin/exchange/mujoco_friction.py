@@ -67,7 +67,7 @@ class Coefficients(NamedTuple):
 
 
 class ElementPlaces(NamedTuple):
-    """Places of the first elements of a friction, named after what they carry; elements of `more` follow."""
+    """Places of the first elements of a friction, named after what they carry; elements of `linked` follow."""
 
     length: int
     ratio: int
@@ -111,10 +111,10 @@ class PluginFriction:
         row_of_joint: Whether that is a joint.
         ratio: Its speed over the row's.
         law: Coefficients of its law.
-        more: Elements that bend or load it: whether it is a joint, its name, and a number.
+        linked: Elements that bend or load it: whether it is a joint, its name, and a number.
         share: Of a `LINK`, tension over the joint's drive: one over the arm and the number of tendons that pull the
             same way; negative where another one pulls the other way, so that it is slack while that is driven. Of a
-            `BRANCH`, how many frictions before it that of its tendon stands, which is the first of ``more``, with one
+            `BRANCH`, how many frictions before it that of its tendon stands, which is the first of ``linked``, with one
             over the pulley's divisor.
         constrained: Whether a tendon has a limit or an equality, which pull it too.
     """
@@ -125,7 +125,7 @@ class PluginFriction:
     row_of_joint: bool
     ratio: float
     law: Coefficients
-    more: tuple[tuple[bool, str, float], ...] = ()
+    linked: tuple[tuple[bool, str, float], ...] = ()
     share: float = 0.0
     constrained: bool = False
 
@@ -135,20 +135,20 @@ class PluginFriction:
         return self.kind not in (TENDON, LINK, BRANCH)
 
     @property
-    def least(self) -> float:
+    def least_level(self) -> float:
         """The level without load, N or N m."""
         return max(self.law.floor, self.law.drag)
 
     def elements(self) -> Iterator[tuple[str, str, float]]:
         """Yield the elements of the table: kind and name of an object, and a number."""
         owner = "joint" if self.of_joint else "tendon"
-        length, kind, loads = float(HEAD + len(self.more)), float(self.kind), float(self.loads)
+        length, kind, loads = float(HEAD + len(self.linked)), float(self.kind), float(self.loads)
         carried = {"length": length, "ratio": self.ratio, "kind": kind, "share": self.share, "loads": loads}
         carried |= self.law._asdict()
         row = ("joint" if self.row_of_joint else "tendon"), self.row
         for name in ElementPlaces._fields:
             yield *(row if name == "ratio" else (owner, self.name)), carried[name]
-        for of_joint, name, value in self.more:
+        for of_joint, name, value in self.linked:
             yield ("joint" if of_joint else "tendon"), name, value
 
     @property

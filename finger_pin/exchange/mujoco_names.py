@@ -74,6 +74,6 @@ def distinct(what: str, names: list[str]) -> list[str]:
     return entries
 
 
-def free_name(name: str, used: Container[str], what: str) -> str:
+def unused_name(name: str, used: Container[str], what: str) -> str:
     """Return an unused name: the kind of element is appended if the name is taken."""
-    return free_name(f"{name}_{what}", used, what) if name in used else name
+    return unused_name(f"{name}_{what}", used, what) if name in used else name

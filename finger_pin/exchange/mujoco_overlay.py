@@ -16,7 +16,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.files import read_text
 
 
-class LaidTendon(TreeTendon):
+class AddedTendon(TreeTendon):
     """A tendon of the tree that a motor pulls."""
 
     pull: Annotated[float, real(0.0, 1e6)] = quantity(
@@ -24,7 +24,7 @@ class LaidTendon(TreeTendon):
     )
 
     @model_validator(mode="after")
-    def _of_mujoco(self) -> Self:
+    def _check_mujoco(self) -> Self:
         if self.slack is not None:
             raise problem("slack", "is not for MuJoCo's springs, which have a rest", self.slack)
         if self.joints is not None and self.path is not None:
@@ -50,19 +50,19 @@ def add_tendons(spec: Any, tendons: Mapping[str, Mapping[str, Any]] | str | Path
     import mujoco
 
     for name, table in _tables(tendons).items():
-        laid = validate(LaidTendon, dict(table), ("tendons", name))
+        added = validate(AddedTendon, dict(table), ("tendons", name))
         if spec.tendon(name) is not None:
             raise InputError(f"tendons.{name}", "the model has a tendon of this name")
         tendon = spec.add_tendon(name=name)
-        for joint, radius in (laid.joints or {}).items():
-            _named(spec.joint(joint), spec.joints, f"tendons.{name}.joints.{joint}", "joint")
+        for joint, radius in (added.joints or {}).items():
+            _check_exists(spec.joint(joint), spec.joints, f"tendons.{name}.joints.{joint}", "joint")
             tendon.wrap_joint(joint, radius)
-        for place, point in (laid.path or {}).items():
-            _lay_point(mujoco, spec, tendon, f"{name}_{place}", point, f"tendons.{name}.path.{place}")
-        _add_numbers(tendon, laid)
-        if laid.pull > 0.0:
+        for place, point in (added.path or {}).items():
+            _add_waypoint(mujoco, spec, tendon, f"{name}_{place}", point, f"tendons.{name}.path.{place}")
+        _add_numbers(tendon, added)
+        if added.pull > 0.0:
             motor = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_TENDON, target=name)
-            motor.gear, motor.ctrllimited, motor.ctrlrange = [-1.0, 0, 0, 0, 0, 0], 1, [0.0, laid.pull]
+            motor.gear, motor.ctrllimited, motor.ctrlrange = [-1.0, 0, 0, 0, 0, 0], 1, [0.0, added.pull]
 
 
 def _tables(tendons: Mapping[str, Mapping[str, Any]] | str | Path) -> Mapping[str, Mapping[str, Any]]:
@@ -78,20 +78,20 @@ def _tables(tendons: Mapping[str, Mapping[str, Any]] | str | Path) -> Mapping[st
     return tables
 
 
-def _named(element: Any, elements: Any, entry: str, what: str) -> None:
+def _check_exists(element: Any, elements: Any, entry: str, what: str) -> None:
     if element is None:
         names = [each.name for each in elements if each.name]
         hint = suggestion(entry.rsplit(".", 1)[1], names)
         raise InputError(entry, f"no such {what}; there are {', '.join(names) or 'none'}{hint}")
 
 
-def _lay_point(mujoco: Any, spec: Any, tendon: Any, name: str, point: Any, entry: str) -> None:
+def _add_waypoint(mujoco: Any, spec: Any, tendon: Any, name: str, point: Any, entry: str) -> None:
     """Add a piece of a path: a site, a geom that only wraps, or a pulley."""
     if point.kind == "pulley":
         tendon.wrap_pulley(point.divisor)
         return
     body = spec.worldbody if point.body is None else spec.body(point.body)
-    _named(body, spec.bodies, f"{entry}.{point.body}", "body")
+    _check_exists(body, spec.bodies, f"{entry}.{point.body}", "body")
     if point.kind == "point":
         body.add_site(name=name, pos=point.position)
         tendon.wrap_site(name)
@@ -109,12 +109,12 @@ def _lay_point(mujoco: Any, spec: Any, tendon: Any, name: str, point: Any, entry
     tendon.wrap_geom(name, side)
 
 
-def _add_numbers(tendon: Any, laid: LaidTendon) -> None:
+def _add_numbers(tendon: Any, added: AddedTendon) -> None:
     """Set spring, damper, range and friction of a tendon."""
-    tendon.stiffness = np.append(laid.stiffness, np.zeros(len(np.atleast_1d(tendon.stiffness)) - 1))
-    tendon.damping = np.append(laid.damping, np.zeros(len(np.atleast_1d(tendon.damping)) - 1))
-    tendon.frictionloss = laid.friction
-    if laid.stiffness > 0.0:
-        tendon.springlength = laid.rest
-    if laid.range is not None:
-        tendon.limited, tendon.range = 1, laid.range
+    tendon.stiffness = np.append(added.stiffness, np.zeros(len(np.atleast_1d(tendon.stiffness)) - 1))
+    tendon.damping = np.append(added.damping, np.zeros(len(np.atleast_1d(tendon.damping)) - 1))
+    tendon.frictionloss = added.friction
+    if added.stiffness > 0.0:
+        tendon.springlength = added.rest
+    if added.range is not None:
+        tendon.limited, tendon.range = 1, added.range

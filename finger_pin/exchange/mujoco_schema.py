@@ -135,10 +135,10 @@ def kind_of(path: tuple[str, ...], attribute: str) -> Kind | None:
         return "idle"
     for end in range(len(path), 0, -1):
         keys = ("/".join(path[max(end - 2, 0) : end]), path[end - 1])
-        known = next((SCHEMA[key] for key in keys if key in SCHEMA), None)
-        if known is not None:
-            whole: Kind | None = next((kind for kind, names in known.items() if names == ALL), None)
-            listed: Kind | None = next((kind for kind, names in known.items() if attribute in names.split()), None)
+        kinds = next((SCHEMA[key] for key in keys if key in SCHEMA), None)
+        if kinds is not None:
+            element_kind: Kind | None = next((kind for kind, names in kinds.items() if names == ALL), None)
+            listed = (kind for kind, names in kinds.items() if attribute in names.split())
             # Children are as an element of which all is the same.
-            return (listed if end == len(path) else None) or whole
+            return (next(listed, None) if end == len(path) else None) or element_kind
     return None

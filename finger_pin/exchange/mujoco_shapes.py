@@ -7,25 +7,25 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.objects import Object
-from finger_pin.exchange.mujoco_names import Table, free_name, model_name, quaternion
+from finger_pin.exchange.mujoco_names import Table, model_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_pairs import Pairs
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.mechanism.tendon_paths import rotation
 
-# How deep bodies may be in each other at the start, as contacts have it, m.
-_DEEPEST = 1e-3
-# Part of the largest moment of inertia, and distance, m, by which a free body may differ from an even solid.
-_UNEVEN = 1e-9
+# Greatest penetration of bodies at the start, m.
+_MAX_PENETRATION = 1e-3
+# Difference of a free body from an even solid: in moments of inertia, part of the largest, and in mass centre, m.
+_INERTIA_TOLERANCE = 1e-9
 
 
 class Shapes:
     """Colliding spheres, capsules, boxes, cylinders and ellipsoids; other colliding geoms are listed by name."""
 
-    def __init__(self, read: ElementReader) -> None:
+    def __init__(self, reader: ElementReader) -> None:
         """Read the geoms of a model."""
-        mujoco, model = read.mujoco, read.model
-        self.mujoco, self.model, self.names, self.rest = mujoco, model, read.names, read.rest
-        self._moves = read.moves[model.geom_bodyid]
+        mujoco, model = reader.mujoco, reader.model
+        self.mujoco, self.model, self.names, self.left_out = mujoco, model, reader.names, reader.left_out
+        self._moves = reader.moves[model.geom_bodyid]
         kinds = mujoco.mjtGeom
         self._kinds = {
             int(kinds.mjGEOM_SPHERE): "sphere",
@@ -34,26 +34,27 @@ class Shapes:
             int(kinds.mjGEOM_BOX): "box",
             int(kinds.mjGEOM_ELLIPSOID): "ellipsoid",
         }
-        touching = "contact" not in disabled(mujoco, model)
-        self._colliding = read.colliding
+        contacts_enabled = "contact" not in disabled(mujoco, model)
+        self._colliding = reader.colliding
         for i in self._colliding:
             kind = kinds(int(model.geom_type[i])).name.removeprefix("mjGEOM_").lower()
-            if not self._solid(i) and not self._is_plane(i):
+            if not self._is_solid(i) and not self._is_plane(i):
                 moves = bool(self._moves[i])
-                self.rest.add(f"geom {self._name(i)}: {_with_article(kind)} touches nothing here", moves)
-        pairs, self._placed_at = Pairs(*vars(read).values()), dict[int, str]()
+                article = "an" if kind[0] in "aeiou" else "a"
+                self.left_out.add(f"geom {self._name(i)}: {article} {kind} touches nothing here", moves)
+        pairs, self._object_names = Pairs(*vars(reader).values()), dict[int, str]()
         # Meshes and planes that move were listed.
-        carried = [i for i in self._colliding if self._solid(i) or self._is_plane(i)]
-        self._met = pairs.met(carried) if touching else {}
-        self._surfaces = pairs.surfaces(self._met)
-        self._read = read
+        carried = [i for i in self._colliding if self._is_solid(i) or self._is_plane(i)]
+        self._contact_pairs = pairs.coefficients(carried) if contacts_enabled else {}
+        self._surfaces = pairs.surfaces(self._contact_pairs)
+        self._reader = reader
         self._list_margins()
         self._overlapping = self._overlaps()
 
     def _name(self, i: int) -> str:
         return model_name(self.model, "geom", i)
 
-    def _solid(self, i: int) -> bool:
+    def _is_solid(self, i: int) -> bool:
         return int(self.model.geom_type[i]) in self._kinds
 
     def _is_plane(self, i: int) -> bool:
@@ -67,20 +68,20 @@ class Shapes:
         if margins or paired:
             largest = max(model.geom_margin.max(initial=0.0), model.pair_margin.max(initial=0.0))
             line = f"margins of geoms, where contacts begin: {', '.join(dict.fromkeys(margins + paired))}"
-            self.rest.add(line, moves=bool(largest > _DEEPEST))
+            self.left_out.add(line, moves=bool(largest > _MAX_PENETRATION))
 
     def _overlaps(self) -> set[frozenset[int]]:
         """Return the pairs of geoms that overlap where runs start, by more than they may."""
-        data = self._read.start_data()
+        data = self._reader.start_data()
         self.mujoco.mj_collision(self.model, data)
-        deep = [k for k in range(data.ncon) if data.contact.dist[k] < -_DEEPEST]
+        deep = [k for k in range(data.ncon) if data.contact.dist[k] < -_MAX_PENETRATION]
         return {frozenset(int(each) for each in data.contact.geom[k]) for k in deep}
 
-    def of_body(self, body: int) -> Table:
+    def body_shapes(self, body: int) -> Table:
         """Return the shapes of a body; of a surface MuJoCo has the coefficient of sliding friction."""
         model, shapes = self.model, {}
         for i in self._colliding:
-            if model.geom_bodyid[i] == body and self._solid(i):
+            if model.geom_bodyid[i] == body and self._is_solid(i):
                 place = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
                 shapes[self.names.geoms[i]] = self._shape(i) | place
         return shapes
@@ -96,32 +97,33 @@ class Shapes:
             sizes = {"semi_axes": size.tolist()}
         elif shape in ("capsule", "cylinder"):
             sizes["length"] = 2.0 * float(size[1])
-        alone = {"friction": float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0}
-        return {"shape": shape, **sizes, "surface": self._surfaces.get(i, alone)}
+        default_surface = {"friction": float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0}
+        return {"shape": shape, **sizes, "surface": self._surfaces.get(i, default_surface)}
 
-    def still(self) -> set[int]:
+    def fixed_bodies(self) -> set[int]:
         """Return the bodies that stand still, have something to touch, and are not the world."""
-        return {int(self.model.geom_bodyid[i]) for i in self._colliding if self._solid(i) and not self._moves[i]} - {0}
+        fixed = [i for i in self._colliding if self._is_solid(i) and not self._moves[i]]
+        return set(self.model.geom_bodyid[fixed].tolist()) - {0}
 
-    def objects(self, loose: list[int]) -> Table:
+    def objects(self, free_bodies: list[int]) -> Table:
         """Return planes that may be touched, and free bodies at the start of runs, as objects."""
-        model, data, objects = self.model, self._read.start_data(), {}
-        shapes = [i for i in self._colliding if self._solid(i) and int(model.geom_bodyid[i]) not in loose]
+        model, data, objects = self.model, self._reader.start_data(), {}
+        shapes = [i for i in self._colliding if self._is_solid(i) and int(model.geom_bodyid[i]) not in free_bodies]
         used = {*self.names.joints, *(self.names.geoms[i] for i in shapes)}
         for i in self._colliding:
-            if self._is_plane(i) and any(i in pair for pair in self._met) and not self._dropped(i):
-                self._placed_at[i] = free_name(self.names.geoms[i], used, "object")
-                objects[self._placed_at[i]] = self._shape(i) | self._placed(data, i)
-        for body in loose:
+            if self._is_plane(i) and any(i in pair for pair in self._contact_pairs) and not self._overlaps_body(i):
+                self._object_names[i] = unused_name(self.names.geoms[i], used, "object")
+                objects[self._object_names[i]] = self._shape(i) | self._pose(data, i)
+        for body in free_bodies:
             name, geoms = self.names.bodies[body], [i for i in self._colliding if model.geom_bodyid[i] == body]
-            if len(geoms) != 1 or not self._solid(geoms[0]) or any(model.body_parentid == body):
-                self.rest.add(f"free body {name}: an object is one sphere, capsule, cylinder, box or ellipsoid")
-            elif not self._dropped(geoms[0]):
+            if len(geoms) != 1 or not self._is_solid(geoms[0]) or any(model.body_parentid == body):
+                self.left_out.add(f"free body {name}: an object is one sphere, capsule, cylinder, box or ellipsoid")
+            elif not self._overlaps_body(geoms[0]):
                 (i,) = geoms
-                self._placed_at[i] = free_name(name, used | {*objects}, "object")
+                self._object_names[i] = unused_name(name, used | {*objects}, "object")
                 moving = {"mass": float(model.body_mass[body]), **self._velocity(data, i)}
-                objects[self._placed_at[i]] = self._shape(i) | self._placed(data, i) | moving
-                objects[self._placed_at[i]] |= self._inertia(body, i, objects[self._placed_at[i]])
+                objects[self._object_names[i]] = self._shape(i) | self._pose(data, i) | moving
+                objects[self._object_names[i]] |= self._inertia(body, i, objects[self._object_names[i]])
                 self._list_free(body)
         return objects
 
@@ -131,38 +133,39 @@ class Shapes:
         return {name: state for name, state in data.items() if state != start[name]}
 
     def _free_states(self, keyframe: int) -> Table:
-        data = self._read.start_data(keyframe)
-        free = {name: i for i, name in self._placed_at.items() if self._moves[i]}
-        return {name: self._placed(data, i) | self._velocity(data, i) for name, i in free.items()}
+        data = self._reader.start_data(keyframe)
+        free = {name: i for i, name in self._object_names.items() if self._moves[i]}
+        return {name: self._pose(data, i) | self._velocity(data, i) for name, i in free.items()}
 
-    def _dropped(self, i: int) -> bool:
+    def _overlaps_body(self, i: int) -> bool:
         """Return whether an object overlaps a body at the start of runs, and list it if so."""
-        met = sorted({self._name(k) for pair in self._overlapping if i in pair for k in pair - {i}})
-        if met:
-            self.rest.add(f"geom {self._name(i)}: it overlaps {', '.join(met)} where runs start")
-        return bool(met)
+        overlapped = sorted({self._name(k) for pair in self._overlapping if i in pair for k in pair - {i}})
+        if overlapped:
+            self.left_out.add(f"geom {self._name(i)}: it overlaps {', '.join(overlapped)} where runs start")
+        return bool(overlapped)
 
-    def _placed(self, data: Any, i: int) -> Table:
-        turned = np.zeros(4)
-        self.mujoco.mju_mat2Quat(turned, data.geom_xmat[i])
-        return {"position": data.geom_xpos[i].tolist(), "orientation": quaternion(turned)}
+    def _pose(self, data: Any, i: int) -> Table:
+        quaternion_wxyz = np.zeros(4)
+        self.mujoco.mju_mat2Quat(quaternion_wxyz, data.geom_xmat[i])
+        return {"position": data.geom_xpos[i].tolist(), "orientation": quaternion(quaternion_wxyz)}
 
     def _velocity(self, data: Any, i: int) -> Table:
         """Return the speeds of a free geom where runs start: of its middle, and of its turning in its own frame."""
         velocity = np.zeros(6)
         # Turning comes first.
         self.mujoco.mj_objectVelocity(self.model, data, self.mujoco.mjtObj.mjOBJ_GEOM, i, velocity, 0)
-        turned = data.geom_xmat[i].reshape(3, 3).T @ velocity[:3]
-        return {"velocity": velocity[3:].tolist(), "angular_velocity": turned.tolist()} if velocity.any() else {}
+        turning = data.geom_xmat[i].reshape(3, 3).T @ velocity[:3]
+        return {"velocity": velocity[3:].tolist(), "angular_velocity": turning.tolist()} if velocity.any() else {}
 
     def _inertia(self, body: int, i: int, described: Table) -> Table:
         """Return mass centre and moments of inertia of a free body in a geom's frame, if no even solid has them."""
-        model, turned = self.model, rotation(quaternion(self.model.geom_quat[i])).T
-        centre = turned @ (model.body_ipos[body] - model.geom_pos[i])
-        axes = turned @ rotation(quaternion(model.body_iquat[body]))
+        model, to_geom = self.model, rotation(quaternion(self.model.geom_quat[i])).T
+        centre = to_geom @ (model.body_ipos[body] - model.geom_pos[i])
+        axes = to_geom @ rotation(quaternion(model.body_iquat[body]))
         moments = axes @ np.diag(model.body_inertia[body]) @ axes.T
         even = Object.model_validate(described).even_moments
-        if np.abs(moments - np.diag(even)).max() < _UNEVEN * max(even) and np.allclose(centre, 0.0, 0.0, _UNEVEN):
+        same_moments = np.abs(moments - np.diag(even)).max() < _INERTIA_TOLERANCE * max(even)
+        if same_moments and np.allclose(centre, 0.0, 0.0, _INERTIA_TOLERANCE):
             return {}
         products = moments[np.triu_indices(3, 1)].tolist()
         return {"centre": centre.tolist(), "inertia": [*np.diag(moments).tolist(), *products]}
@@ -179,16 +182,18 @@ class Shapes:
             ("a spring", model.jnt_stiffness[joint]),
         ):
             if np.any(values):
-                self.rest.add(f"free body {name}: {what}")
+                self.left_out.add(f"free body {name}: {what}")
 
     def pairs(self, bodies: list[int]) -> list[list[str]]:
         """Return the pairs of shapes that MuJoCo lets collide among some bodies, as `Pairs` finds them."""
         apart, carriers = [], self.model.geom_bodyid
-        for a, b in self._met:
-            if not {int(carriers[a]), int(carriers[b])} <= {0, *bodies} or not (self._solid(a) and self._solid(b)):
+        for a, b in self._contact_pairs:
+            solids = self._is_solid(a) and self._is_solid(b)
+            if not ({int(carriers[a]), int(carriers[b])} <= {0, *bodies} and solids):
                 continue
             if frozenset((a, b)) in self._overlapping:
-                self.rest.add(f"geoms {self._name(a)}, {self._name(b)}: they overlap where runs start, and never touch")
+                reason = "they overlap where runs start, and never touch"
+                self.left_out.add(f"geoms {self._name(a)}, {self._name(b)}: {reason}")
             elif carriers[a] != carriers[b]:
                 apart.append([self.names.geoms[a], self.names.geoms[b]])
         return apart
@@ -197,18 +202,14 @@ class Shapes:
         """Set the entry ``apart`` of objects: what MuJoCo does not let collide with them."""
         carriers = self.model.geom_bodyid
         shapes = {
-            i: self.names.geoms[i] for i in self._colliding if self._solid(i) and int(carriers[i]) in (0, *bodies)
+            i: self.names.geoms[i] for i in self._colliding if self._is_solid(i) and int(carriers[i]) in (0, *bodies)
         }
         others = dict(shapes)
-        for i, name in self._placed_at.items():
+        for i, name in self._object_names.items():
             apart = [
                 other
                 for k, other in others.items()
-                if (self._moves[i] or self._moves[k]) and (min(i, k), max(i, k)) not in self._met
+                if (self._moves[i] or self._moves[k]) and (min(i, k), max(i, k)) not in self._contact_pairs
             ]
             objects[name] |= {"apart": apart} if apart else {}
             others[i] = name
-
-
-def _with_article(kind: str) -> str:
-    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"

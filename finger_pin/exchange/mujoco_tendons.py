@@ -11,9 +11,9 @@ from finger_pin.exchange.mujoco_unsupported import ElementReader
 from finger_pin.typing import Array
 
 
-def passed_bodies(read: ElementReader, sides: bool = False) -> set[int]:
+def passed_bodies(reader: ElementReader, sides: bool = False) -> set[int]:
     """Return the bodies that tendons pass or whose geoms they wrap, and those that have side sites if asked for."""
-    model, types = read.model, read.mujoco.mjtWrap
+    model, types = reader.model, reader.mujoco.mjtWrap
     wraps = np.isin(model.wrap_type, [int(each) for each in (types.mjWRAP_SPHERE, types.mjWRAP_CYLINDER)])
     sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE].tolist()
     sites += [int(site) for site in model.wrap_prm[wraps] if sides and site >= 0]
@@ -44,60 +44,61 @@ class TendonReader(ElementReader):
             tendon["joints"] = {self.names.joints[model.wrap_objid[k]]: float(model.wrap_prm[k]) for k in pieces}
         else:
             names = distinct("pulley", [self._piece_name(k) for k in pieces])
-            tendon["path"] = self._without_idle({name: self._piece(k) for name, k in zip(names, pieces, strict=True)})
+            path = {name: self._piece(k) for name, k in zip(names, pieces, strict=True)}
+            tendon["path"] = self._without_unused_wraps(path)
         if model.tendon_limited[i]:
             tendon["range"] = within_margin(model.tendon_range[i], float(model.tendon_margin[i]))
-            soft = model.tendon_solref_lim[i], model.tendon_solimp_lim[i], float(model.tendon_invweight0[i])
-            what = f"range of tendon {self.names.tendons[i]}"
-            tendon["limit_stiffness"], tendon["limit_viscous"] = soft_spring(self, what, *soft, stop=True)
+            limit = model.tendon_solref_lim[i], model.tendon_solimp_lim[i], float(model.tendon_invweight0[i])
+            element = f"range of tendon {self.names.tendons[i]}"
+            tendon["limit_stiffness"], tendon["limit_viscous"] = soft_spring(self, element, *limit, stop=True)
             tendon["limit_damping"] = 0.0
         return tendon
 
-    def _without_idle(self, path: Table) -> Table:
+    def _without_unused_wraps(self, path: Table) -> Table:
         """Return a path without the wraps that a point of their own body lies inside of: they never wrap."""
-        read = {name: Waypoint.model_validate(each) for name, each in path.items()}
-        idle = set()
-        for point, wrap in points_inside_wraps(read):
-            self.rest.add(f"wrap {wrap}: {point} lies inside of it, so that the path goes straight", moves=False)
-            idle.add(wrap)
-        return {name: each for name, each in path.items() if name not in idle}
+        waypoints = {name: Waypoint.model_validate(each) for name, each in path.items()}
+        unused = set()
+        for point, wrap in points_inside_wraps(waypoints):
+            self.left_out.add(f"wrap {wrap}: {point} lies inside of it, so that the path goes straight", moves=False)
+            unused.add(wrap)
+        return {name: each for name, each in path.items() if name not in unused}
 
     def _piece_name(self, k: int) -> str:
-        kind, at, types = self.model.wrap_type[k], self.model.wrap_objid[k], self.mujoco.mjtWrap
+        kind, object_id, types = self.model.wrap_type[k], self.model.wrap_objid[k], self.mujoco.mjtWrap
         if kind == types.mjWRAP_PULLEY:
             return ""
-        return (self.names.sites if kind == types.mjWRAP_SITE else self.names.geoms)[int(at)]
+        return (self.names.sites if kind == types.mjWRAP_SITE else self.names.geoms)[int(object_id)]
 
     def _piece(self, k: int) -> Table:
         """Return a piece of a spatial tendon's path."""
         model, types, kind = self.model, self.mujoco.mjtWrap, self.model.wrap_type[k]
-        at = int(model.wrap_objid[k])
+        object_id = int(model.wrap_objid[k])
         if kind == types.mjWRAP_PULLEY:
             return {"kind": "pulley", "divisor": float(model.wrap_prm[k])}
         if kind == types.mjWRAP_SITE:
-            place = {"kind": "point", "position": model.site_pos[at].tolist()}
-            return place | self.names.carrier(int(model.site_bodyid[at]), "body")
+            entries = {"kind": "point", "position": model.site_pos[object_id].tolist()}
+            return entries | self.names.carrier(int(model.site_bodyid[object_id]), "body")
         wrap = {
             "kind": "cylinder" if kind == types.mjWRAP_CYLINDER else "sphere",
-            "position": model.geom_pos[at].tolist(),
-            "orientation": quaternion(model.geom_quat[at]),
-            "radius": float(model.geom_size[at, 0]),
-            **self.names.carrier(int(model.geom_bodyid[at]), "body"),
+            "position": model.geom_pos[object_id].tolist(),
+            "orientation": quaternion(model.geom_quat[object_id]),
+            "radius": float(model.geom_size[object_id, 0]),
+            **self.names.carrier(int(model.geom_bodyid[object_id]), "body"),
         }
         side = int(model.wrap_prm[k])
         if side >= 0:
             carrier = int(model.site_bodyid[side])
-            if carrier != model.geom_bodyid[at]:
-                place = {"position": model.site_pos[side].tolist(), **self.names.carrier(carrier, "body")}
-                wrap["side_point"] = place
+            if carrier != model.geom_bodyid[object_id]:
+                entries = {"position": model.site_pos[side].tolist(), **self.names.carrier(carrier, "body")}
+                wrap["side_point"] = entries
             else:
-                wrap["side"] = self._seen_from(at, side).tolist()
+                wrap["side"] = self._in_geom_frame(object_id, side).tolist()
         return wrap
 
-    def _seen_from(self, geom: int, site: int) -> Array:
+    def _in_geom_frame(self, geom: int, site: int) -> Array:
         """Return a site in the frame of a geom, at the model's reference."""
         mujoco, model = self.mujoco, self.model
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        turned = data.geom_xmat[geom].reshape(3, 3)
-        return np.asarray(turned.T @ (data.site_xpos[site] - data.geom_xpos[geom]))
+        rotation = data.geom_xmat[geom].reshape(3, 3)
+        return np.asarray(rotation.T @ (data.site_xpos[site] - data.geom_xpos[geom]))

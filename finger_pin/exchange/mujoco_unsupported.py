@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finger_pin.exchange.mujoco_names import Names, model_name
 
-# What each flag takes out: the arrays that it makes zero; older versions lack some.
+# Arrays that each flag makes zero; older versions lack some.
 _ZEROED = {
     "spring": ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "tendon_stiffnesspoly"),
     "damper": ("dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly", "actuator_dampingpoly"),
@@ -22,7 +22,7 @@ _ZEROED = {
     "contact": ("geom_contype", "geom_conaffinity"),
     "clampctrl": ("actuator_ctrllimited",),
 }
-# What is listed of elements, by array, where it is not zero.
+# Kind of element, array, and feature that is listed where the array is not zero.
 _LISTED = (
     ("joint", "jnt_stiffnesspoly", "a stiffness that grows with the deflection"),
     ("joint", "dof_dampingpoly", "damping that grows with the speed"),
@@ -38,13 +38,13 @@ _LISTED = (
     ("actuator", "actuator_dampingpoly", "damping that grows with the speed"),
 )
 # MuJoCo's default.
-_SOLREF = 0.02, 1.0
+_DEFAULT_SOLREF = 0.02, 1.0
 _CONSTRAINTS = {"frictionloss", "limit", "equality", "contact"}
-# Obeyed elsewhere.
-_ASKED_FOR = {"constraint", "filterparent", "actuation"}
+# Flags that are obeyed elsewhere.
+_HANDLED_ELSEWHERE = {"constraint", "filterparent", "actuation"}
 
 
-class Rest:
+class LeftOutElements:
     """Elements left out of a model.
 
     Attributes:
@@ -55,19 +55,19 @@ class Rest:
     def __init__(self, mujoco: Any, model: Any) -> None:
         """Check all elements but equalities and actuators."""
         self.mujoco, self.model = mujoco, model
-        self._listed: list[str] = []
-        self._moving: list[str] = []
-        for what, array, has in _LISTED:
-            self._every(what, array, has)
-        self._default("joint", model.dof_frictionloss > 0.0, model.dof_solref, model.dof_jntid)
+        self._lines: list[str] = []
+        self._moving_lines: list[str] = []
+        for what, array, feature in _LISTED:
+            self._list_nonzero(what, array, feature)
+        self._list_creep("joint", model.dof_frictionloss > 0.0, model.dof_solref, model.dof_jntid)
         lossy = model.tendon_frictionloss > 0.0
-        self._default("tendon", lossy, model.tendon_solref_fri, range(model.ntendon))
+        self._list_creep("tendon", lossy, model.tendon_solref_fri, range(model.ntendon))
         if "contact" in disabled(mujoco, model):
             self.add("contacts are disabled in the model: its geoms touch nothing", moves=False)
         flags = without_counterpart(mujoco, model)
         if flags:
             self.add(f"flags about how MuJoCo computes: {', '.join(flags)}", moves=False)
-        if "override" in _set(mujoco.mjtEnableBit, model.opt.enableflags):
+        if "override" in _flag_names(mujoco.mjtEnableBit, model.opt.enableflags):
             self.add("override of the margin, solref and solimp of contacts", moves=False)
         if model.opt.density or model.opt.viscosity:
             self.add("the medium: nothing is dragged")
@@ -78,31 +78,31 @@ class Rest:
             if count:
                 self.add(f"{what}: {count}")
 
-    def listed(self) -> list[str]:
+    def lines(self) -> list[str]:
         """Return the elements left out, a line each."""
-        return list(dict.fromkeys(self._listed))
+        return list(dict.fromkeys(self._lines))
 
-    def moving(self) -> list[str]:
+    def moving_lines(self) -> list[str]:
         """Return the lines about elements that move or carry something."""
-        return list(dict.fromkeys(self._moving))
+        return list(dict.fromkeys(self._moving_lines))
 
     def add(self, line: str, moves: bool = True) -> None:
         """List an unsupported element and whether it moves or carries anything."""
-        self._listed.append(line)
+        self._lines.append(line)
         if moves:
-            self._moving.append(line)
+            self._moving_lines.append(line)
 
-    def _every(self, what: str, attribute: str, has: str) -> None:
+    def _list_nonzero(self, what: str, attribute: str, feature: str) -> None:
         """List every element with a nonzero attribute that older versions lack."""
         values = getattr(self.model, attribute, None)
         if values is None or not len(values):
             return
         for i in np.flatnonzero(np.any(np.reshape(values, (len(values), -1)), axis=1)):
-            self.add(f"{self._name(what, self.model.dof_jntid[i] if attribute.startswith('dof') else i)}: {has}")
+            self.add(f"{self._name(what, self.model.dof_jntid[i] if attribute.startswith('dof') else i)}: {feature}")
 
-    def _default(self, what: str, lossy: NDArray[np.bool_], solref: NDArray[np.float64], owner: Any) -> None:
+    def _list_creep(self, what: str, lossy: NDArray[np.bool_], solref: NDArray[np.float64], owner: Any) -> None:
         """List dry friction with a ``solreffriction`` of its own, which is not read."""
-        for i in np.flatnonzero(lossy & np.any(solref != _SOLREF, axis=1)):
+        for i in np.flatnonzero(lossy & np.any(solref != _DEFAULT_SOLREF, axis=1)):
             self.add(f"{self._name(what, owner[i])}: solreffriction, by which its dry friction creeps", moves=False)
 
     def _name(self, what: str, i: Any) -> str:
@@ -117,13 +117,13 @@ class ElementReader:
         mujoco: The module.
         model: The compiled model.
         names: Of its elements.
-        rest: List of the elements left out.
+        left_out: List of the elements left out.
     """
 
     mujoco: Any
     model: Any
     names: Names
-    rest: Rest
+    left_out: LeftOutElements
 
     @property
     def moves(self) -> NDArray[np.bool_]:
@@ -149,13 +149,13 @@ class ElementReader:
         return data
 
 
-def _set(bits: Any, value: int) -> set[str]:
+def _flag_names(bits: Any, value: int) -> set[str]:
     return {name.split("_")[1].lower() for name, bit in bits.__members__.items() if "_" in name and value & int(bit)}
 
 
 def disabled(mujoco: Any, model: Any) -> set[str]:
     """Return the flags that a model disables, by the names that its XML has for them."""
-    flags = _set(mujoco.mjtDisableBit, model.opt.disableflags)
+    flags = _flag_names(mujoco.mjtDisableBit, model.opt.disableflags)
     return flags | (_CONSTRAINTS if "constraint" in flags else set())
 
 
@@ -166,41 +166,41 @@ def apply_flags(mujoco: Any, model: Any) -> Any:
     """
     copied = copy.copy(model)
     if model.nkey:
-        led = np.flatnonzero(model.body_mocapid >= 0)
-        copied.body_pos[led] = model.key_mpos[0].reshape(-1, 3)[model.body_mocapid[led]]
-        copied.body_quat[led] = model.key_mquat[0].reshape(-1, 4)[model.body_mocapid[led]]
+        mocap = np.flatnonzero(model.body_mocapid >= 0)
+        copied.body_pos[mocap] = model.key_mpos[0].reshape(-1, 3)[model.body_mocapid[mocap]]
+        copied.body_quat[mocap] = model.key_mquat[0].reshape(-1, 4)[model.body_mocapid[mocap]]
     flags = disabled(mujoco, model)
     if hasattr(model, "actuator_armature"):
-        _add_drives(mujoco, copied)
+        _add_actuator_inertia(mujoco, copied)
     for array in (name for flag in flags & set(_ZEROED) for name in _ZEROED[flag]):
         values = getattr(copied, array, None)
         if values is not None:
             values[:] = 0
     if "gravity" in flags:
         copied.opt.gravity[:] = 0.0
-    if "override" in _set(mujoco.mjtEnableBit, model.opt.enableflags):
+    if "override" in _flag_names(mujoco.mjtEnableBit, model.opt.enableflags):
         copied.geom_friction[:, 0] = copied.pair_friction[:, 0] = model.opt.o_friction[0]
     return copied
 
 
-def _add_drives(mujoco: Any, model: Any) -> None:
+def _add_actuator_inertia(mujoco: Any, model: Any) -> None:
     """Add armature and damping of actuators to the joints or tendons that they drive."""
     for i in np.flatnonzero(model.actuator_armature + model.actuator_damping):
-        at, ratio = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0]) ** 2
+        target, ratio = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0]) ** 2
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
             damping, armature = model.tendon_damping, model.tendon_armature
-        elif model.jnt_type[at] != mujoco.mjtJoint.mjJNT_FREE:
-            damping, armature, at = model.dof_damping, model.dof_armature, int(model.jnt_dofadr[at])
+        elif model.jnt_type[target] != mujoco.mjtJoint.mjJNT_FREE:
+            damping, armature, target = model.dof_damping, model.dof_armature, int(model.jnt_dofadr[target])
         else:
             continue
-        damping[at] += ratio * model.actuator_damping[i]
-        armature[at] += ratio * model.actuator_armature[i]
+        damping[target] += ratio * model.actuator_damping[i]
+        armature[target] += ratio * model.actuator_armature[i]
 
 
 def without_counterpart(mujoco: Any, model: Any) -> list[str]:
     """Return the flags of a model that mean nothing here: those of MuJoCo's way of computing."""
-    enabled = _set(mujoco.mjtEnableBit, model.opt.enableflags) - {"override"}
-    return sorted(disabled(mujoco, model) - set(_ZEROED) - _ASKED_FOR | enabled)
+    enabled = _flag_names(mujoco.mjtEnableBit, model.opt.enableflags) - {"override"}
+    return sorted(disabled(mujoco, model) - set(_ZEROED) - _HANDLED_ELSEWHERE | enabled)
 
 
 def is_disabled(mujoco: Any, model: Any, actuator: int) -> str | None:

@@ -1,4 +1,4 @@
-"""The finished pieces of an identification, kept in its folder, so that the same call goes on after a stop."""
+"""Checkpoint of an identification: its finished pieces, stored in its folder to resume after a stop."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,14 +24,14 @@ from finger_pin.identification.recordings import Recording
 from finger_pin.typing import Array
 from finger_pin.version import __version__
 
-NAME = "identification.json"
+FILE_NAME = "identification.json"
 
 
 def digest(
-    scenario: Scenario, settings: IdentifySettings, recordings: Sequence[Recording], more: tuple[Any, ...]
+    scenario: Scenario, settings: IdentifySettings, recordings: Sequence[Recording], options: tuple[Any, ...]
 ) -> str:
     """Return the digest of an identification: scenario, table, data, options, version."""
-    text = [__version__, scenario.model_dump_json(), settings.model_dump_json(), repr(more)]
+    text = [__version__, scenario.model_dump_json(), settings.model_dump_json(), repr(options)]
     hasher = hashlib.sha256("\0".join(text).encode())
     for recording in recordings:
         for values in (*recording.inputs.values(), *recording.outputs.values(), recording.time, recording.speed):
@@ -39,21 +40,19 @@ def digest(
 
 
 class Checkpoint:
-    """Finished pieces of work by name, kept in a folder, or only in memory without one."""
+    """Finished pieces of work by name, stored in a folder, or only in memory without one."""
 
-    def __init__(self, folder: Path | None, asked: str, restart: bool) -> None:
-        """Read the pieces of the same identification; those of another one are forgotten."""
-        self._path = None if folder is None else folder / NAME
-        self._asked, self._done = asked, {}
+    def __init__(self, folder: Path | None, request: str, restart: bool) -> None:
+        """Load the pieces of the same identification, by the digest of the request; discard those of another one."""
+        self._path = None if folder is None else folder / FILE_NAME
+        self._request, self._created = request, False
+        self._results: dict[str, Any] = {}
         if self._path is not None and not restart:
             try:
                 saved = json.loads(self._path.read_text("utf-8"))
-                self._done = saved["done"] if saved["asked"] == asked else {}
+                self._results = saved["done"] if saved["asked"] == request else {}
             except (OSError, ValueError, KeyError, TypeError):
-                self._done = {}
-
-    _done: dict[str, Any]
-    _made: bool
+                self._results = {}
 
     def __enter__(self) -> Self:
         """Make the folder.
@@ -63,7 +62,7 @@ class Checkpoint:
         """
         if self._path is not None:
             try:
-                self._made = not self._path.parent.exists()
+                self._created = not self._path.parent.exists()
                 self._path.parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 reason = f"cannot be written: {error.strerror or error}"
@@ -75,41 +74,41 @@ class Checkpoint:
         if self._path is None:
             return
         if isinstance(error, InputError):
-            if self._made and not any(self._path.parent.iterdir()):
+            if self._created and not any(self._path.parent.iterdir()):
                 self._path.parent.rmdir()
-        elif self._done:
-            write_text(self._path, json.dumps({"asked": self._asked, "done": self._done}))
+        elif self._results:
+            write_text(self._path, json.dumps({"asked": self._request, "done": self._results}))
 
     def fit(self, name: str, problem: Problem, work: Callable[[], Fit]) -> Fit:
-        """Return a minimum, or the stored one."""
-        if name in self._done:
-            z: Array = np.array(self._done[name])
+        """Return the stored minimum of a name, or compute and store it."""
+        if name in self._results:
+            z: Array = np.array(self._results[name])
             return fit(problem, z, fixed=dict(enumerate(z)))
         try:
             minimum = work()
         except Stopped:
             if len(problem.best[1]):
-                self._done[f"{name} so far"] = problem.best[1].tolist()
+                self._results[f"{name} so far"] = problem.best[1].tolist()
             raise
-        self._done[name] = minimum.z.tolist()
+        self._results[name] = minimum.z.tolist()
         return minimum
 
-    def reached(self, name: str, start: Array) -> Array:
-        """Return the last place of a search that was stopped, shape (p,), or its start."""
-        return np.array(self._done.get(f"{name} so far", start), dtype=float)
+    def last_point(self, name: str, start: Array) -> Array:
+        """Return the last point of an interrupted search, shape (p,), or its start."""
+        return np.array(self._results.get(f"{name} so far", start), dtype=float)
 
-    def side(self, name: str, work: Callable[[], ProfileBound]) -> ProfileBound:
-        """Return an end of an interval."""
-        if name in self._done:
-            end, path = self._done[name]
+    def interval_end(self, name: str, work: Callable[[], ProfileBound]) -> ProfileBound:
+        """Return the stored end of an interval, or compute and store it."""
+        if name in self._results:
+            end, path = self._results[name]
             return ProfileBound(math.nan if end is None else float(end), np.array(path))
         bound = work()
-        if bound.better is None:
-            self._done[name] = (bound.end, bound.path.tolist())
+        if bound.lower_minimum is None:
+            self._results[name] = (bound.end, bound.path.tolist())
         return bound
 
     def comparison(self, work: Callable[[], LawComparison]) -> LawComparison:
-        """Return a comparison of laws."""
-        if "comparison" not in self._done:
-            self._done["comparison"] = work().plain()
-        return LawComparison.from_table(self._done["comparison"])
+        """Return the stored comparison of laws, or compute and store it."""
+        if "comparison" not in self._results:
+            self._results["comparison"] = asdict(work())
+        return LawComparison(**self._results["comparison"])

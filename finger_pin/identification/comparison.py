@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,25 +18,25 @@ from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.problem import Problem
 from finger_pin.typing import Array
 
-#: Name of the law that the scenario has as it stands.
-DESCRIBED = "as described"
-# Into how many parts one recording is cut.
-_PARTS = 6
-# Where in its range a key is started from that only another law has.
-_SHARES = (0.9, 0.7, 0.5, 0.3)
+#: Name of the scenario's unchanged law.
+SCENARIO_LAW = "as described"
+# Number of folds of a single recording in cross-validation.
+_MAX_FOLDS = 6
+# Starts of a key that only the alternative law has, as shares of its range.
+_START_SHARES = (0.9, 0.7, 0.5, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
 class LawComparison:
-    """Laws side by side; lists by law.
+    """Results of the compared laws; lists by law.
 
     Attributes:
         law: Names.
         parameters: Number of parameters found.
         bic: As by `bic`, under the weights of the scenario's own law.
         rms: Of residuals over the noise under the scenario's own law.
-        held_out: The same of samples that the fit had not seen; not a number where nothing can be held out.
-        estimate: By law, what was found, by key.
+        held_out: The same of held-out samples in cross-validation; not a number with a single fold.
+        estimate: Estimates by key, for each law.
     """
 
     law: list[str]
@@ -44,15 +45,6 @@ class LawComparison:
     rms: list[float]
     held_out: list[float]
     estimate: list[dict[str, float]]
-
-    def plain(self) -> dict[str, Any]:
-        """Return the comparison as plain lists, for JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> Self:
-        """Read a table of `plain`."""
-        return cls(**table)
 
 
 def compare_laws(problem: Problem, settings: IdentifySettings, minimum: Fit) -> LawComparison:
@@ -65,12 +57,14 @@ def compare_laws(problem: Problem, settings: IdentifySettings, minimum: Fit) -> 
     """
     folds = _folds(problem)
     rows = []
-    for name, law in [(DESCRIBED, problem), *other_laws(problem, settings).items()]:
-        best = minimum if law is problem else _best(law, minimum.weights, _places(law, problem, minimum.z))
-        value = bic(best.residuals, minimum.weights, law.asked, law.groups, law.least_noise)
-        values = dict(zip(law.keys[: law.asked], law.values(best.z).tolist(), strict=False))
-        out = _held_out(law, best, minimum, folds)
-        rows.append((name, law.asked, value, _scaled_rms(best.residuals, minimum.noise), out, values))
+    for name, law in [(SCENARIO_LAW, problem), *other_laws(problem, settings).items()]:
+        best = minimum if law is problem else _best_fit(law, problem, minimum)
+        value = bic(best.residuals, minimum.weights, law.requested_count, law.groups, law.least_noise)
+        values = dict(zip(law.keys[: law.requested_count], law.values(best.z).tolist(), strict=False))
+        held_out = _held_out_rms(law, best, minimum, folds)
+        scaled = np.concatenate([e / n for e, n in zip(best.residuals, minimum.noise, strict=True)])
+        rms = float(np.sqrt(np.mean(scaled * scaled)))
+        rows.append((name, law.requested_count, value, rms, held_out, values))
     return LawComparison(*(list(column) for column in zip(*rows, strict=True)))
 
 
@@ -96,12 +90,13 @@ def other_laws(problem: Problem, settings: IdentifySettings) -> dict[str, Proble
     Raises:
         InputError: If an entry of a law is wrong.
     """
-    return {name: _other(problem, name, each) for name, each in settings.compare.items()}
+    return {name: _alternative(problem, name, each) for name, each in settings.compare.items()}
 
 
-def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
+def _alternative(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
     """Return the problem under another friction law, with its fixed keys and bounds."""
-    bounds = {key: (float(a), float(b)) for key, a, b in zip(*_asked(problem), strict=True)}
+    ends = zip(problem.keys, problem.low.tolist(), problem.high.tolist(), strict=True)
+    bounds = {key: (low, high) for key, low, high in itertools.islice(ends, problem.requested_count)}
     fixed: dict[str, float] = {}
     for key, value in law.items():
         if isinstance(value, int | float) and not isinstance(value, bool):
@@ -118,22 +113,14 @@ def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
         raise InputError(f"identify.compare.{name}", str(error)) from None
 
 
-def _asked(problem: Problem) -> tuple[Sequence[str], Array, Array]:
-    """Return the keys that were asked for, without those of a recording, and their bounds."""
-    return problem.keys[: problem.asked], problem.low[: problem.asked], problem.high[: problem.asked]
-
-
-def _places(law: Problem, default: Problem, z: Array) -> list[Array]:
-    """Return the starts of searches under a law: that of the scenario's law, further keys spread over their ranges."""
-    low, high = law.box
+def _best_fit(law: Problem, default: Problem, minimum: Fit) -> Fit:
+    """Return the fit of a law from starts with shared keys at the default's minimum, others over their ranges."""
+    (low, high), z = law.box, minimum.z
     shared = [key in default.keys for key in law.keys]
-    known = np.array([z[default.keys.index(key)] if key in default.keys else 0.0 for key in law.keys])
-    shares = [0.5] if all(shared) else _SHARES
-    return [np.clip(np.where(shared, known, low + (high - low) * share), low, high) for share in shares]
-
-
-def _best(law: Problem, weights: Array, places: Sequence[Array]) -> Fit:
-    return min((fit(law, place, weights=weights) for place in places), key=lambda minimum: minimum.objective)
+    shared_values = np.array([z[default.keys.index(key)] if key in default.keys else 0.0 for key in law.keys])
+    shares = [0.5] if all(shared) else _START_SHARES
+    starts = (np.clip(np.where(shared, shared_values, low + (high - low) * share), low, high) for share in shares)
+    return min((fit(law, start, weights=minimum.weights) for start in starts), key=lambda each: each.objective)
 
 
 def _folds(problem: Problem) -> list[list[NDArray[np.bool_]]]:
@@ -141,28 +128,23 @@ def _folds(problem: Problem) -> list[list[NDArray[np.bool_]]]:
     names = list(dict.fromkeys(signal.recording for signal in problem.signals))
     if len(names) > 1:
         return [[np.full(len(s.measured), s.recording == name) for s in problem.signals] for name in names]
-    if problem.moves:
+    if problem.has_motion:
         # The windows of one recording follow each other; samples of one window do not stand for themselves.
         groups = problem.groups.tolist()
         window = [groups[:k].count(group) for k, group in enumerate(groups)]
-        parts = min(max(window) + 1, _PARTS)
+        parts = min(max(window) + 1, _MAX_FOLDS)
         return [
             [np.full(len(s.measured), w % parts == part) for s, w in zip(problem.signals, window, strict=True)]
             for part in range(parts)
         ]
-    groups = [np.unique(np.nan_to_num(signal.load), return_inverse=True)[1] % _PARTS for signal in problem.signals]
+    groups = [np.unique(np.nan_to_num(signal.load), return_inverse=True)[1] % _MAX_FOLDS for signal in problem.signals]
     return [[group == part for group in groups] for part in range(int(max(g.max() for g in groups)) + 1)]
 
 
-def _held_out(law: Problem, best: Fit, reference: Fit, folds: Sequence[Sequence[NDArray[np.bool_]]]) -> float:
+def _held_out_rms(law: Problem, best: Fit, reference: Fit, folds: Sequence[Sequence[NDArray[np.bool_]]]) -> float:
     squares, count = 0.0, 0
     for fold in folds if len(folds) > 1 else []:
         z = fit(law.subset([~each for each in fold]), best.z).z
         for e, mask, noise in zip(law.residuals(z), fold, reference.noise, strict=True):
             squares, count = squares + float(np.sum((e[mask] / noise) ** 2)), count + int(mask.sum())
     return math.sqrt(squares / count) if count else math.nan
-
-
-def _scaled_rms(residuals: Sequence[Array], noise: Array) -> float:
-    whole = np.concatenate([e / n for e, n in zip(residuals, noise, strict=True)])
-    return float(np.sqrt(np.mean(whole * whole)))

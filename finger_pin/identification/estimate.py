@@ -10,28 +10,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from finger_pin.identification.likelihood import minus_twice_likelihood, pooled, typical
+from finger_pin.identification.likelihood import minus_twice_likelihood, pooled_variance, robust_deviation
 from finger_pin.identification.problem import Problem
 from finger_pin.typing import Array
 
-# Rounds of weights, steps in a round, and trials in a row that may fail.
-_ROUNDS, _STEPS, _FAILS = 5, 40, 3
+# Rounds of weights, steps in a round, and consecutive trials that may fail.
+_MAX_ROUNDS, _MAX_STEPS, _MAX_FAILURES = 5, 40, 3
 # Gain of minus twice the log-likelihood that is not worth a step. A gain g leaves parameters within sqrt(g) of their
 # standard deviation: one for means of motions, 0.2 for motions, 0.03 for those computed finely, none for closed forms.
 _GAIN_ROUGH, _GAIN, _GAIN_FINE, _GAIN_CLOSED = 1.0, 0.05, 1e-3, 1e-9
 # Difference of minus twice the log-likelihood that errors of runs hide: half the 0.1 by which fine ones make it jump.
-_JUMP = 0.05
+_LIKELIHOOD_JUMP = 0.05
 # Largest step, and the least that limits of parameters on each other cut it to, part of a parameter's range.
 _RADIUS, _LEAST_RADIUS = 0.3, 1e-6
-# Ratio of gained to promised from which on slopes are kept; below it the radius is that part of the step (Nocedal and
-# Wright, Numerical Optimization, algorithm 4.1).
-_RATIO = 0.25
-# Gain per sample that errors of slopes promise: slopes that searches ask for err by 0.01 to 0.03, and this is squared.
-_FEIGNED = 1e-3
-# Part of the largest reading that a parameter must move, all over its bounds, to be felt by a signal; and the shares of
-# the bounds at which searches go on for parameters that nothing feels where one has ended.
-_FELT, _SHARES = 1e-9, (0.5, 0.9, 0.1)
-#: What a squared residual u counts for where outliers are to count less, and how fast that grows.
+# Ratio of actual to predicted gain above which slopes are kept; below it the radius is that part of the step (Nocedal
+# and Wright, Numerical Optimization, algorithm 4.1).
+_GAIN_RATIO = 0.25
+# Gain per sample that errors of slopes alone predict: the square of their relative error, 0.01 to 0.03 in searches.
+_SLOPE_ERROR_GAIN = 1e-3
+# Least change of a signal over a parameter's bounds, part of its largest reading, that counts as influence; and the
+# shares of the bounds at which searches restart parameters without any.
+_LEAST_EFFECT, _RESTART_SHARES = 1e-9, (0.5, 0.9, 0.1)
+#: Loss of a squared residual u, and its derivative, for outliers.
 LOSSES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
     "linear": (lambda u: u, np.ones_like),
     "soft_l1": (lambda u: 2.0 * (np.sqrt(1.0 + u) - 1.0), lambda u: 1.0 / np.sqrt(1.0 + u)),
@@ -43,7 +43,7 @@ LOSSES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A minimum.
+    """Minimum of the objective, and its noise.
 
     Attributes:
         z: Search variables, shape (p,).
@@ -91,48 +91,47 @@ def fit(
     for k, value in (fixed or {}).items():
         z[k], free[k] = value, False
     z = problem.feasible(z, free)
-    shares = np.ones(len(problem.signals)) if weights is None else weights
+    signal_weights = np.ones(len(problem.signals)) if weights is None else weights
     residuals: Sequence[Array] = problem.residuals(z)
     if not all(np.isfinite(e).all() for e in residuals):
-        # What cannot be integrated there is the worst of all minima.
-        nothing = np.zeros(len(residuals))
-        return Fit(z, residuals, nothing, nothing, nothing, math.inf, converged=False)
-    ended = True
-    for k in range(_ROUNDS if free.any() else 0):
-        before = z
-        z, residuals, slopes, ended = _descend(problem, z, residuals, free, shares, loss, slopes, scale)
-        if weights is not None or not ended or (k > 0 and z is before):
+        # A failed integration is the worst of all minima.
+        zeros = np.zeros(len(residuals))
+        return Fit(z, residuals, zeros, zeros, zeros, math.inf, converged=False)
+    converged = True
+    for k in range(_MAX_ROUNDS if free.any() else 0):
+        previous = z
+        z, residuals, slopes, converged = _descend(problem, z, residuals, free, signal_weights, loss, slopes, scale)
+        if weights is not None or not converged or (k > 0 and z is previous):
             break
-        shares = _independent(problem, residuals)[1]
-    correlation, independent = _independent(problem, residuals)
-    shares = independent if weights is None else weights
+        signal_weights = _independent(problem, residuals)[1]
+    correlation, residual_shares = _independent(problem, residuals)
+    signal_weights = residual_shares if weights is None else weights
     noise = _noise(problem, residuals, robust=loss != "linear")
-    used = noise if scale is None else scale
-    objective = _objective(problem, _counted(residuals, used, loss)[0], shares, used, loss)
-    return Fit(z, residuals, noise, correlation, shares, objective, slopes, ended)
+    outlier_scale = noise if scale is None else scale
+    objective = _objective(problem, _apply_loss(residuals, outlier_scale, loss)[0], signal_weights, outlier_scale, loss)
+    return Fit(z, residuals, noise, correlation, signal_weights, objective, slopes, converged)
 
 
-def fit_off_flats(problem: Problem, start: Array, loss: str = "linear") -> Fit:
-    """Return the minimum that is reached from a start, and from beside it where nothing feels some parameters.
+def fit_with_restarts(problem: Problem, start: Array, loss: str = "linear") -> Fit:
+    """Return the minimum reached from a start; restart parameters without influence there at other values.
 
-    No step moves what has no slope there, such as a friction below the floor of its law.
+    A parameter without a slope does not move, such as a friction below the floor of its law.
     """
     best, (low, high) = fit(problem, start, loss=loss), problem.box
-    for share in _SHARES:
-        flat = np.zeros(len(start), dtype=bool) if best.slopes is None else ~felt(problem, best.slopes)
-        if not flat.any():
+    for share in _RESTART_SHARES:
+        if best.slopes is None or (influential := influential_parameters(problem, best.slopes)).all():
             break
-        beside = fit(problem, np.where(flat, low + (high - low) * share, best.z), loss=loss)
-        best = best_of(problem, [best, beside])
+        restarted = fit(problem, np.where(influential, best.z, low + (high - low) * share), loss=loss)
+        best = best_of(problem, [best, restarted])
     return best
 
 
-def felt(problem: Problem, slopes: Sequence[Array]) -> NDArray[np.bool_]:
-    """Return which parameters move a signal where residuals have some slopes, shape (p,)."""
+def influential_parameters(problem: Problem, slopes: Sequence[Array]) -> NDArray[np.bool_]:
+    """Return a mask of the parameters that influence a signal, by the slopes of the residuals, shape (p,)."""
     width = np.subtract(*reversed(problem.box))
     sizes = [max(float(np.max(np.abs(signal.measured), initial=0.0)), 1e-300) for signal in problem.signals]
     pairs = zip(slopes, sizes, strict=True)
-    return np.asarray(np.any([np.any(np.abs(j) * width > _FELT * size, axis=0) for j, size in pairs], axis=0))
+    return np.asarray(np.any([np.any(np.abs(j) * width > _LEAST_EFFECT * size, axis=0) for j, size in pairs], axis=0))
 
 
 def _descend(
@@ -140,93 +139,95 @@ def _descend(
     z: Array,
     residuals: Sequence[Array],
     free: NDArray[np.bool_],
-    shares: Array,
+    weights: Array,
     loss: str,
     slopes: Sequence[Array] | None,
     scale: Array | None,
 ) -> tuple[Array, Sequence[Array], Sequence[Array], bool]:
-    """Return the place of the greatest likelihood, its residuals, the slopes of the last step, and success.
+    """Return the point of greatest likelihood, its residuals, the slopes of the last step, and convergence.
 
-    Steps are those of Gauss and Newton in a box of trust. A run costs less than its slopes: these are made anew only
-    where a step does not gain what they promise. Of motions they are bent to agree with it while far from the end: over
-    whole steps the little leaps of a motion count less than in slopes at one place.
+    Gauss-Newton steps in a trust region. A run costs less than its slopes, so slopes are recomputed only where a step
+    does not gain what they predict. For motions, Broyden's update keeps them in agreement with the steps: over whole
+    steps the small jumps of a motion matter less than in slopes at one point.
     """
-    fresh, radius, failed = slopes is None, _RADIUS, 0
+    slopes_are_current, radius, failed = slopes is None, _RADIUS, 0
     slopes = problem.slopes(z) if slopes is None else list(slopes)
-    gain, bending = _least_gain(problem), problem.moves and not problem.finely
-    jump = max(gain, _JUMP) if problem.moves else gain
-    count = float(sum(w * len(e) for w, e in zip(shares, residuals, strict=True)))
-    feigned = max(_GAIN_ROUGH, 0.0 if problem.finely else _FEIGNED * count)
-    for _ in range(_STEPS):
+    least_gain, updates_slopes = _least_gain(problem), problem.has_motion and not problem.is_fine
+    jump = max(least_gain, _LIKELIHOOD_JUMP) if problem.has_motion else least_gain
+    count = float(sum(w * len(e) for w, e in zip(weights, residuals, strict=True)))
+    slope_error_gain = max(_GAIN_ROUGH, 0.0 if problem.is_fine else _SLOPE_ERROR_GAIN * count)
+    for _ in range(_MAX_STEPS):
         noise = _noise(problem, residuals, robust=loss != "linear") if scale is None else scale
-        met, system = _normal(problem, residuals, slopes, shares, noise, loss)
-        move, promised = _step(problem, z, free, system, radius)
-        if promised < 0.0 and radius > _LEAST_RADIUS:
+        weighted, system = _triangular_system(problem, residuals, slopes, weights, noise, loss)
+        step, predicted_gain = _step(problem, z, free, system, radius)
+        if predicted_gain < 0.0 and radius > _LEAST_RADIUS:
             # Limits that parameters set each other have cut it wrongly.
-            radius *= _RATIO
+            radius *= _GAIN_RATIO
             continue
-        if promised < gain:
+        if predicted_gain < least_gain:
             return z, residuals, slopes, True
-        there = problem.residuals(z + move)
-        both = met, _counted(there, noise, loss)[0]
-        sums = [_objective(problem, each, shares, noise, loss) for each in both]
-        gained = sums[0] - sums[1]
-        away = promised - gained if bending else abs(promised - gained)
-        ratio, served = gained / promised, away < (1.0 - _RATIO if bending else _RATIO) * promised + jump
+        trial = problem.residuals(z + step)
+        weighted_pair = weighted, _apply_loss(trial, noise, loss)[0]
+        sums = [_objective(problem, each, weights, noise, loss) for each in weighted_pair]
+        actual_gain = sums[0] - sums[1]
+        disagreement = predicted_gain - actual_gain if updates_slopes else abs(predicted_gain - actual_gain)
+        ratio, tolerated = actual_gain / predicted_gain, 1.0 - _GAIN_RATIO if updates_slopes else _GAIN_RATIO
+        slopes_hold = disagreement < tolerated * predicted_gain + jump
         if ratio > 0.0:
-            before = residuals
-            z, residuals, failed = z + move, there, 0
-            radius = min(2.0 * radius, _RADIUS) if ratio > _RATIO else radius
-        elif fresh:
+            previous = residuals
+            z, residuals, failed = z + step, trial, 0
+            radius = min(2.0 * radius, _RADIUS) if ratio > _GAIN_RATIO else radius
+        elif slopes_are_current:
             failed += 1
-            radius = _RATIO * float(np.max(np.abs(move) / np.subtract(*reversed(problem.box))))
-        if ratio <= 0.0 and promised < jump:
+            radius = _GAIN_RATIO * float(np.max(np.abs(step) / np.subtract(*reversed(problem.box))))
+        if ratio <= 0.0 and predicted_gain < jump:
             return z, residuals, slopes, True
-        if failed > (_FAILS if promised > feigned else 0):
-            return z, residuals, slopes, promised <= feigned
-        if not served and (ratio > 0.0 or not fresh):
-            slopes, fresh = problem.slopes(z), True
+        if failed > (_MAX_FAILURES if predicted_gain > slope_error_gain else 0):
+            return z, residuals, slopes, predicted_gain <= slope_error_gain
+        if not slopes_hold and (ratio > 0.0 or not slopes_are_current):
+            slopes, slopes_are_current = problem.slopes(z), True
         elif ratio > 0.0:
-            slopes, fresh = _bent(problem, slopes, move, before, there) if bending else slopes, False
+            slopes_are_current = False
+            slopes = _broyden_update(problem, slopes, step, previous, trial) if updates_slopes else slopes
     return z, residuals, slopes, False
 
 
 def _least_gain(problem: Problem) -> float:
     """Return the gain of minus twice the log-likelihood below which no step is made."""
-    if not problem.moves:
+    if not problem.has_motion:
         return _GAIN_CLOSED
-    return _GAIN_FINE if problem.finely else _GAIN_ROUGH if problem.means else _GAIN
+    return _GAIN_FINE if problem.is_fine else _GAIN_ROUGH if problem.block_sizes else _GAIN
 
 
-def _bent(
-    problem: Problem, slopes: Sequence[Array], move: Array, before: Sequence[Array], after: Sequence[Array]
+def _broyden_update(
+    problem: Problem, slopes: Sequence[Array], step: Array, before: Sequence[Array], after: Sequence[Array]
 ) -> list[Array]:
-    """Return the slopes that agree with a step, and change the least (Broyden)."""
+    """Return slopes that agree with a step and change the least: Broyden's update."""
     low, high = problem.box
-    way = move / (high - low) ** 2
-    way /= move @ way
-    return [j + np.outer(b - a - j @ move, way) for j, a, b in zip(slopes, before, after, strict=True)]
+    direction = step / (high - low) ** 2
+    direction /= step @ direction
+    return [j + np.outer(b - a - j @ step, direction) for j, a, b in zip(slopes, before, after, strict=True)]
 
 
-def _normal(
-    problem: Problem, residuals: Sequence[Array], slopes: Sequence[Array], shares: Array, scale: Array, loss: str
+def _triangular_system(
+    problem: Problem, residuals: Sequence[Array], slopes: Sequence[Array], weights: Array, scale: Array, loss: str
 ) -> tuple[Sequence[Array], Array]:
     """Return the weighed residuals, and slopes beside residuals, triangular: shape (q, p + 1), q at most p + 1."""
-    met, growth = _counted(residuals, scale, loss)
-    factors = np.sqrt(shares) / (_noise(problem, met) if loss == "linear" else scale)
-    rows = zip(factors, growth, slopes, met, strict=True)
-    whole = np.concatenate([f * np.column_stack([g[:, None] * j, e]) for f, g, j, e in rows])
-    return met, np.asarray(np.linalg.qr(whole, mode="r"))
+    weighted, loss_slopes = _apply_loss(residuals, scale, loss)
+    factors = np.sqrt(weights) / (_noise(problem, weighted) if loss == "linear" else scale)
+    rows = zip(factors, loss_slopes, slopes, weighted, strict=True)
+    stacked = np.concatenate([f * np.column_stack([g[:, None] * j, e]) for f, g, j, e in rows])
+    return weighted, np.asarray(np.linalg.qr(stacked, mode="r"))
 
 
-def _objective(problem: Problem, counted: Sequence[Array], shares: Array, scale: Array, loss: str) -> float:
+def _objective(problem: Problem, weighted: Sequence[Array], weights: Array, scale: Array, loss: str) -> float:
     """Return minus twice the log-likelihood of weighed residuals.
 
     Where outliers count less their noise is that of the scale: an rms would be theirs.
     """
     if loss == "linear":
-        return minus_twice_likelihood(counted, shares, problem.groups, problem.least_noise)
-    by_signal = zip(counted, shares, scale, strict=True)
+        return minus_twice_likelihood(weighted, weights, problem.groups, problem.least_noise)
+    by_signal = zip(weighted, weights, scale, strict=True)
     return float(sum(w * (e @ e / s**2 + 2.0 * len(e) * math.log(s)) for e, w, s in by_signal))
 
 
@@ -235,27 +236,27 @@ def _step(problem: Problem, z: Array, free: NDArray[np.bool_], system: Array, ra
     low, high = problem.box
     width = high - low
     # Strictly apart, as `lsq_linear` asks: at a bound by what is lost when the step is added.
-    least = np.minimum(np.maximum((low - z) / width, -radius), -1e-12)
-    most = np.maximum(np.minimum((high - z) / width, radius), 1e-12)
-    slopes, residuals, move = system[:, :-1] * width, system[:, -1], np.zeros(len(z))
-    move[free] = lsq_linear(slopes[:, free], -residuals, (least[free], most[free]), method="bvls", tol=1e-12).x
-    move = problem.feasible(np.clip(z + width * move, low, high), free) - z
-    left = system[:, :-1] @ move + residuals
-    return move, float(residuals @ residuals - left @ left)
+    lower = np.minimum(np.maximum((low - z) / width, -radius), -1e-12)
+    upper = np.maximum(np.minimum((high - z) / width, radius), 1e-12)
+    slopes, residuals, step = system[:, :-1] * width, system[:, -1], np.zeros(len(z))
+    step[free] = lsq_linear(slopes[:, free], -residuals, (lower[free], upper[free]), method="bvls", tol=1e-12).x
+    step = problem.feasible(np.clip(z + width * step, low, high), free) - z
+    remaining = system[:, :-1] @ step + residuals
+    return step, float(residuals @ residuals - remaining @ remaining)
 
 
-def _counted(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[Array], list[Array]]:
+def _apply_loss(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[Array], list[Array]]:
     """Return the weighed residuals, the sum of their squares, and their derivatives by the residuals."""
     if loss == "linear":
         return list(residuals), [np.ones(len(e)) for e in residuals]
     rho, growth = LOSSES[loss]
-    counted, factors = [], []
+    weighted, factors = [], []
     for e, n in zip(residuals, scale, strict=True):
         u = np.maximum((e / n) ** 2, 1e-12)
         ratio = np.sqrt(rho(u) / u)
-        counted.append(ratio * e)
+        weighted.append(ratio * e)
         factors.append(growth(u) / ratio)
-    return counted, factors
+    return weighted, factors
 
 
 def best_of(problem: Problem, fits: Sequence[Fit]) -> Fit:
@@ -275,8 +276,8 @@ def information(problem: Problem, minimum: Fit) -> Array:
 def _noise(problem: Problem, residuals: Sequence[Array], robust: bool = False) -> Array:
     """Return the rms of the residuals of every output, or that of their median; never below its least, or rounding."""
     groups = problem.groups
-    count, square = pooled(residuals, np.ones(len(residuals)), groups)
-    rms = typical(residuals, groups) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
+    count, square = pooled_variance(residuals, np.ones(len(residuals)), groups)
+    rms = robust_deviation(residuals, groups) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
     rounding = [1e-9 * max(float(np.max(np.abs(s.measured), initial=0.0)), 1e-9) for s in problem.signals]
     return np.maximum(rms, np.maximum(problem.least_noise, rounding))
 
@@ -287,8 +288,8 @@ def _independent(problem: Problem, residuals: Sequence[Array]) -> tuple[Array, A
     for group in np.unique(groups):
         places = np.flatnonzero(groups == group).tolist()
         ordered = [k for k in places if problem.signals[k].ordered and len(residuals[k]) > 2]
-        size = sum(float(residuals[k] @ residuals[k]) for k in ordered)
-        together = sum(float(residuals[k][1:] @ residuals[k][:-1]) for k in ordered)
+        squares = sum(float(residuals[k] @ residuals[k]) for k in ordered)
+        products = sum(float(residuals[k][1:] @ residuals[k][:-1]) for k in ordered)
         count = sum(len(residuals[k]) for k in ordered)
-        rho[groups == group] = np.clip(together / size, 0.0, 1.0 - 2.0 / count) if size > 0.0 else 0.0
+        rho[groups == group] = np.clip(products / squares, 0.0, 1.0 - 2.0 / count) if squares > 0.0 else 0.0
     return rho, (1.0 - rho) / (1.0 + rho)

@@ -26,7 +26,7 @@ from finger_pin.identification.pipeline import FitPipeline, Progress, starting_p
 from finger_pin.identification.prediction import check_predictable, predictions
 from finger_pin.identification.problem import Problem, Stopped
 from finger_pin.identification.recordings import read_recording
-from finger_pin.identification.result_dataset import results, write_results
+from finger_pin.identification.result_dataset import result_dataset, write_results
 from finger_pin.identification.scenario_parameters import key_in
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.studies.fingerprint import digest as content_digest
@@ -96,7 +96,7 @@ def identify(
     if loss not in LOSSES:
         raise InputError("loss", f"must be one of {', '.join(LOSSES)}", loss)
     tables = {"parameters": parameters, "recordings": recordings, "compare": compare}
-    entries = {name: {key: _plain(each) for key, each in table.items()} for name, table in tables.items() if table}
+    entries = {name: {key: _as_builtin(each) for key, each in table.items()} for name, table in tables.items() if table}
     scenario, settings = load_bench(bench, overrides, entries)
     custom_finger = resolve_finger(finger, scenario)
     scenario = with_finger(scenario, custom_finger)
@@ -106,19 +106,19 @@ def identify(
     # Before any work: an entry that is wrong in them is refused now.
     other_laws(problem, settings)
     check_predictable(scenario, held_out, custom_finger)
-    for doubt in _doubts(problem, scenario):
-        warnings.warn(doubt, ScenarioWarning, stacklevel=2)
+    for message in _model_warnings(problem, scenario):
+        warnings.warn(message, ScenarioWarning, stacklevel=2)
     problem.stop = CancelToken(stop)
-    asked = digest(
+    request = digest(
         scenario,
         settings,
         recorded,
         (starts, seed, loss, *([] if custom_finger is None else [content_digest(custom_finger)])),
     )
-    with Checkpoint(None if output is None else Path(output), asked, restart) as ledger:
-        work = FitPipeline(problem, ledger, loss, progress)
-        result = _work(problem, settings, starting_points(problem, starts, seed), starts, work, profiles)
-        result.attrs["undamped"] = ", ".join(_undamped(scenario, problem))
+    with Checkpoint(None if output is None else Path(output), request, restart) as checkpoint:
+        pipeline = FitPipeline(problem, checkpoint, loss, progress)
+        result = _run_pipeline(problem, settings, starting_points(problem, starts, seed), starts, pipeline, profiles)
+        result.attrs["undamped"] = ", ".join(_undamped_joints(scenario, problem))
         result.attrs["profiles"] = int(profiles)
         result.attrs["custom_finger"] = int(custom_finger is not None)
         result.update(predictions(result, scenario, held_out, recorded, custom_finger))
@@ -128,42 +128,43 @@ def identify(
     return result
 
 
-def _doubts(problem: Problem, scenario: Scenario) -> Iterator[str]:
+def _model_warnings(problem: Problem, scenario: Scenario) -> Iterator[str]:
     """Yield warnings: the first one of every recording, and tolerances that are too coarse for slopes."""
     for name in dict.fromkeys(each.recording.name for each in problem.models):
         keys = [key_in(key, name) for key in problem.keys]
-        doubts = (each.doubt(keys) for each in problem.models if each.recording.name == name)
-        yield from itertools.islice(filter(None, doubts), 1)
-    for name in ("rtol", "atol_scale") if problem.moves else ():
+        messages = (each.warning(keys) for each in problem.models if each.recording.name == name)
+        yield from itertools.islice(filter(None, messages), 1)
+    for name in ("rtol", "atol_scale") if problem.has_motion else ():
         tolerance = getattr(scenario.simulation, name)
         if tolerance > GREATEST_TOLERANCE:
             coarse = f"simulation.{name} = {tolerance:g}: slopes of such runs may err by as much as themselves"
             yield f"{coarse}; {GREATEST_TOLERANCE:g} or less is fine enough"
 
 
-def _work(
+def _run_pipeline(
     problem: Problem,
     settings: IdentifySettings,
-    places: Sequence[Array],
+    points: Sequence[Array],
     starts: int,
-    work: FitPipeline,
+    pipeline: FitPipeline,
     profiles: bool,
 ) -> xr.Dataset:
     unfinished = ""
     try:
-        work.search(work.screen_starts(places, starts))
-        (work.profile_all if profiles else work.linearise)(work.best)
-        work.compare(settings)
+        pipeline.search(pipeline.screen_starts(points, starts))
+        (pipeline.profile_all if profiles else pipeline.linearise)(pipeline.best)
+        pipeline.compare(settings)
     except Stopped:
         unfinished = "interrupted: the best so far, and the intervals that are finished"
         problem.stop = lambda: False
-        if not work.fits:
-            reached = problem.best[1] if len(problem.best[1]) else problem.start
-            work.fits.append(fit(problem, reached, fixed=dict(enumerate(reached))))
-    return results(problem, work.fits, work.best, work.sides, work.spread, work.comparison, unfinished)
+        if not pipeline.fits:
+            point = problem.best[1] if len(problem.best[1]) else problem.start
+            pipeline.fits.append(fit(problem, point, fixed=dict(enumerate(point))))
+    ends, covariance = pipeline.interval_ends, pipeline.covariance
+    return result_dataset(problem, pipeline.fits, pipeline.best, ends, covariance, pipeline.comparison, unfinished)
 
 
-def _undamped(scenario: Scenario, problem: Problem) -> list[str]:
+def _undamped_joints(scenario: Scenario, problem: Problem) -> list[str]:
     """Return the undamped joints in motions: where friction holds them they ring, in ten times the steps."""
     finger, joints = scenario.finger, list(scenario.finger.joints)
     friction = finger.joint_friction
@@ -177,7 +178,7 @@ def _undamped(scenario: Scenario, problem: Problem) -> list[str]:
     return [name for name, value in zip(joints, damped, strict=True) if value == 0.0]
 
 
-def _plain(value: Any) -> Any:
+def _as_builtin(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {key: _plain(each) for key, each in value.items()}
-    return [_plain(each) for each in value] if isinstance(value, tuple | np.ndarray) else value
+        return {key: _as_builtin(each) for key, each in value.items()}
+    return [_as_builtin(each) for each in value] if isinstance(value, tuple | np.ndarray) else value

@@ -16,13 +16,13 @@ from finger_pin.identification.problem import Problem
 from finger_pin.typing import Array
 
 #: Rise of minus twice the log-likelihood at the ends of an interval: 95 % of chi-squared with one degree of freedom.
-LEVEL = 3.841
+CHI2_95 = 3.841
 # Relative error of the rise at an end: half of it is that of the half width, as its root is straight there.
-# And the number of refits after which a search for an end gives up.
-_LEVEL_ERROR, _REFITS = 0.06, 8
-# Fall of minus twice the log-likelihood from which on a refit is another minimum: twice the 0.1 by which errors of fine
-# runs make it jump.
-_DEEPER = 0.2
+# And the greatest number of refits in the search for an end.
+_CHI2_TOLERANCE, _MAX_REFITS = 0.06, 8
+# Fall of minus twice the log-likelihood above which a refit is another minimum: twice its jump of 0.1 by errors of fine
+# runs.
+_LOWER_MINIMUM_FALL = 0.2
 # Standard deviation, part of the range, from which on a direction is free: an interval of 95 % is as wide as the range.
 _FREE_DEVIATION = 0.25
 # Entries of a direction that are left out of its words, part of the largest.
@@ -36,12 +36,12 @@ class ProfileBound:
     Attributes:
         end: z there; infinite where the recording does not close it within the bounds.
         path: Points of the profile, shape (k, 2): z and the rise of minus twice the likelihood.
-        better: A minimum below the one that it started from, if one turned up.
+        lower_minimum: A minimum below the one that the profile started from, if found.
     """
 
     end: float
     path: Array
-    better: Fit | None = None
+    lower_minimum: Fit | None = None
 
 
 def covariance(problem: Problem, minimum: Fit) -> Array:
@@ -49,9 +49,9 @@ def covariance(problem: Problem, minimum: Fit) -> Array:
     return inverse_within_bounds(problem, information(problem, minimum))
 
 
-def inverse_within_bounds(problem: Problem, known: Array) -> Array:
+def inverse_within_bounds(problem: Problem, fisher_information: Array) -> Array:
     """Return the covariance of z by an information, shape (p, p); no direction is less sure than bounds are wide."""
-    values, vectors, size = _directions(problem, known)
+    values, vectors, size = _directions(problem, fisher_information)
     return np.asarray((vectors / np.maximum(values, 1.0)) @ vectors.T * size)
 
 
@@ -61,11 +61,11 @@ def information_of_bounds(problem: Problem, minimum: Fit) -> Array:
     return np.asarray((vectors * np.maximum(1.0 - values, 0.0)) @ vectors.T / size)
 
 
-def _directions(problem: Problem, known: Array) -> tuple[Array, Array, Array]:
+def _directions(problem: Problem, fisher_information: Array) -> tuple[Array, Array, Array]:
     """Return eigenvalues and eigenvectors of scaled information, and the products of ranges that scale it."""
     width = np.subtract(*reversed(problem.box))
     size = np.outer(width, width)
-    return *np.linalg.eigh(known * size), size
+    return *np.linalg.eigh(fisher_information * size), size
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,44 +76,45 @@ class SmallSample:
         variance: Factors on the variance of every parameter for the same 95 % of a normal distribution, shape (p,).
         level: Rise of minus twice the likelihood at an end of each interval, shape (p,).
         noise: Factors on the noise of every signal, for 95 % of further readings, shape (s,).
-        elsewhere: The same on the mean square of the noises of a name, for readings of other recordings, shape (s,).
+        pooled_noise: The same on the mean square of the noises of a name, for readings of other recordings, shape (s,).
     """
 
     variance: Array
     level: Array
     noise: Array
-    elsewhere: Array
+    pooled_noise: Array
 
     @classmethod
-    def from_fit(cls, problem: Problem, minimum: Fit, spread: Array) -> Self:
+    def from_fit(cls, problem: Problem, minimum: Fit, covariance: Array) -> Self:
         """Return the corrections at a minimum with a covariance by the likelihood alone.
 
-        Of several outputs each has what is left of its samples by the parameters that it tells (the trace of its part
-        of the information), and a parameter the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
+        Each output has its samples less its effective number of parameters (the trace of its part of the information)
+        as degrees of freedom, and a parameter the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
         """
         groups, slopes = problem.groups, problem.slopes(minimum.z)
-        parts = np.zeros((int(groups.max()) + 1, *spread.shape))
+        parts = np.zeros((int(groups.max()) + 1, *covariance.shape))
         count = np.zeros(len(parts))
         for group, w, n, e, j in zip(groups, minimum.weights, minimum.noise, minimum.residuals, slopes, strict=True):
             parts[group] += w / n**2 * j.T @ j
             count[group] += w * len(e)
-        # Correlated samples may count for less than the parameters that they are to tell.
-        told = np.einsum("kl,glk->g", spread, parts)
-        left = np.maximum(count - told, 1.0)
-        plain = np.einsum("kl,glm,mk->gk", spread, parts, spread)
-        grown = plain * (count / left)[:, None]
-        whole, corrected = np.maximum(plain.sum(axis=0), 1e-300), np.maximum(grown.sum(axis=0), 1e-300)
-        free = np.maximum(corrected**2 / np.maximum(np.sum(grown**2 / left[:, None], axis=0), 1e-300), 1.0)
-        factor, quantile = corrected / whole, student.ppf(0.975, free)
+        # Correlated samples may count for fewer than the parameters.
+        effective_parameters = np.einsum("kl,glk->g", covariance, parts)
+        freedom_left = np.maximum(count - effective_parameters, 1.0)
+        variances = np.einsum("kl,glm,mk->gk", covariance, parts, covariance)
+        corrected = variances * (count / freedom_left)[:, None]
+        total, corrected_total = np.maximum([variances.sum(axis=0), corrected.sum(axis=0)], 1e-300)
+        square_total = np.maximum(np.sum(corrected**2 / freedom_left[:, None], axis=0), 1e-300)
+        freedom = np.maximum(corrected_total**2 / square_total, 1.0)
+        factor, quantile = corrected_total / total, student.ppf(0.975, freedom)
         return cls(
-            factor * quantile**2 / LEVEL,
-            factor * free * np.log1p(quantile**2 / free),
-            (np.sqrt(count / left / LEVEL) * student.ppf(0.975, left))[groups],
-            _elsewhere(problem, minimum, count, told)[groups],
+            factor * quantile**2 / CHI2_95,
+            factor * freedom * np.log1p(quantile**2 / freedom),
+            (np.sqrt(count / freedom_left / CHI2_95) * student.ppf(0.975, freedom_left))[groups],
+            _pooled_noise_factors(problem, minimum, count, effective_parameters)[groups],
         )
 
 
-def _elsewhere(problem: Problem, minimum: Fit, count: Array, told: Array) -> Array:
+def _pooled_noise_factors(problem: Problem, minimum: Fit, count: Array, effective_parameters: Array) -> Array:
     """Return factors on the mean square noise of a name for readings of other recordings, for 95 % of them, by output.
 
     Samples that follow each other are hardly more than one, so that one recording tells its noise badly: the mean of
@@ -123,18 +124,19 @@ def _elsewhere(problem: Problem, minimum: Fit, count: Array, told: Array) -> Arr
         problem: The problem that was fitted.
         minimum: Of the problem.
         count: Number of independent samples of every output.
-        told: Number of parameters that every output tells.
+        effective_parameters: Effective number of parameters of every output.
     """
     first = [int(np.flatnonzero(problem.groups == group)[0]) for group in range(len(count))]
     names, square = [problem.signals[k].name for k in first], minimum.noise[first] ** 2
-    alike = np.array([[one == other for other in names] for one in names])
-    ratio = alike @ count / np.maximum(alike @ (count - told), 1.0)
-    freedom = np.maximum((alike @ square) ** 2 / (ratio * (alike @ (square**2 / np.maximum(count, 1e-300)))), 1.0)
-    return np.asarray(np.sqrt(ratio / LEVEL) * student.ppf(0.975, freedom))
+    same_name = np.array([[one == other for other in names] for one in names])
+    ratio = same_name @ count / np.maximum(same_name @ (count - effective_parameters), 1.0)
+    square_total = same_name @ (square**2 / np.maximum(count, 1e-300))
+    freedom = np.maximum((same_name @ square) ** 2 / (ratio * square_total), 1.0)
+    return np.asarray(np.sqrt(ratio / CHI2_95) * student.ppf(0.975, freedom))
 
 
 def profile(
-    problem: Problem, minimum: Fit, k: int, way: int, spread: Array, loss: str = "linear", inflation: float = 1.0
+    problem: Problem, minimum: Fit, k: int, side: int, covariance: Array, loss: str = "linear", inflation: float = 1.0
 ) -> ProfileBound:
     """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841 times an inflation.
 
@@ -142,54 +144,55 @@ def profile(
         problem: The problem that was fitted.
         minimum: Of the problem.
         k: Which parameter.
-        way: 1 for the upper end, -1 for the lower.
-        spread: Covariance of z.
+        side: 1 for the upper end, -1 for the lower.
+        covariance: Covariance of z.
         loss: As for `fit`.
         inflation: Variance of the parameter over that by the likelihood (Pace, Salvan and Sartori, Statistica Sinica
             21, 2011), and over that of few readings; rises of the path are divided by it.
     """
     low, high = problem.box
-    limit = high[k] if way > 0 else low[k]
+    limit = high[k] if side > 0 else low[k]
     room = abs(limit - minimum.z[k])
-    deviation = math.sqrt(max(inflation * spread[k, k], 0.0))
-    tilt = spread[:, k] / spread[k, k] if spread[k, k] > 0.0 else np.zeros(len(minimum.z))
+    deviation = math.sqrt(max(inflation * covariance[k, k], 0.0))
+    direction = covariance[:, k] / covariance[k, k] if covariance[k, k] > 0.0 else np.zeros(len(minimum.z))
     path = [(float(minimum.z[k]), 0.0)]
-    reach = min(room, max(math.sqrt(LEVEL) * deviation, 1e-6 * (high[k] - low[k])))
+    distance = min(room, max(math.sqrt(CHI2_95) * deviation, 1e-6 * (high[k] - low[k])))
     inner, outer = (0.0, 0.0), (math.inf, math.inf)
     slopes: Sequence[Array] = problem.slopes(minimum.z)
     # The farthest place within the interval: refits start there, not from one beyond that may have failed.
-    within, end = minimum, math.inf * way
-    for _ in range(_REFITS if room > 1e-9 * (high[k] - low[k]) else 0):
-        at = minimum.z[k] + way * reach
-        guess = np.clip(within.z + tilt * (at - within.z[k]), low, high)
-        refit = partial(fit, problem, fixed={k: at}, weights=minimum.weights, scale=minimum.noise, loss=loss)
-        there = refit(guess, slopes=slopes)
-        if not there.converged and math.isfinite(there.objective):
-            there = refit(there.z)
-        rise = (there.objective - minimum.objective) / inflation
-        path.append((at, rise))
-        if rise * inflation < -_DEEPER:
-            return ProfileBound(end, np.array(path), there)
-        if rise >= LEVEL:
+    inner_fit, end = minimum, math.inf * side
+    for _ in range(_MAX_REFITS if room > 1e-9 * (high[k] - low[k]) else 0):
+        value = minimum.z[k] + side * distance
+        guess = np.clip(inner_fit.z + direction * (value - inner_fit.z[k]), low, high)
+        refit = partial(fit, problem, fixed={k: value}, weights=minimum.weights, scale=minimum.noise, loss=loss)
+        refitted = refit(guess, slopes=slopes)
+        if not refitted.converged and math.isfinite(refitted.objective):
+            refitted = refit(refitted.z)
+        rise = (refitted.objective - minimum.objective) / inflation
+        path.append((value, rise))
+        if rise * inflation < -_LOWER_MINIMUM_FALL:
+            return ProfileBound(end, np.array(path), refitted)
+        if rise >= CHI2_95:
             # A refit that has not come to its end tells that the end is before it, not how near.
-            outer = (reach, math.sqrt(rise) if there.converged else math.inf)
+            outer = (distance, math.sqrt(rise) if refitted.converged else math.inf)
         else:
-            inner, within, slopes = (reach, math.sqrt(max(rise, 0.0))), there, there.slopes or slopes
-            if reach >= room * (1.0 - 1e-12):
+            inner, inner_fit, slopes = (distance, math.sqrt(max(rise, 0.0))), refitted, refitted.slopes or slopes
+            if distance >= room * (1.0 - 1e-12):
                 break
-        crossing, near = _crossing(inner, outer), there.converged and abs(rise - LEVEL) < _LEVEL_ERROR * LEVEL
-        if near or math.isfinite(outer[0]):
-            end = minimum.z[k] + way * min(crossing, room)
-        if near:
+        crossing = _crossing(inner, outer)
+        at_level = refitted.converged and abs(rise - CHI2_95) < _CHI2_TOLERANCE * CHI2_95
+        if at_level or math.isfinite(outer[0]):
+            end = minimum.z[k] + side * min(crossing, room)
+        if at_level:
             break
-        further = 0.0 if math.isfinite(outer[0]) else max(1.2 * inner[0], 1e-6 * room)
-        reach = min(room, max(crossing, further))
+        least_distance = 0.0 if math.isfinite(outer[0]) else max(1.2 * inner[0], 1e-6 * room)
+        distance = min(room, max(crossing, least_distance))
     return ProfileBound(end, np.array(path))
 
 
 def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
-    """Return where the root of the rise in likelihood crosses that of the level, from points on either side."""
-    target = math.sqrt(LEVEL)
+    """Return the distance at which the root of the rise reaches that of the level, from points on either side."""
+    target = math.sqrt(CHI2_95)
     if math.isinf(outer[1]) and math.isfinite(outer[0]):
         return 0.5 * (inner[0] + outer[0])
     if math.isinf(outer[0]):
@@ -208,11 +211,11 @@ def free_directions(problem: Problem, minimum: Fit) -> list[tuple[str, list[int]
             direction = vector * width
             size = np.abs(direction) / np.max(np.abs(direction))
             shown = [k for k in range(len(size)) if size[k] > _SMALL_ENTRY]
-            directions.append((_in_words(problem, direction, shown), shown))
+            directions.append((_direction_text(problem, direction, shown), shown))
     return directions
 
 
-def _in_words(problem: Problem, direction: Array, shown: list[int]) -> str:
+def _direction_text(problem: Problem, direction: Array, shown: list[int]) -> str:
     """Return a direction of z in words."""
     size = np.abs(direction) / np.max(np.abs(direction))
     names = [problem.keys[k] for k in shown]
@@ -220,11 +223,10 @@ def _in_words(problem: Problem, direction: Array, shown: list[int]) -> str:
         return f"{names[0]} is not determined: the recording hardly feels it"
     if len(shown) == 2 and all(problem.logarithmic[shown]) and min(size[shown]) > 0.8:
         same_sign = direction[shown[0]] * direction[shown[1]] > 0.0
-        what = "quotient" if same_sign else "product"
-        return f"of {names[0]} and {names[1]} only the {what} is determined"
-    return (
-        f"only a combination of {_listed(names)} is determined: {_example(problem, direction, shown)} changes nothing"
-    )
+        combination = "quotient" if same_sign else "product"
+        return f"of {names[0]} and {names[1]} only the {combination} is determined"
+    listed = f"{', '.join(names[:-1])} and {names[-1]}"
+    return f"only a combination of {listed} is determined: {_example(problem, direction, shown)} changes nothing"
 
 
 def _example(problem: Problem, direction: Array, shown: Sequence[int]) -> str:
@@ -235,7 +237,3 @@ def _example(problem: Problem, direction: Array, shown: Sequence[int]) -> str:
         change = f"times {math.exp(step[k]):.3g}" if problem.logarithmic[k] else f"plus {step[k]:.3g}"
         parts.append(f"{problem.keys[k]} {change}")
     return " with ".join(parts)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"

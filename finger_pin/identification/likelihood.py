@@ -13,8 +13,8 @@ from scipy.stats import norm
 from finger_pin.identification.recordings import RecordedSignal
 from finger_pin.typing import Array
 
-# Median size of what is normally distributed with a deviation of one.
-_MEDIAN = float(norm.ppf(0.75))
+# Median magnitude of a standard normal variable.
+_NORMAL_MEDIAN = float(norm.ppf(0.75))
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,38 +27,39 @@ class NoiseGrowth:
 
     Attributes:
         measured: Readings of every signal.
-        least: Least noise of every signal, shape (s,).
-        share: Part of the reading, shape (s,).
+        least_noise: Least noise of every signal, shape (s,).
+        noise_share: Part of the reading, shape (s,).
         groups: Group of every signal, shape (s,).
     """
 
     measured: Sequence[Array]
-    least: Array
-    share: Array
+    least_noise: Array
+    noise_share: Array
     groups: NDArray[np.intp]
 
     @classmethod
     def from_signals(cls, signals: Sequence[RecordedSignal], groups: NDArray[np.intp]) -> Self:
         """Return the growth of the noise of recorded signals."""
-        least, share = np.array([(each.least_noise, each.noise_share) for each in signals]).reshape(-1, 2).T
-        return cls([each.measured for each in signals], least, share, groups)
+        least_noise, noise_share = np.array([(each.least_noise, each.noise_share) for each in signals]).reshape(-1, 2).T
+        return cls([each.measured for each in signals], least_noise, noise_share, groups)
 
     @property
     def floor(self) -> Array:
         """The least deviation of residuals, shape (s,), by the level of the measured readings."""
-        return self.least * self.levels([0.0 * x for x in self.measured]) if self.acts else self.least
+        return self.least_noise * self.levels([0.0 * x for x in self.measured]) if self.active else self.least_noise
 
     @property
     def _ratios(self) -> Array:
-        return np.divide(self.share, self.least, out=np.zeros_like(self.share), where=self.share > 0.0)
+        zeros = np.zeros_like(self.noise_share)
+        return np.divide(self.noise_share, self.least_noise, out=zeros, where=self.noise_share > 0.0)
 
     @property
-    def acts(self) -> bool:
+    def active(self) -> bool:
         """Whether any noise grows."""
-        return bool(np.any(self.share))
+        return bool(np.any(self.noise_share))
 
     def growth(self, errors: Sequence[Array]) -> list[Array]:
-        """Return w of what is computed, measured less errors."""
+        """Return w at the computed readings, which are measured less errors."""
         readings = zip(self._ratios, self.measured, errors, strict=True)
         return [np.sqrt(1.0 + (ratio * (x - e)) ** 2) if ratio else np.ones_like(x) for ratio, x, e in readings]
 
@@ -89,7 +90,7 @@ class NoiseGrowth:
         return np.asarray((totals.T / np.maximum(count, 1)).T[self.groups])
 
 
-def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
+def pooled_variance(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
     """Return the number of independent samples of every group of signals, and their mean square."""
     count, squares = np.zeros((2, int(groups.max(initial=-1)) + 1))
     for e, w, group in zip(residuals, weights, groups, strict=True):
@@ -98,10 +99,10 @@ def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp])
     return count, squares / np.maximum(count, 1e-300)
 
 
-def typical(residuals: Sequence[Array], groups: NDArray[np.intp]) -> Array:
+def robust_deviation(residuals: Sequence[Array], groups: NDArray[np.intp]) -> Array:
     """Return the deviation of the residuals of every signal's output by their median, which outliers hardly change."""
     sizes = [np.abs(np.concatenate([e for e, g in zip(residuals, groups, strict=True) if g == k])) for k in groups]
-    return np.array([np.median(each) / _MEDIAN if len(each) else 1.0 for each in sizes])
+    return np.array([np.median(each) / _NORMAL_MEDIAN if len(each) else 1.0 for each in sizes])
 
 
 def minus_twice_likelihood(
@@ -112,16 +113,16 @@ def minus_twice_likelihood(
     Where SSE / n is below the square of the least noise s of a signal, the term is w (n log(s^2) + SSE / s^2 - n): that
     of a known noise, which joins the other one smoothly.
     """
-    count, square = pooled(residuals, weights, groups)
+    count, square = pooled_variance(residuals, weights, groups)
     least = np.zeros(len(count))
     least[groups] = least_noise**2
-    there = count > 0.0
-    value = np.sum(count[there] * np.log(np.maximum(np.maximum(square, least)[there], 1e-300)))
-    known = there & (square < least)
-    return float(value + np.sum(count[known] * (square[known] / least[known] - 1.0)))
+    sampled = count > 0.0
+    value = np.sum(count[sampled] * np.log(np.maximum(np.maximum(square, least)[sampled], 1e-300)))
+    at_least_noise = sampled & (square < least)
+    return float(value + np.sum(count[at_least_noise] * (square[at_least_noise] / least[at_least_noise] - 1.0)))
 
 
-def means_of(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
+def block_means(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
     """Return means of consecutive samples."""
     pairs = zip(values, counts, strict=True)
     return [e[: len(e) // n * n].reshape(-1, n, *e.shape[1:]).mean(axis=1) for e, n in pairs]

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.scenario_parameters import ScenarioPart, bare, entry_of
+from finger_pin.identification.scenario_parameters import ScenarioPart, entry_of, scenario_key
 from finger_pin.typing import Array
 
-# How near to the edge, over the way to a corner; of how many numbers all corners are tried.
-_NEAR_EDGE, _FEW = 1e-9, 8
+# Tolerance of the edge, part of the line to a corner; greatest number of parameters of which all corners are tried.
+_EDGE_TOLERANCE, _MAX_CORNER_PARAMETERS = 1e-9, 8
 
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Bounds of numbers, and the scenarios that they make.
+    """Bounds of parameters, and the scenarios that limit them within.
 
     Attributes:
         parts: The scenarios, of one recording each.
@@ -41,37 +41,38 @@ class Limits:
         Raises:
             InputError: Naming the key, its bound and what is wrong with it.
         """
-        self = cls(parts, [bare(key) for key in parameters], low, high)
-        keys, middle = self.keys, 0.5 * (self.low + self.high)
-        anywhere = any(self.refusal(each) is None for each in self._corners(middle, np.ones(len(keys), dtype=bool)))
+        limits = cls(parts, [scenario_key(key) for key in parameters], low, high)
+        keys, middle = limits.keys, 0.5 * (limits.low + limits.high)
+        corners = limits._corners(middle, np.ones(len(keys), dtype=bool))
+        any_feasible = any(limits.refusal(each) is None for each in corners)
         for k, key in enumerate(keys):
-            part = next(each for each in parts if k in each.places)
-            alone = ParametrisedScenario(part.family.scenario, (key,))
-            for bound in (self.low[k], self.high[k]):
+            part = next(each for each in parts if k in each.indices)
+            single = ParametrisedScenario(part.family.scenario, (key,))
+            for bound in (limits.low[k], limits.high[k]):
                 try:
-                    alone.with_values([float(bound)])
+                    single.with_values([float(bound)])
                 except InputError as error:
-                    at, free = middle.copy(), np.arange(len(keys)) != k
-                    at[k] = bound
-                    refusals = {self.refusal(each) for each in (at, *self._corners(at, free))}
-                    # What is wrong with it alone is the same beside any others.
-                    others = (each[0] in keys and each[0] != key for each in refusals if each)
-                    between = None in refusals or len(refusals) > 1 or any(others)
-                    if not (between and anywhere):
+                    point, free = middle.copy(), np.arange(len(keys)) != k
+                    point[k] = bound
+                    refusals = {limits.refusal(each) for each in (point, *limits._corners(point, free))}
+                    # A bound that is wrong by itself is refused alike whatever the other values.
+                    other_key_refused = (each[0] in keys and each[0] != key for each in refusals if each)
+                    feasible_between = None in refusals or len(refusals) > 1 or any(other_key_refused)
+                    if not (feasible_between and any_feasible):
                         allowed = error.allowed if error.entry == key else f"with it {error.entry} {error.allowed}"
                         raise InputError(entry_of(parameters[k]), allowed, float(bound)) from None
-        return self
+        return limits
 
     def refusal(self, values: Array) -> tuple[str, str] | None:
-        """Return the entry that does not go with the others, and its allowed values; None if all are allowed."""
+        """Return the refused entry and its allowed values; None if all values are allowed together."""
         try:
             for part in self.parts:
-                part.at(values)
+                part.scenario_at(values)
         except InputError as error:
             return error.entry, error.allowed
         return None
 
-    def nearest(self, values: Array, free: NDArray[np.bool_] | None = None) -> Array:
+    def nearest_allowed(self, values: Array, free: NDArray[np.bool_] | None = None) -> Array:
         """Return the nearest allowed values on lines to corners of the bounds; the same values if there are none.
 
         Args:
@@ -84,23 +85,24 @@ class Limits:
         corner = next((each for each in corners if self.refusal(each) is None), None)
         if corner is None:
             return values
-        out, into = 0.0, 1.0
-        while into - out > _NEAR_EDGE:
-            middle = 0.5 * (out + into)
+        refused, accepted = 0.0, 1.0
+        while accepted - refused > _EDGE_TOLERANCE:
+            middle = 0.5 * (refused + accepted)
             allowed = self.refusal(values + middle * (corner - values)) is None
-            out, into = (out, middle) if allowed else (middle, into)
-        return values + into * (corner - values)
+            refused, accepted = (refused, middle) if allowed else (middle, accepted)
+        return values + accepted * (corner - values)
 
     def _corners(self, values: Array, free: NDArray[np.bool_]) -> Iterator[Array]:
-        """Yield values with one number at a bound, the nearest first, then those of a few with all of them there."""
-        places = np.flatnonzero(free)
-        ends = [(k, end) for k in places for end in (self.low[k], self.high[k])]
-        ends.sort(key=lambda bound: abs(bound[1] - values[bound[0]]) / (self.high[bound[0]] - self.low[bound[0]]))
-        for k, end in ends:
+        """Yield points with one parameter at a bound, nearest first, then corners with all free ones at bounds."""
+        indices = np.flatnonzero(free)
+        bounds = [(k, limit) for k in indices for limit in (self.low[k], self.high[k])]
+        bounds.sort(key=lambda bound: abs(bound[1] - values[bound[0]]) / (self.high[bound[0]] - self.low[bound[0]]))
+        for k, limit in bounds:
             corner = values.copy()
-            corner[k] = end
+            corner[k] = limit
             yield corner
-        for both in itertools.product((False, True), repeat=len(places)) if len(places) <= _FEW else ():
-            corner = values.copy()
-            corner[places] = np.where(both, self.high[places], self.low[places])
-            yield corner
+        if len(indices) <= _MAX_CORNER_PARAMETERS:
+            for at_upper in itertools.product((False, True), repeat=len(indices)):
+                corner = values.copy()
+                corner[indices] = np.where(at_upper, self.high[indices], self.low[indices])
+                yield corner

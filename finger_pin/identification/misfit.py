@@ -15,13 +15,13 @@ from scipy.stats import t as student
 
 from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import information_of_bounds, inverse_within_bounds
-from finger_pin.identification.likelihood import typical
+from finger_pin.identification.likelihood import robust_deviation
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording
 from finger_pin.typing import Array
 
-# From which probability of chance on a model is said to miss something, and how many lags of correlation are fitted.
-CHANCE, _LAGS = 0.01, 8
+# Probability below which a misfit is significant, and the greatest order of the autoregression of residuals.
+SIGNIFICANCE, _MAX_LAGS = 0.01, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,19 +29,19 @@ class Repeats:
     """Signals, or readings of one signal, that a model cannot tell apart.
 
     Attributes:
-        signals: Their numbers: of motions all repeated runs, of readings one.
+        signals: Indices of the signals: all repeated runs of a motion, or one signal of readings.
         scatter: Mean square of residuals about their mean, independent of any model.
-        common: Mean square of what they share beyond that scatter, which the model misses; 0 if that may be chance.
-        chance: Probability of as much under a model that misses nothing (F test).
+        shared_misfit: Mean square of the residual that they share beyond that scatter; 0 if that may be chance.
+        p_value: Probability of such a misfit under a correct model (F test).
     """
 
     signals: tuple[int, ...]
     scatter: float
-    common: float
-    chance: float
+    shared_misfit: float
+    p_value: float
 
 
-def sandwich(problem: Problem, minimum: Fit, spread: Array) -> Array:
+def sandwich_covariance(problem: Problem, minimum: Fit, covariance: Array) -> Array:
     """Return the covariance of z with residuals correlated as they are, shape (p, p).
 
     The estimate weighs samples as if they were independent but for their share; its covariance H^-1 V H^-1 has V of
@@ -51,38 +51,39 @@ def sandwich(problem: Problem, minimum: Fit, spread: Array) -> Array:
     Args:
         problem: The problem that was fitted.
         minimum: Of the problem.
-        spread: Covariance by the likelihood alone, H^-1, shape (p, p).
+        covariance: Covariance by the likelihood alone, H^-1, shape (p, p).
     """
     slopes = problem.slopes(minimum.z)
     scores = [w / n**2 * j for w, n, j in zip(minimum.weights, minimum.noise, slopes, strict=True)]
-    total, together = information_of_bounds(problem, minimum), set[int]()
+    total, repeated_signals = information_of_bounds(problem, minimum), set[int]()
     for repeated in repeats(problem, minimum.residuals):
-        if repeated.common == 0.0:
+        if repeated.shared_misfit == 0.0:
             continue
-        together.update(repeated.signals)
+        repeated_signals.update(repeated.signals)
         members = [problem.signals[k] for k in repeated.signals]
-        # Where residuals are smaller than the least noise, that counts.
-        grown = max(1.0, members[0].least_noise ** 2 / (repeated.common + repeated.scatter))
+        # Residuals below the least noise count as that noise.
+        floor_factor = max(1.0, members[0].least_noise ** 2 / (repeated.shared_misfit + repeated.scatter))
+        shared_square, scatter_square = floor_factor * repeated.shared_misfit, floor_factor * repeated.scatter
         if members[0].ordered:
             mean = np.mean([minimum.residuals[k] for k in repeated.signals], axis=0)
             shared = np.sum([scores[k] for k in repeated.signals], axis=0)
-            total += grown * repeated.common * _correlated(shared, _process([mean]))
-            apart = [minimum.residuals[k] - mean for k in repeated.signals]
-            spread_apart = sum(_correlated(scores[k], _process(apart)) for k in repeated.signals)
-            total += grown * repeated.scatter * spread_apart
+            total += shared_square * _correlated_information(shared, _autoregression([mean]))
+            deviations = [minimum.residuals[k] - mean for k in repeated.signals]
+            process = _autoregression(deviations)
+            total += scatter_square * sum(_correlated_information(scores[k], process) for k in repeated.signals)
         else:
             score, replicate = scores[repeated.signals[0]], members[0].replicate
             sums = np.zeros((replicate.max() + 1, score.shape[1]))
             np.add.at(sums, replicate, score)
-            total += grown * repeated.common * sums.T @ sums + grown * repeated.scatter * score.T @ score
+            total += shared_square * sums.T @ sums + scatter_square * score.T @ score
     for group in np.unique(problem.groups):
-        single = [k for k in np.flatnonzero(problem.groups == group).tolist() if k not in together]
-        process = _process([minimum.residuals[k] for k in single if problem.signals[k].ordered])
-        total += sum(minimum.noise[k] ** 2 * _correlated(scores[k], process) for k in single)
-    return np.asarray(spread @ total @ spread)
+        unrepeated = [k for k in np.flatnonzero(problem.groups == group).tolist() if k not in repeated_signals]
+        autoregression = _autoregression([minimum.residuals[k] for k in unrepeated if problem.signals[k].ordered])
+        total += sum(minimum.noise[k] ** 2 * _correlated_information(scores[k], autoregression) for k in unrepeated)
+    return np.asarray(covariance @ total @ covariance)
 
 
-def jackknife(problem: Problem, minimum: Fit) -> Array:
+def jackknife_covariance(problem: Problem, minimum: Fit) -> Array:
     """Return the covariance of z by leaving out one setting at a time, shape (p, p); zero of less than three settings.
 
     Settings are the recordings or, of less than three, the loads of their readings. What a model misses is shared by
@@ -92,22 +93,22 @@ def jackknife(problem: Problem, minimum: Fit) -> Array:
     """
     by_load = len({signal.recording for signal in problem.signals}) < 3
     parts, scores = dict[tuple[str, float], Array](), dict[tuple[str, float], Array]()
-    far = outliers(problem, minimum.residuals)
-    usual = [np.where(ratio > 0.0, 0.0, e) for ratio, e in zip(far, minimum.residuals, strict=True)]
-    by_signal = zip(problem.signals, minimum.weights, minimum.noise, usual, problem.slopes(minimum.z), strict=True)
+    outlier_ratios = outliers(problem, minimum.residuals)
+    inliers = [np.where(ratio > 0.0, 0.0, e) for ratio, e in zip(outlier_ratios, minimum.residuals, strict=True)]
+    by_signal = zip(problem.signals, minimum.weights, minimum.noise, inliers, problem.slopes(minimum.z), strict=True)
     for signal, w, n, e, j in by_signal:
         load = np.nan_to_num(signal.load) if by_load and not signal.ordered else np.zeros(len(e))
-        for each in np.unique(load):
-            rows, setting = load == each, (signal.recording, float(each))
+        for level in np.unique(load):
+            rows, setting = load == level, (signal.recording, float(level))
             parts[setting] = parts.get(setting, 0.0) + w / n**2 * j[rows].T @ j[rows]
             scores[setting] = scores.get(setting, 0.0) + w / n**2 * j[rows].T @ e[rows]
     count = len(parts)
     if count < 3:
         return np.zeros((len(minimum.z), len(minimum.z)))
-    whole, mean = np.sum(list(parts.values()), axis=0), np.mean(list(scores.values()), axis=0)
-    without = [inverse_within_bounds(problem, whole - parts[each]) @ (scores[each] - mean) for each in parts]
+    total, mean = np.sum(list(parts.values()), axis=0), np.mean(list(scores.values()), axis=0)
+    shifts = [inverse_within_bounds(problem, total - parts[level]) @ (scores[level] - mean) for level in parts]
     share = (count - 1) / count * (student.ppf(0.975, count - 1) / 1.96) ** 2
-    return np.asarray(share * np.transpose(without) @ without)
+    return np.asarray(share * np.transpose(shifts) @ shifts)
 
 
 def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:
@@ -117,34 +118,34 @@ def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:
     """
     ratios, groups = [], problem.groups
     count = np.bincount(groups, [len(e) for e in residuals])[groups]
-    for e, n, deviation in zip(residuals, count, typical(residuals, groups), strict=True):
+    for e, n, deviation in zip(residuals, count, robust_deviation(residuals, groups), strict=True):
         ratio = np.abs(e) / max(deviation, 1e-300)
-        chance = 2.0 * n * student.sf(ratio, max(n - len(problem.keys), 1.0))
-        ratios.append(np.where((chance < CHANCE) & (ratio**2 > n), ratio, 0.0))
+        p_value = 2.0 * n * student.sf(ratio, max(n - len(problem.keys), 1.0))
+        ratios.append(np.where((p_value < SIGNIFICANCE) & (ratio**2 > n), ratio, 0.0))
     return ratios
 
 
 def repeats(problem: Problem, residuals: Sequence[Array]) -> list[Repeats]:
-    """Return the repeats among the signals, with residuals of all of them."""
+    """Return the repeated runs and readings among the signals, with their misfit."""
     repeated, runs = [], list[list[int]]()
     recordings = {model.recording.name: model.recording for model in problem.models}
     for k, signal in enumerate(problem.signals):
         if signal.ordered:
-            like = [run for run in runs if _are_repeats(problem.signals[run[0]], signal, recordings)]
-            if like:
-                like[0].append(k)
+            matching = [run for run in runs if _are_repeated_runs(problem.signals[run[0]], signal, recordings)]
+            if matching:
+                matching[0].append(k)
             else:
                 runs.append([k])
         elif signal.replicate.max(initial=-1) + 1 < len(signal.measured):
-            repeated.append(_of_readings(k, signal.replicate, residuals[k], len(problem.keys)))
-    repeated += [_of_runs(tuple(run), [residuals[k] for k in run]) for run in runs if len(run) > 1]
+            repeated.append(_reading_repeats(k, signal.replicate, residuals[k], len(problem.keys)))
+    repeated += [_run_repeats(tuple(run), [residuals[k] for k in run]) for run in runs if len(run) > 1]
     return repeated
 
 
-def _are_repeats(one: RecordedSignal, other: RecordedSignal, recordings: Mapping[str, Recording]) -> bool:
+def _are_repeated_runs(first: RecordedSignal, second: RecordedSignal, recordings: Mapping[str, Recording]) -> bool:
     """Return whether two signals of motions are of the same output, read at the same times, of repeated runs."""
-    same = one.name == other.name and np.array_equal(one.instant, other.instant)
-    return same and recordings[one.recording].repeats(recordings[other.recording])
+    same_output = first.name == second.name and np.array_equal(first.instant, second.instant)
+    return same_output and recordings[first.recording].repeats(recordings[second.recording])
 
 
 def scatter(values: Array, replicate: NDArray[np.intp]) -> float:
@@ -156,55 +157,56 @@ def scatter(values: Array, replicate: NDArray[np.intp]) -> float:
     return float(np.sum((values - mean[replicate]) ** 2)) / (len(values) - len(count))
 
 
-def _of_readings(k: int, replicate: NDArray[np.intp], residual: Array, parameters: int) -> Repeats:
+def _reading_repeats(k: int, replicate: NDArray[np.intp], residual: Array, parameters: int) -> Repeats:
     count = np.bincount(replicate)
     mean = np.bincount(replicate, residual) / count
-    inner, outer = len(residual) - len(count), max(len(count) - parameters, 1)
+    inner_freedom, outer_freedom = len(residual) - len(count), max(len(count) - parameters, 1)
     within = scatter(residual, replicate)
-    between = float(np.sum(count * mean**2)) / outer
-    chance = float(f_distribution.sf(between / max(within, 1e-300), outer, inner))
-    common = max(between - within, 0.0) / float(np.mean(count))
-    return Repeats((k,), within, common if chance < CHANCE else 0.0, chance)
+    between = float(np.sum(count * mean**2)) / outer_freedom
+    p_value = float(f_distribution.sf(between / max(within, 1e-300), outer_freedom, inner_freedom))
+    shared_misfit = max(between - within, 0.0) / float(np.mean(count))
+    return Repeats((k,), within, shared_misfit if p_value < SIGNIFICANCE else 0.0, p_value)
 
 
-def _of_runs(signals: tuple[int, ...], residuals: Sequence[Array]) -> Repeats:
+def _run_repeats(signals: tuple[int, ...], residuals: Sequence[Array]) -> Repeats:
     runs = len(residuals)
     mean = np.mean(residuals, axis=0)
-    apart = [each - mean for each in residuals]
-    within = sum(float(np.mean(each**2)) for each in apart) / (runs - 1)
+    deviations = [each - mean for each in residuals]
+    within = sum(float(np.mean(each**2)) for each in deviations) / (runs - 1)
     # Squares of what is correlated by rho count as (1 - rho^2) / (1 + rho^2) (Bartlett, J. Roy. Stat. Soc. B 8, 1946).
-    square = sum(float(each @ each) for each in apart)
-    rho = sum(float(each[1:] @ each[:-1]) for each in apart) / max(square, 1e-300)
+    square = sum(float(each @ each) for each in deviations)
+    rho = sum(float(each[1:] @ each[:-1]) for each in deviations) / max(square, 1e-300)
     independent = max(len(mean) * (1.0 - rho**2) / (1.0 + rho**2), 1.0)
     between = runs * float(np.mean(mean**2))
-    chance = float(f_distribution.sf(between / max(within, 1e-300), independent, (runs - 1) * independent))
-    common = max(between - within, 0.0) / runs
-    return Repeats(signals, within, common if chance < CHANCE else 0.0, chance)
+    p_value = float(f_distribution.sf(between / max(within, 1e-300), independent, (runs - 1) * independent))
+    shared_misfit = max(between - within, 0.0) / runs
+    return Repeats(signals, within, shared_misfit if p_value < SIGNIFICANCE else 0.0, p_value)
 
 
-def _process(residuals: Sequence[Array]) -> Array:
+def _autoregression(residuals: Sequence[Array]) -> Array:
     """Return the autoregressive process of residuals, as a filter of white noise: numerator, then denominator.
 
     Its variance is one; its order is that of least BIC (Yule and Walker).
     """
     count = sum(map(len, residuals))
-    lags = min(_LAGS, min(map(len, residuals), default=0) - 1)
+    lags = min(_MAX_LAGS, min(map(len, residuals), default=0) - 1)
     if lags < 1 or not any(each.any() for each in residuals):
         return np.array([1.0, 1.0])
     moments = np.array([sum(float(e[h:] @ e[: len(e) - h]) for e in residuals) for h in range(lags + 1)]) / count
-    best, least = np.array([1.0, 1.0]), 0.0
+    best_filter, least_bic = np.array([1.0, 1.0]), 0.0
     for order in range(1, lags + 1):
-        ahead = solve_toeplitz(moments[:order] * np.append(1.0 + 1e-9, np.ones(order - 1)), moments[1 : order + 1])
-        left = max(1.0 - float(ahead @ moments[1 : order + 1]) / moments[0], 1e-12)
-        bic = count * np.log(left) + order * np.log(count)
-        if bic < least:
-            best, least = np.concatenate([[np.sqrt(left), 1.0], -ahead]), bic
-    return best
+        column, lagged = moments[:order] * np.append(1.0 + 1e-9, np.ones(order - 1)), moments[1 : order + 1]
+        coefficients = solve_toeplitz(column, lagged)
+        innovation_variance = max(1.0 - float(coefficients @ lagged) / moments[0], 1e-12)
+        bic = count * np.log(innovation_variance) + order * np.log(count)
+        if bic < least_bic:
+            best_filter, least_bic = np.concatenate([[np.sqrt(innovation_variance), 1.0], -coefficients]), bic
+    return best_filter
 
 
-def _correlated(score: Array, process: Array) -> Array:
+def _correlated_information(score: Array, autoregression: Array) -> Array:
     """Return B^T R B of scores B, shape (m, p), under a stationary process, shape (p, p)."""
-    # What came before the first sample goes on in it: as many instants as there are samples tell it.
-    reversed_scores = np.concatenate([score[::-1], np.zeros_like(score if len(process) > 2 else score[:0])])
-    filtered = lfilter(process[:1], process[1:], reversed_scores, axis=0)
+    # The process also reaches back before the first sample, by as many instants as there are samples.
+    reversed_scores = np.concatenate([score[::-1], np.zeros_like(score if len(autoregression) > 2 else score[:0])])
+    filtered = lfilter(autoregression[:1], autoregression[1:], reversed_scores, axis=0)
     return np.asarray(filtered.T @ filtered)

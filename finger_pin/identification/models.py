@@ -17,10 +17,10 @@ from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording, RecordingModel, check_angles, unit_of
 from finger_pin.identification.scenario_parameters import (
     acts_on,
-    bare,
-    column_of,
+    corrected_column,
     entry_of,
     key_in,
+    scenario_key,
     with_recorded_values,
 )
 from finger_pin.identification.steady_data import SteadyReadings
@@ -53,13 +53,13 @@ def _check_corrections(model: RecordingModel, bounds: Mapping[str, tuple[float, 
     """Refuse bounds of an input's offset, scale and delay with which a recording cannot be computed."""
     name = model.recording.name
     for column in model.recording.inputs:
-        keys = [key for key in bounds if acts_on(key, name) and column_of(key, [f"{name}.{column}"])]
+        keys = [key for key in bounds if acts_on(key, name) and corrected_column(key, [f"{name}.{column}"])]
         for ends in itertools.product(*(bounds[key] for key in keys)) if keys else ():
             corrected = dict(zip(keys, ends, strict=True))
             try:
                 model.check({key_in(key, name): value for key, value in corrected.items()})
             except InputError as error:
-                where = " and ".join(f"{bare(key)} = {value:g}" for key, value in corrected.items())
+                where = " and ".join(f"{scenario_key(key)} = {value:g}" for key, value in corrected.items())
                 raise InputError(entry_of(keys[0]), f"with {where}: {error}") from None
 
 
@@ -72,7 +72,7 @@ def held_out_rows(recording: Recording) -> NDArray[np.bool_]:
 
 
 def recording_models(
-    scenario: Scenario, recordings: Sequence[Recording], finger: Finger | None, wanted: Sequence[NDArray[np.bool_]]
+    scenario: Scenario, recordings: Sequence[Recording], finger: Finger | None, selected: Sequence[NDArray[np.bool_]]
 ) -> tuple[list[RecordingModel], list[RecordedSignal]]:
     """Return the models of recordings, one for each window with selected rows, and all their outputs.
 
@@ -81,22 +81,22 @@ def recording_models(
     """
     models: list[RecordingModel] = []
     signals: list[RecordedSignal] = []
-    for recording, rows_wanted in zip(recordings, wanted, strict=True):
+    for recording, selected_rows in zip(recordings, selected, strict=True):
         steady = recording.settings.kind == "steady"
         pieces = [np.arange(len(recording.time))] if steady else windows(recording)
-        parts = [(k, rows) for k, rows in enumerate(pieces) if rows_wanted[rows].any()]
+        parts = [(k, rows) for k, rows in enumerate(pieces) if selected_rows[rows].any()]
         if not parts:
             continue
         recorded_scenario = with_recorded_values(scenario, recording.name, recording.settings)
         check_angles(recording, recorded_scenario)
-        replacing = None if finger is None else with_parameters_of(finger, scenario, recorded_scenario)
+        replacement = None if finger is None else with_parameters_of(finger, scenario, recorded_scenario)
         if steady:
-            models.append(SteadyReadings(recording, recorded_scenario, replacing))
+            models.append(SteadyReadings(recording, recorded_scenario, replacement))
         else:
             model = ImposedMotion if recording.settings.imposed else RecordedMotion
-            models += [model(recording, recorded_scenario, rows, k, replacing) for k, rows in parts]
+            models += [model(recording, recorded_scenario, rows, k, replacement) for k, rows in parts]
         signals += [
-            _signal(recording, name, values, rows, rows_wanted)
+            _signal(recording, name, values, rows, selected_rows)
             for _, rows in parts
             for name, values in recording.outputs.items()
         ]
@@ -104,25 +104,25 @@ def recording_models(
 
 
 def _signal(
-    recording: Recording, name: str, values: Array, rows: NDArray[np.intp], wanted: NDArray[np.bool_]
+    recording: Recording, name: str, values: Array, rows: NDArray[np.intp], selected: NDArray[np.bool_]
 ) -> RecordedSignal:
-    later = recording.time[rows] - recording.time[rows[0]] >= recording.settings.settle
-    there = np.flatnonzero(np.isfinite(values[rows]) & wanted[rows] & (later | (recording.settings.kind == "steady")))
-    at = rows[there]
+    settled = recording.time[rows] - recording.time[rows[0]] >= recording.settings.settle
     steady = recording.settings.kind == "steady"
+    valid = np.flatnonzero(np.isfinite(values[rows]) & selected[rows] & (settled | steady))
+    valid_rows = rows[valid]
     loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
     load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
     instant = np.arange(len(values), dtype=float) if steady else recording.time
     conditions = np.stack([*recording.inputs.values(), recording.speed, recording.time], axis=1)
-    replicate = np.unique(conditions[at], axis=0, return_inverse=True)[1].ravel()
+    replicate = np.unique(conditions[valid_rows], axis=0, return_inverse=True)[1].ravel()
     return RecordedSignal(
         recording.name,
         name,
         unit_of(name),
-        values[at],
-        there,
-        instant[at],
-        load[at],
+        values[valid_rows],
+        valid,
+        instant[valid_rows],
+        load[valid_rows],
         replicate,
         ordered=not steady,
         least_noise=recording.settings.outputs[name].least_noise,
@@ -133,13 +133,13 @@ def _signal(
 def windows(recording: Recording) -> Sequence[NDArray[np.intp]]:
     """Return the rows of the windows that a recording is cut into, each with two rows at least.
 
-    A window begins before what is compared of it by the time that bristles take to follow the motion: how they are bent
-    where it begins is not recorded, and where they slide they forget it.
+    A window begins earlier than its compared samples, by the time in which bristles settle: their deflection at the
+    start is not recorded, and sliding makes them forget it.
     """
     length, time = recording.settings.window, recording.time
     if length is None:
         return [np.arange(len(time))]
-    number = np.floor(time / length * (1.0 + 1e-12)).astype(int)
-    pieces = [time[number == k] for k in np.unique(number)]
-    begun = [(piece[0] - recording.settings.settle, piece[-1]) for piece in pieces if len(piece) > 1]
-    return [np.flatnonzero((time >= first - 1e-9) & (time <= last)) for first, last in begun]
+    window_of_row = np.floor(time / length * (1.0 + 1e-12)).astype(int)
+    pieces = [time[window_of_row == k] for k in np.unique(window_of_row)]
+    spans = [(piece[0] - recording.settings.settle, piece[-1]) for piece in pieces if len(piece) > 1]
+    return [np.flatnonzero((time >= first - 1e-9) & (time <= last)) for first, last in spans]

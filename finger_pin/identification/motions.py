@@ -17,9 +17,9 @@ from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.identification.recorded_inputs import Corrections, check_references, put_inputs, with_corrected_inputs
-from finger_pin.identification.recordings import At, Recording, comes_round
+from finger_pin.identification.recordings import Recording, ScenarioMap, wraparound_warning
 from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
-from finger_pin.identification.starts import check_reachable, far_start, recorded_starts, starts_to_find
+from finger_pin.identification.starts import check_reachable, far_start_warning, recorded_starts, start_parameters
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import RunArrays, recorded
@@ -35,9 +35,9 @@ _SLOPE_TOLERANCE = 10.0
 # Least and greatest tolerance, unless the scenario's is beyond. Beyond the greatest, slopes of `to_and_fro` and
 # `winding` err by as much as themselves; up to it, by a tenth.
 _LEAST_TOLERANCE, GREATEST_TOLERANCE = 1e-10, 1e-4
-# Slope, in ranges of the signal over the range of the parameter, from which on it is made by runs with steps of their
-# own, and the change for that, part of the parameter's range.
-_STEEP, _LARGE_CHANGE = 30.0, 1e-3
+# Slope, in ranges of the signal over the range of the parameter, above which it is computed by runs with their own time
+# steps, and the change of the parameter for that, part of its range.
+_STEEP_SLOPE, _LARGE_CHANGE = 30.0, 1e-3
 
 
 class RecordedMotion:
@@ -65,102 +65,102 @@ class RecordedMotion:
         """
         self.recording, self.rows = recording, rows
         self._entry = f"identify.recordings.{recording.name}"
-        self._first = float(recording.time[rows[0]])
-        self._times = recording.time[rows] - self._first
+        self._start_time = float(recording.time[rows[0]])
+        self._times = recording.time[rows] - self._start_time
         self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
-        self._read_imposed(scenario)
+        self._read_imposed_motion(scenario)
         table = copy.deepcopy(scenario.model_dump(mode="python", exclude_unset=True, exclude_none=True))
         put_inputs(table, recording, scenario)
         settings = {"duration": float(self._times[-1]), "sample_rate": 1.0 / float(self._times[-1])}
         table["simulation"] = {**table.get("simulation", {}), **settings}
-        table["simulation"]["start_time"] = scenario.simulation.start_time + self._first
-        self._put_start(table, scenario, window)
+        table["simulation"]["start_time"] = scenario.simulation.start_time + self._start_time
+        self._set_start(table, scenario, window)
         # The steps of an encoder would make the likelihood as rough as what ends an interval.
         self.scenario = with_exact_encoders(read_scenario(table))
         check_references(recording, self.scenario)
         self._finger = finger
-        self._factor = 1.0
+        self._tolerance_factor = 1.0
 
-    def doubt(self, sought: Collection[str]) -> str:
-        """Return a warning about angles that come round, or a start far from where the recording begins.
+    def warning(self, searched_keys: Collection[str]) -> str:
+        """Return a warning about angles that wrap around, or a start far from the recorded one.
 
         Nothing is said of a start whose columns' zeros are sought.
         """
-        jumps = comes_round(self.recording)
+        jumps = wraparound_warning(self.recording)
         if jumps:
             return jumps
         starts = {} if self.recording.settings.start != "rest" else self._starts
         prefix = f"recordings.{self.recording.name}."
-        starts = {joint: each for joint, each in starts.items() if f"{prefix}{each.column}.offset" not in sought}
+        starts = {joint: each for joint, each in starts.items() if f"{prefix}{each.column}.offset" not in searched_keys}
         if not starts:
             return ""
         loop = self._setup(self.scenario, {}).loop
         position = loop.finger.layout.unpack(loop.initial_state()).position
-        return far_start(
+        return far_start_warning(
             self.recording, starts, dict(zip(loop.finger.routing.joints, position, strict=True)), self.scenario
         )
 
     def check(self, nuisance: Mapping[str, float]) -> None:
         """Raise the error of offsets and scales of inputs with which the motion cannot be computed."""
-        moved = self._with_nuisance(self.scenario, nuisance)
+        corrected = self._with_nuisance(self.scenario, nuisance)
         # Searches move checked scenarios without another check.
-        read_scenario(moved.model_dump(mode="python", exclude_unset=True, exclude_none=True))
+        read_scenario(corrected.model_dump(mode="python", exclude_unset=True, exclude_none=True))
         self._setup(self.scenario, nuisance)
 
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
-        return self._made(scenario, nuisance, self._factor)[0]
+        return self._run(scenario, nuisance, self._tolerance_factor)[0]
 
-    def tune(self, factor: float) -> None:
+    def scale_tolerances(self, factor: float) -> None:
         """Multiply the scenario's tolerances by a factor from now on."""
-        self._factor = factor
+        self._tolerance_factor = factor
 
-    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
+    def slopes(self, scenario_map: ScenarioMap, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of the outputs by the values, shape (m, p) each.
 
         Args:
-            at: Maps values to a scenario and the numbers of this motion.
+            scenario_map: Maps values to a scenario and the numbers of this motion.
             values: Values of the parameters, shape (p,).
             sizes: Sizes of changes of the values, shape (p,).
         """
-        here = at(values)
-        factor = max(self._factor, _SLOPE_TOLERANCE)
-        plain, motion = self._made(*here, factor)
+        current = scenario_map(values)
+        factor = max(self._tolerance_factor, _SLOPE_TOLERANCE)
+        base_outputs, motion = self._run(*current, factor)
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
-        there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
-        feeling = [
+        changed_points, changes = changed(values.tolist(), sizes.tolist(), lambda point: scenario_map(np.array(point)))
+        affected = [
             k
-            for k, (scenario, nuisance) in enumerate(there)
+            for k, (scenario, nuisance) in enumerate(changed_points)
             if self._with_nuisance(scenario, nuisance) != motion[0].scenario
-            or self._imposed(nuisance) != self._imposed(here[1])
+            or self._imposed_corrections(nuisance) != self._imposed_corrections(current[1])
         ]
-        others = {k: self._setup(*there[k]) for k in feeling}
-        # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
-        same = self._setup(*here)
-        base, *near_by = nearby(motion[1], [same, *others.values()])
-        near = dict(zip(feeling, near_by, strict=True))
-        computed = plain if base.failure else self._outputs(same, base, here[1])
-        ranges = [float(np.ptp(each)) for each in plain]
+        setups = {k: self._setup(*changed_points[k]) for k in affected}
+        # Repeat the unchanged run too, so that outputs that a parameter does not affect differ by exactly zero.
+        base_setup = self._setup(*current)
+        base_run, *neighbours = nearby(motion[1], [base_setup, *setups.values()])
+        runs = dict(zip(affected, neighbours, strict=True))
+        computed = base_outputs if base_run.failure else self._outputs(base_setup, base_run, current[1])
+        ranges = [float(np.ptp(each)) for each in base_outputs]
 
         def column(k: int) -> list[Array]:
-            if there[k] == here:
+            if changed_points[k] == current:
                 return [np.zeros(len(each)) for each in computed]
-            if not (base.failure or near.get(k, base).failure):
-                outputs = self._outputs(others.get(k, same), near.get(k, base), there[k][1])
+            if not (base_run.failure or runs.get(k, base_run).failure):
+                outputs = self._outputs(setups.get(k, base_setup), runs.get(k, base_run), changed_points[k][1])
                 slopes = [(f - c) / changes[k] for f, c in zip(outputs, computed, strict=True)]
                 pairs = zip(slopes, ranges, strict=True)
-                if all(np.max(np.abs(each)) * float(sizes[k]) <= _STEEP * size for each, size in pairs):
+                if all(np.max(np.abs(each)) * float(sizes[k]) <= _STEEP_SLOPE * size for each, size in pairs):
                     return slopes
-            # Of a motion that hunts what counts is the mean trend; one that sticks need not bear the steps of another.
-            change = np.where(np.arange(len(values)) == k, np.sign(changes[k]) * _LARGE_CHANGE * float(sizes[k]), 0.0)
-            for moved in (values + change, values - change):
-                # At the edge of what goes together there is no such change.
+            # Of a hunting motion the mean trend matters, and a sticking one may fail with the steps of another.
+            offset = np.where(np.arange(len(values)) == k, np.sign(changes[k]) * _LARGE_CHANGE * float(sizes[k]), 0.0)
+            for point in (values + offset, values - offset):
+                # At the edge of the allowed values there is no such change.
                 with suppress(InputError):
-                    outputs, other = self._made(*at(moved), factor)
-                    if other is not None:
-                        return [(f - c) / (moved[k] - values[k]) for f, c in zip(outputs, plain, strict=True)]
-            # Such a motion tells nothing of this number: its interval is that of its bounds.
+                    outputs, run = self._run(*scenario_map(point), factor)
+                    if run is not None:
+                        return [(f - c) / (point[k] - values[k]) for f, c in zip(outputs, base_outputs, strict=True)]
+            # Without slopes the parameter's interval is that of its bounds.
             return [np.zeros(len(each)) for each in computed]
 
         columns = in_threads(column, range(len(values)))
@@ -171,14 +171,14 @@ class RecordedMotion:
         scenario = with_corrected_inputs(scenario, self.recording, nuisance)
         if self.recording.settings.start == "rest":
             return scenario
-        moved = {joint: each.corrected(self.recording.name, nuisance) for joint, each in self._starts.items()}
-        starts = {joint: angle for joint, (angle, _) in moved.items()}
+        recorded = {joint: each.corrected(self.recording.name, nuisance) for joint, each in self._starts.items()}
+        starts = {joint: angle for joint, (angle, _) in recorded.items()}
         starts |= {
             joint: nuisance[each.key]
             for joint, each in zip(starts, self.nuisance_parameters, strict=False)
             if each.key in nuisance
         }
-        speeds, initial = {joint: speed for joint, (_, speed) in moved.items()}, scenario.simulation.initial
+        speeds, initial = {joint: speed for joint, (_, speed) in recorded.items()}, scenario.simulation.initial
         assert initial is not None
         if starts.items() <= initial.position.items() and speeds.items() <= initial.velocity.items():
             return scenario
@@ -186,27 +186,27 @@ class RecordedMotion:
         return scenario.updated(simulation={"initial": changed})
 
     def _setup(self, scenario: Scenario, nuisance: Mapping[str, float]) -> Setup:
-        moved = self._with_nuisance(scenario, nuisance)
-        return Setup.from_scenario(moved, self._loop(moved, nuisance))
+        corrected = self._with_nuisance(scenario, nuisance)
+        return Setup.from_scenario(corrected, self._loop(corrected, nuisance))
 
     def _loop(self, scenario: Scenario, nuisance: Mapping[str, float]) -> ClosedLoop:
         finger = None if self._finger is None else with_parameters_of(self._finger, self.scenario, scenario)
         return ClosedLoop.from_scenario(scenario, finger=finger)
 
-    def _read_imposed(self, scenario: Scenario) -> None:
-        """Read the motion of joints that is given: none here."""
+    def _read_imposed_motion(self, scenario: Scenario) -> None:
+        """Read the imposed motion of joints: none here."""
 
-    def _imposed(self, nuisance: Mapping[str, float]) -> dict[str, Corrections]:
-        """Return the corrections of joints whose motion is given, by column: none here."""
+    def _imposed_corrections(self, nuisance: Mapping[str, float]) -> dict[str, Corrections]:
+        """Return the corrections of joints with imposed motion, by column: none here."""
         return {}
 
-    def _made(
+    def _run(
         self, scenario: Scenario, nuisance: Mapping[str, float], factor: float
     ) -> tuple[list[Array], tuple[Setup, Trajectory] | None]:
-        """Return the outputs, not numbers if the motion fails, and the motion, at so much larger tolerances."""
+        """Return the outputs, not numbers if the run fails, and the run, with tolerances multiplied by a factor."""
         try:
             setup = self._setup(scenario, nuisance)
-            trajectory = setup.integrate(scenario=_tuned(setup.scenario, factor))
+            trajectory = setup.integrate(scenario=_with_scaled_tolerances(setup.scenario, factor))
             failed = bool(trajectory.failure)
         except IntegrationError:
             failed = True
@@ -220,11 +220,9 @@ class RecordedMotion:
         delays = {key: each.delay + nuisance_value(nuisance, name, key, "delay") for key, each in settings.items()}
         by_delay = {delay: self._at_delay(setup, trajectory, delay, delays) for delay in dict.fromkeys(delays.values())}
         for key, delay in delays.items():
-            scale, offset = (
-                nuisance_value(nuisance, name, key, "scale", 1.0),
-                nuisance_value(nuisance, name, key, "offset"),
-            )
-            outputs.append(np.asarray(scale * self._one(by_delay[delay], key) + offset))
+            scale = nuisance_value(nuisance, name, key, "scale", 1.0)
+            offset = nuisance_value(nuisance, name, key, "offset")
+            outputs.append(np.asarray(scale * self._column(by_delay[delay], key) + offset))
         return outputs
 
     def _at_delay(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> RunArrays:
@@ -235,7 +233,7 @@ class RecordedMotion:
         arrays = recorded(motions, tuple(names), f"{self._entry}.outputs")
         return RunArrays(arrays, coordinates(setup.scenario, setup.loop, times), {})
 
-    def _one(self, arrays: RunArrays, name: str) -> Array:
+    def _column(self, arrays: RunArrays, name: str) -> Array:
         """Return a column of a variable by its labels, or the difference of two, as in ``spool_tension.A-B``."""
         variable, _, label = name.partition(".")
         values, (dims, *_) = arrays[variable], arrays.variables[variable]
@@ -256,7 +254,7 @@ class RecordedMotion:
             values = first - rest[0] if rest else first
         return values
 
-    def _put_start(self, table: dict[str, Any], scenario: Scenario, window: int) -> None:
+    def _set_start(self, table: dict[str, Any], scenario: Scenario, window: int) -> None:
         kind, entry = self.recording.settings.start, f"{self._entry}.start"
         self._starts = recorded_starts(self.recording, self.rows, scenario.finger.joints)
         if kind == "rest":
@@ -269,10 +267,10 @@ class RecordedMotion:
         for k, name in enumerate(("position", "velocity")):
             initial[name] = {**initial.get(name, {}), **{joint: start[k] for joint, start in starts.items()}}
         if kind == "found":
-            self.nuisance_parameters = starts_to_find(self.recording.name, window, starts)
+            self.nuisance_parameters = start_parameters(self.recording.name, window, starts)
 
 
-def _tuned(scenario: Scenario, factor: float) -> Scenario:
+def _with_scaled_tolerances(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario with tolerances multiplied by a factor."""
     settings = scenario.simulation
     rtol, atol = (

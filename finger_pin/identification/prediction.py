@@ -19,14 +19,14 @@ from finger_pin.identification.misfit import scatter as scatter_of
 from finger_pin.identification.models import held_out_rows, recording_models
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import Recording, read_recording
-from finger_pin.identification.scenario_parameters import acts_on, bare, owner
+from finger_pin.identification.scenario_parameters import acts_on, recording_pattern, scenario_key
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
-# Half a 95 % band, in deviations.
-_BAND = 1.96
-_NAMES = {
+# Half the width of a 95 % band, in deviations.
+_BAND_DEVIATIONS = 1.96
+_TEXTS = {
     "rms": "rms of measured less predicted, in the unit of the signal",
     "bias": "mean of measured less predicted, in the unit of the signal",
     "within": "share of samples within the band",
@@ -55,7 +55,7 @@ def predict(
         recordings: By name, entries as for `identify`; with ``held_out`` a part of one. What was found for one
             recording alone counts where the name is that of this recording.
         data: By name of a recording, columns by name, in place of its file.
-        finger: That which `identify` was given, if it was given one.
+        finger: The finger that `identify` was called with, if any.
 
     Returns:
         Along ``prediction``, the signals: ``prediction_rms``, ``prediction_bias`` (measured less predicted),
@@ -99,7 +99,7 @@ def predictions(
     result: xr.Dataset,
     scenario: Scenario,
     recordings: Sequence[Recording],
-    known: Sequence[Recording],
+    all_recordings: Sequence[Recording],
     finger: Finger | None,
 ) -> xr.Dataset:
     """Return the Dataset of `predict` for the held-out parts of recordings; empty without any.
@@ -108,34 +108,35 @@ def predictions(
         result: Dataset of `identify`.
         scenario: Whose numbers were found.
         recordings: To predict.
-        known: Recordings among which those with equal inputs are repeated runs.
+        all_recordings: Recordings among which those with equal inputs are repeated runs.
         finger: Replaces the one that the scenario describes.
     """
     signals: list[dict[str, Any]] = []
+    fitted = result["applied"].values[np.isfinite(result["applied"].values)]
+    lowest, highest = (float(fitted.min()), float(fitted.max())) if len(fitted) else (-math.inf, math.inf)
     for recording in recordings:
-        problem, z, spreads = _problem(result, scenario, recording, finger)
+        problem, z, covariances = _problem(result, scenario, recording, finger)
         residuals = problem.errors(z)
-        growth = problem.growth.growth(residuals)
-        computed = zip(problem.signals, residuals, problem.error_slopes(z), growth, strict=True)
+        growths = problem.growth.growth(residuals)
+        computed = zip(problem.signals, residuals, problem.error_slopes(z), growths, strict=True)
         rows_by_signal: dict[str, list[Array]] = {}
-        for signal, residual, slopes, grown in computed:
-            noise = _noise(result, recording.name, signal.name) * grown
-            unsure = np.max([np.sum(slopes @ spread * slopes, axis=1) for spread in spreads], axis=0)
-            deviation = np.sqrt(noise**2 + unsure)
+        for signal, residual, slopes, growth in computed:
+            noise = _noise(result, recording.name, signal.name) * growth
+            parameter_variance = np.max([np.sum(slopes @ each * slopes, axis=1) for each in covariances], axis=0)
+            deviation = np.sqrt(noise**2 + parameter_variance)
             value = np.where(np.isfinite(residual), signal.measured - residual, np.nan)
-            rows = np.stack([signal.instant, signal.load, signal.measured, value, _BAND * deviation])
+            rows = np.stack([signal.instant, signal.load, signal.measured, value, _BAND_DEVIATIONS * deviation])
             rows_by_signal.setdefault(signal.name, []).append(rows)
         for name, pieces in rows_by_signal.items():
             first = next(each for each in problem.signals if each.name == name)
-            scatter = (
-                _repeats(recording, name, known)
-                if first.ordered
-                else math.sqrt(scatter_of(first.measured, first.replicate))
-            )
+            square = math.nan if first.ordered else scatter_of(first.measured, first.replicate)
+            scatter = _repeats(recording, name, all_recordings) if first.ordered else math.sqrt(square)
             rows = np.concatenate(pieces, axis=1)
+            # Loads that are not numbers count as inside.
+            beyond = float(np.mean((rows[1] < lowest) | (rows[1] > highest)))
             signals.append(
                 {"name": f"{recording.name}.{name}", "unit": first.unit, "steady": not first.ordered}
-                | {"rows": rows, "scatter": scatter, "beyond": _beyond(result, rows[1])}
+                | {"rows": rows, "scatter": scatter, "beyond": beyond}
             )
     return _dataset(signals) if signals else xr.Dataset()
 
@@ -146,71 +147,64 @@ def _problem(
     """Return the problem of the held-out part of a recording, the estimate, and its covariances, shape (2, p, p)."""
     models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
 
-    def acts(key: str) -> bool:
-        of_column = bare(key).rpartition(".")[0] in {*recording.inputs, *recording.outputs}
-        acting = bare(key).partition(".")[0] in Scenario.model_fields or of_column
-        return owner(key) is None or (acts_on(key, recording.name) and acting)
+    def applies(key: str) -> bool:
+        of_column = scenario_key(key).rpartition(".")[0] in {*recording.inputs, *recording.outputs}
+        has_effect = scenario_key(key).partition(".")[0] in Scenario.model_fields or of_column
+        return recording_pattern(key) is None or (acts_on(key, recording.name) and has_effect)
 
-    kept = [k for k, key in enumerate(result["parameter"].values) if acts(str(key))]
+    applicable = [k for k, key in enumerate(result["parameter"].values) if applies(str(key))]
     estimate, upper, low, high = (
-        result[name].values[kept].astype(float) for name in ("estimate", "linear_upper", "least", "greatest")
+        result[name].values[applicable].astype(float) for name in ("estimate", "linear_upper", "least", "greatest")
     )
-    keys = tuple(str(result["parameter"].values[k]) for k in kept)
+    keys = tuple(str(result["parameter"].values[k]) for k in applicable)
     problem = Problem(scenario, keys, low, high, models, signals, {})
-    # Starts that would be found are those that were recorded.
-    count, z = len(kept), problem.start.copy()
+    # Estimated starts are not known here: the recorded ones stand in.
+    count, z = len(applicable), problem.start.copy()
     z[:count] = problem.to_search(np.append(estimate, problem.values(z)[count:]))[:count]
     ends = problem.to_search(np.append(upper, problem.values(z)[count:]))[:count]
-    spreads, square = np.zeros((2, len(z), len(z))), np.ix_(kept, kept)
-    correlation = result["correlation"].values[square]
-    spreads[0, :count, :count] = np.outer(ends - z[:count], ends - z[:count]) / _BAND**2 * correlation
+    covariances, selection = np.zeros((2, len(z), len(z))), np.ix_(applicable, applicable)
+    correlation = result["correlation"].values[selection]
+    covariances[0, :count, :count] = np.outer(ends - z[:count], ends - z[:count]) / _BAND_DEVIATIONS**2 * correlation
     # A result of an earlier version has none.
-    spreads[1, :count, :count] = result["jackknife"].values[square] if "jackknife" in result else 0.0
-    # An identification that was stopped early knows no covariance: noise alone makes the band.
-    return problem, z, np.nan_to_num(spreads, nan=0.0)
+    covariances[1, :count, :count] = result["jackknife"].values[selection] if "jackknife" in result else 0.0
+    # An identification stopped early has no covariance: the band is that of the noise alone.
+    return problem, z, np.nan_to_num(covariances, nan=0.0)
 
 
 def _noise(result: xr.Dataset, recording: str, name: str) -> float:
     """Return the deviation of a fitted signal: of the same recording, else that for others of the same name."""
     # A result of an earlier version has no other.
-    elsewhere = "noise_elsewhere" if "noise_elsewhere" in result else "noise_deviation"
-    for key, name_of_deviation in ((f"{recording}.{name}", "noise_deviation"), (name, elsewhere)):
+    pooled = "noise_elsewhere" if "noise_elsewhere" in result else "noise_deviation"
+    for key, name_of_deviation in ((f"{recording}.{name}", "noise_deviation"), (name, pooled)):
         for signal, deviation in zip(result["signal"].values, result[name_of_deviation].values, strict=True):
             if key in (signal, str(signal).partition(".")[2]):
                 return float(deviation)
     return math.nan
 
 
-def _beyond(result: xr.Dataset, load: Array) -> float:
-    """Return the share of loads, N, outside the range of those that were fitted; nan counts as inside."""
-    fitted = result["applied"].values[np.isfinite(result["applied"].values)]
-    least, most = (float(fitted.min()), float(fitted.max())) if len(fitted) else (-math.inf, math.inf)
-    return float(np.mean((load < least) | (load > most)))
-
-
-def _repeats(recording: Recording, name: str, known: Sequence[Recording]) -> float:
+def _repeats(recording: Recording, name: str, recordings: Sequence[Recording]) -> float:
     """Return the rms of an output about its mean over motions with equal inputs; not a number of one alone."""
-    runs = np.array([each.outputs[name] for each in known if name in each.outputs and each.repeats(recording)])
-    there = np.isfinite(runs).all(axis=0) & held_out_rows(recording)
-    if len(runs) < 2 or not there.any():
+    runs = np.array([each.outputs[name] for each in recordings if name in each.outputs and each.repeats(recording)])
+    compared = np.isfinite(runs).all(axis=0) & held_out_rows(recording)
+    if len(runs) < 2 or not compared.any():
         return math.nan
-    return float(np.sqrt(np.mean(np.var(runs[:, there], axis=0, ddof=1))))
+    return float(np.sqrt(np.mean(np.var(runs[:, compared], axis=0, ddof=1))))
 
 
 def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     """Return the Dataset of predictions."""
-    columns: dict[str, list[Any]] = {name: [] for name in _NAMES}
+    columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
     for signal in signals:
         _, _, measured, value, band = signal["rows"]
-        off = measured - value
+        residual = measured - value
         of_signal = {
-            "rms": float(np.sqrt(np.mean(off**2))),
-            "bias": float(np.mean(off)),
+            "rms": float(np.sqrt(np.mean(residual**2))),
+            "bias": float(np.mean(residual)),
             # A run that fails is within no band; without noise there is no band.
-            "within": float(np.mean(np.abs(off) <= band)) if np.isfinite(band).all() else math.nan,
+            "within": float(np.mean(np.abs(residual) <= band)) if np.isfinite(band).all() else math.nan,
             "scatter": signal["scatter"],
             "beyond": signal["beyond"],
-            "samples": len(off),
+            "samples": len(residual),
             "units": signal["unit"],
             "steady": signal["steady"],
         }
@@ -218,7 +212,7 @@ def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
             values.append(of_signal[name])
     index = np.repeat(np.arange(len(signals)), columns["samples"])
     rows = np.concatenate([each["rows"] for each in signals], axis=1)
-    names = {
+    sample_texts = {
         "instant": "time, s; number of a steady reading",
         "applied": "what pulls, N",
         "measured": "measured, in the unit of the signal",
@@ -226,11 +220,11 @@ def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         "band": "half the width of the 95 % band about it",
     }
     return xr.Dataset(
-        {f"prediction_{name}": ("prediction", values, {"long_name": _NAMES[name]}) for name, values in columns.items()}
+        {f"prediction_{key}": ("prediction", column, {"long_name": _TEXTS[key]}) for key, column in columns.items()}
         | {"predicted_index": ("predicted", index, {"long_name": "which prediction"})}
         | {
-            f"predicted_{name}": ("predicted", values, {"long_name": names[name]})
-            for name, values in zip(names, rows, strict=True)
+            f"predicted_{name}": ("predicted", values, {"long_name": sample_texts[name]})
+            for name, values in zip(sample_texts, rows, strict=True)
         },
         {"prediction": [each["name"] for each in signals]},
     )

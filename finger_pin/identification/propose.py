@@ -1,4 +1,4 @@
-"""The next experiment: of given motions the one that narrows the intervals most, from sensitivities alone."""
+"""Optimal design of the next experiment: ranking of motions by their sensitivities."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def propose(
     *,
     overrides: Mapping[str, Any] | None = None,
     finger: FingerLike | None = None,
-    known: Mapping[str, float] | None = None,
+    prior: Mapping[str, float] | None = None,
     rate: float = 100.0,
 ) -> xr.Dataset:
     """Rank motions by their information on the parameters: D-optimal, the greatest determinant first.
@@ -40,7 +40,7 @@ def propose(
         outputs: Signals that would be measured, by variable.label, and their noise, SI, rms.
         overrides: Entries of all of them, such as what is known by now.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`.
-        known: By key, standard deviations that earlier recordings have left, in units of the parameter.
+        prior: By key, standard deviations that earlier recordings have left, in units of the parameter.
         rate: Of independent samples, Hz: of a model at 1 kHz only some are.
 
     Returns:
@@ -49,30 +49,26 @@ def propose(
 
     Raises:
         InputError: If there are no candidates, parameters or outputs, or one names nothing that there is; if bounds are
-            not in order, or a noise or what is known is not positive.
+            not in order, or a noise or prior is not positive.
     """
-    _check(candidates, parameters, outputs, known or {})
+    _check(candidates, parameters, outputs, prior or {})
     keys = list(parameters)
     low, high = np.array(list(parameters.values()), dtype=float).T
-    # The least that is known: a parameter lies within its bounds.
-    before = np.array([(known or {}).get(key, (b - a) / 4.0) for key, a, b in zip(keys, low, high, strict=True)])
+    # Without a prior, bounds are two deviations from their middle.
+    deviations = np.array([(prior or {}).get(key, (b - a) / 4.0) for key, a, b in zip(keys, low, high, strict=True)])
     variables = tuple(dict.fromkeys(name.partition(".")[0] for name in outputs))
     outcomes: dict[str, tuple[float, Array]] = {}
-    for name, changed in candidates.items():
-        entries = {**(overrides or {}), "simulation.sample_rate": rate, **changed}
+    for name, candidate in candidates.items():
+        entries = {**(overrides or {}), "simulation.sample_rate": rate, **candidate}
         run = prepare(load_scenario(scenario, entries), keys, variables, finger=finger).run(sensitivities=True)
-        information = np.diag(1.0 / before**2) + sum(_information(run, *each) for each in outputs.items())
-        scaled = information * np.outer(before, before)
-        outcomes[name] = (float(np.linalg.slogdet(scaled)[1]), np.sqrt(np.diag(np.linalg.inv(scaled))) * before)
+        information = np.diag(1.0 / deviations**2) + sum(_information(run, *each) for each in outputs.items())
+        scaled = information * np.outer(deviations, deviations)
+        outcomes[name] = (float(np.linalg.slogdet(scaled)[1]), np.sqrt(np.diag(np.linalg.inv(scaled))) * deviations)
     order = sorted(outcomes, key=lambda name: -outcomes[name][0])
-    long_name = "of the information over that without it"
+    determinant = {"units": "1", "long_name": "of the information over that without it"}
     return xr.Dataset(
         {
-            "log_determinant": (
-                "candidate",
-                [outcomes[name][0] for name in order],
-                {"units": "1", "long_name": long_name},
-            ),
+            "log_determinant": ("candidate", [outcomes[name][0] for name in order], determinant),
             "deviation": (("candidate", "parameter"), [outcomes[name][1] for name in order]),
         },
         {"candidate": order, "parameter": keys},
@@ -80,7 +76,7 @@ def propose(
 
 
 def _information(run: RunArrays, output: str, noise: float) -> Array:
-    """Return the information on the parameters in an output with noise, (p, p), while the derivatives hold."""
+    """Return the Fisher information of an output with noise, shape (p, p), while the derivatives hold."""
     slopes = _slopes(run, output)[:, run.time < run.attrs["sensitivities_lost"]]
     return np.asarray(slopes @ slopes.T / noise**2)
 
@@ -89,22 +85,22 @@ def _check(
     candidates: Mapping[str, Any],
     parameters: Mapping[str, Sequence[float]],
     outputs: Mapping[str, float],
-    known: Mapping[str, float],
+    prior: Mapping[str, float],
 ) -> None:
     for entry, table in (("candidates", candidates), ("parameters", parameters), ("outputs", outputs)):
         if not table:
             raise InputError(entry, "must have at least one entry")
     for key, bounds in parameters.items():
-        pair = np.shape(bounds) == (2,) and all(isinstance(each, Real) for each in bounds)
-        if not (pair and -np.inf < bounds[0] < bounds[1] < np.inf):
+        is_pair = np.shape(bounds) == (2,) and all(isinstance(each, Real) for each in bounds)
+        if not (is_pair and -np.inf < bounds[0] < bounds[1] < np.inf):
             raise InputError(f"parameters.{key}", "must be the least and the greatest value", bounds)
-    for entry, numbers in (("outputs", outputs), ("known", known)):
+    for entry, numbers in (("outputs", outputs), ("prior", prior)):
         for key, value in numbers.items():
             if not (isinstance(value, Real) and 0.0 < value < np.inf):
                 raise InputError(f"{entry}.{key}", "must be a number above 0", value)
-    for key in known:
+    for key in prior:
         if key not in parameters:
-            raise InputError(f"known.{key}", f"is none of the parameters {', '.join(parameters)}")
+            raise InputError(f"prior.{key}", f"is none of the parameters {', '.join(parameters)}")
 
 
 def _slopes(run: RunArrays, output: str) -> Array:

@@ -12,11 +12,11 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import Series
 from finger_pin.description.winding import BY_NAME, WINDINGS
 from finger_pin.exceptions import InputError
-from finger_pin.identification.recordings import Recording, check_pulling
+from finger_pin.identification.recordings import Recording, check_tension_sign
 from finger_pin.identification.scenario_parameters import nuisance_value
 
-# Where the inputs of a motion go in a scenario, by variable.
-_INPUTS = {
+# Section and entry of a scenario for every input of a motion, by variable.
+_SCENARIO_ENTRIES = {
     "tendon_command": ("controller", "tensions"),
     "spool_angle": ("controller", "spool_angle"),
     "tendon_winding": ("controller", "tendon_winding"),
@@ -26,8 +26,8 @@ _INPUTS = {
     "joint_reference": ("reference", "joints"),
     "fingertip_force": ("environment", "fingertip_force_signal"),
 }
-# Those of which a motor is given one.
-_OF_MOTORS = ("spool_angle", "motor_voltage")
+# Inputs of motors, of which each may have one.
+_MOTOR_INPUTS = ("spool_angle", "motor_voltage")
 
 
 def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) -> None:
@@ -41,37 +41,37 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
         variable, _, label = name.partition(".")
         if variable == IMPOSED:
             continue
-        if variable not in _INPUTS:
-            raise InputError(f"{entry}.inputs.{name}", f"a motion is given {', '.join([*_INPUTS, IMPOSED])}")
-        rivals = [f"{other}.{label}" for other in _OF_MOTORS if variable in _OF_MOTORS and other != variable]
+        if variable not in _SCENARIO_ENTRIES:
+            raise InputError(f"{entry}.inputs.{name}", f"a motion is given {', '.join([*_SCENARIO_ENTRIES, IMPOSED])}")
+        rivals = [f"{other}.{label}" for other in _MOTOR_INPUTS if variable in _MOTOR_INPUTS and other != variable]
         rival = next((each for each in rivals if each in recording.inputs), None)
         if rival is not None:
             raise InputError(f"{entry}.inputs.{name}", f"is of the same motor as {rival}: leave one out")
-        section, group = _INPUTS[variable]
+        section, group = _SCENARIO_ENTRIES[variable]
         entries = table.setdefault(section, {})
         if variable == "tendon_command" and entries.get("kind") != "tensions":
-            kept = {key: entries[key] for key in ("minimum_tension", "inputs", *BY_NAME[1:]) if key in entries}
-            entries = table[section] = {"kind": "tensions", **kept}
+            inherited = {key: entries[key] for key in ("minimum_tension", "inputs", *BY_NAME[1:]) if key in entries}
+            entries = table[section] = {"kind": "tensions", **inherited}
         if variable == "tendon_command":
-            check_pulling(f"{entry}.inputs.{name}", values)
+            check_tension_sign(f"{entry}.inputs.{name}", values)
             values = np.maximum(values, 0.0)
         delay = recording.settings.inputs[name].delay
         times = (recording.time - delay + scenario.simulation.start_time).tolist()
         samples = {"kind": "samples", "times": times, "values": values.tolist()}
-        finger, dot, local_label = label.partition(".")
-        into = entries.setdefault(group, {})
-        if variable in _OF_MOTORS:
-            # What the scenario itself tells that motor is not what was recorded.
+        finger, is_of_hand, finger_label = label.partition(".")
+        signals = entries.setdefault(group, {})
+        if variable in _MOTOR_INPUTS:
+            # The recorded input replaces the scenario's own of that motor.
             for other in WINDINGS:
                 if other != group:
                     entries.get(other, {}).pop(label, None)
-        if dot:
-            into.setdefault(finger, {})[local_label] = samples
+        if is_of_hand:
+            signals.setdefault(finger, {})[finger_label] = samples
         else:
-            into[label] = samples
+            signals[label] = samples
     controller = table.get("controller", {})
     if controller.get("kind") == "tensions" and {*scenario.finger.actuated_names} <= {*controller.get("tensions", {})}:
-        # No tendon is left for it.
+        # No tendon is left without a recorded tension.
         controller.pop("minimum_tension", None)
 
 
@@ -86,15 +86,15 @@ def check_references(recording: Recording, scenario: Scenario) -> None:
         variable, _, label = name.partition(".")
         part = parts.get(label.partition(".")[0]) or next(iter(parts.values()))
         controller, motors = part.controller, part.finger.actuators
-        wound = {
+        prescribed = {
             **(controller.spool_angle or {}),
             **(controller.motor_voltage or {}),
             **(controller.tendon_winding or {}),
         }
-        follows = any(
-            each.drive == "position" and not {motor, *each.tendons} & {*wound} for motor, each in motors.items()
+        follows_reference = any(
+            each.drive == "position" and not {motor, *each.tendons} & {*prescribed} for motor, each in motors.items()
         )
-        if variable == "joint_reference" and controller.kind == "tensions" and not follows:
+        if variable == "joint_reference" and controller.kind == "tensions" and not follows_reference:
             allowed = 'is read by nobody: the controller is of kind "tensions", and no motor follows a reference'
             raise InputError(f"identify.recordings.{recording.name}.inputs.{name}", allowed)
 
@@ -110,7 +110,7 @@ class Corrections(NamedTuple):
 def corrections(recording: str, column: str, nuisance: Mapping[str, float]) -> Corrections:
     """Return the corrections of a column of a recording."""
     neutral = Corrections()._asdict().items()
-    return Corrections(*(nuisance_value(nuisance, recording, column, what, default) for what, default in neutral))
+    return Corrections(*(nuisance_value(nuisance, recording, column, name, default) for name, default in neutral))
 
 
 def with_corrected_inputs(scenario: Scenario, recording: Recording, nuisance: Mapping[str, float]) -> Scenario:
@@ -122,19 +122,19 @@ def with_corrected_inputs(scenario: Scenario, recording: Recording, nuisance: Ma
     for name, values in recording.inputs.items():
         if name.startswith(f"{IMPOSED}."):
             continue
-        numbers = corrections(recording.name, name, nuisance)
-        if numbers == Corrections():
+        correction = corrections(recording.name, name, nuisance)
+        if correction == Corrections():
             continue
-        (section, group), label = _INPUTS[name.partition(".")[0]], name.partition(".")[2]
+        (section, group), label = _SCENARIO_ENTRIES[name.partition(".")[0]], name.partition(".")[2]
         signals = dict(getattr(getattr(scenario, section), group) or {})
         if label not in signals:
             allowed = "has no scale, offset or delay to be found: it is of one finger of a hand"
             raise InputError(f"identify.recordings.{recording.name}.inputs.{name}", allowed)
-        corrected = numbers.scale * values + numbers.offset
+        corrected = correction.scale * values + correction.offset
         if name.startswith("tendon_command."):
-            # A tendon only pulls: what a wrong zero takes below it is a slack one.
+            # A tendon only pulls: a tension below zero by a wrong zero is that of a slack one.
             corrected = np.maximum(corrected, 0.0)
-        times = np.asarray(signals[label].times) - numbers.delay
+        times = np.asarray(signals[label].times) - correction.delay
         signals[label] = signals[label].updated(times=Series(times), values=Series(corrected))
         scenario = scenario.updated(**{section: {group: signals}})
     return scenario

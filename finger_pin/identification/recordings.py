@@ -19,8 +19,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.identification.scenario_parameters import NuisanceParameter
 from finger_pin.typing import Array
 
-#: SI units of what is recorded most; of anything else a column is in SI.
-VARIABLES = {
+#: SI units of the common variables; a column of any other is in SI.
+SI_UNITS = {
     "tendon_command": "N",
     "tendon_tension": "N",
     "tendon_friction": "N",
@@ -45,12 +45,12 @@ VARIABLES = {
     "spool_angle": "rad",
     "tendon_winding": "m",
 }
-#: How far a recorded angle may be beyond a joint's range, rad.
-BEYOND = 0.2
-# By how much of its greatest reading a load cell of a slack cord may err.
-_WRONG_ZERO = 0.1
-# How far a jump of an angle that comes round may be from a turn, in turns.
-_JUMP = 0.1
+#: Greatest excess of a recorded angle over a joint's range, rad.
+RANGE_MARGIN = 0.2
+# Greatest error of a load cell's zero, part of its greatest reading.
+_ZERO_ERROR_SHARE = 0.1
+# Tolerance of a jump by one turn that shows a wrapped angle, in turns.
+_TURN_TOLERANCE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class Recording:
         outputs: By variable.label, shape (m,); not a number where nothing was measured.
         time: Of a motion, shape (m,), s, from zero.
         speed: Of steady readings, shape (m,), m/s.
-        in_si: Names of inputs and outputs that are read as SI because nothing names their unit.
+        unitless: Names of inputs and outputs that are read as SI because nothing names their unit.
         held_out: Rows that are held out by a column, shape (m,); empty where none are.
     """
 
@@ -105,7 +105,7 @@ class Recording:
     outputs: dict[str, Array]
     time: Array
     speed: Array
-    in_si: frozenset[str] = frozenset()
+    unitless: frozenset[str] = frozenset()
     held_out: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def repeats(self, other: Recording) -> bool:
@@ -118,7 +118,7 @@ class Recording:
 
 
 #: Maps values to a scenario, and to the numbers that belong to a recording, by key.
-At = Callable[[Array], tuple[Scenario, dict[str, float]]]
+ScenarioMap = Callable[[Array], tuple[Scenario, dict[str, float]]]
 
 
 class RecordingModel(Protocol):
@@ -136,7 +136,7 @@ class RecordingModel(Protocol):
     def nuisance_parameters(self) -> tuple[NuisanceParameter, ...]:
         """The parameters of this recording alone."""
 
-    def doubt(self, sought: Collection[str]) -> str:
+    def warning(self, searched_keys: Collection[str]) -> str:
         """Return a warning about a recording for the parameters to be found; empty if there is none."""
 
     def check(self, nuisance: Mapping[str, float]) -> None:
@@ -145,29 +145,29 @@ class RecordingModel(Protocol):
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
 
-    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
+    def slopes(self, scenario_map: ScenarioMap, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of the outputs by the values, shape (m, p) each, by changes of given sizes."""
 
-    def tune(self, factor: float) -> None:
+    def scale_tolerances(self, factor: float) -> None:
         """Multiply the tolerances of further computations by a factor."""
 
 
 def unit_of(name: str) -> str:
     """Return the SI unit of ``variable.label``; empty for an unknown one."""
-    return VARIABLES.get(name.partition(".")[0], "")
+    return SI_UNITS.get(name.partition(".")[0], "")
 
 
-def check_pulling(entry: str, tension: Array) -> None:
+def check_tension_sign(entry: str, tension: Array) -> None:
     """Refuse recorded tensions that are negative by more than a wrong zero makes them; below 0 N a cord is slack.
 
     Raises:
         InputError: Naming the row of the least one.
     """
     least, greatest = float(tension.min()), float(tension.max())
-    if least < -_WRONG_ZERO * max(greatest, 0.0):
+    if least < -_ZERO_ERROR_SHARE * max(greatest, 0.0):
         hint = "" if greatest > 0.0 else "; scale = -1 turns the sign of a column"
-        below = f"is {least:.4g} N in row {int(np.argmin(tension)) + 1}, and a tendon only pulls{hint}"
-        raise InputError(entry, below)
+        allowed = f"is {least:.4g} N in row {int(np.argmin(tension)) + 1}, and a tendon only pulls{hint}"
+        raise InputError(entry, allowed)
 
 
 def read_recording(
@@ -215,14 +215,14 @@ def read_recording(
     )
 
 
-def comes_round(recording: Recording) -> str:
-    """Return a warning where an angle of a motion jumps by a turn between two samples; empty where none does."""
+def wraparound_warning(recording: Recording) -> str:
+    """Return a warning about an angle that jumps by a turn between two samples; empty without any."""
     for name, values in recording.outputs.items():
-        there = np.flatnonzero(np.isfinite(values))
-        turns = np.abs(np.diff(values[there])) / (2.0 * np.pi)
-        jumps = np.flatnonzero(np.abs(turns - 1.0) < _JUMP)
+        finite_rows = np.flatnonzero(np.isfinite(values))
+        turns = np.abs(np.diff(values[finite_rows])) / (2.0 * np.pi)
+        jumps = np.flatnonzero(np.abs(turns - 1.0) < _TURN_TOLERANCE)
         if unit_of(name) == "rad" and len(jumps):
-            where = f"{recording.name}.{name} jumps by a turn after row {there[jumps[0]] + 1}"
+            where = f"{recording.name}.{name} jumps by a turn after row {finite_rows[jumps[0]] + 1}"
             return f"{where}: where its numbers come round, write their period, such as period = 4096"
     return ""
 
@@ -234,13 +234,13 @@ def check_angles(recording: Recording, scenario: Scenario) -> None:
         InputError: Naming the column and its farthest angle.
     """
     for group, columns in (("inputs", recording.inputs), ("outputs", recording.outputs)):
-        for name in recording.in_si.intersection(columns):
+        for name in recording.unitless.intersection(columns):
             variable, _, joint = name.partition(".")
             if variable not in ("joint_position", "joint_reference") or joint not in scenario.finger.joints:
                 continue
             low, high = scenario.finger.joints[joint].range
             beyond = np.maximum(low - columns[name], columns[name] - high)
-            if np.nanmax(beyond, initial=0.0) > BEYOND and scenario.finger.joints[joint].limited:
+            if np.nanmax(beyond, initial=0.0) > RANGE_MARGIN and scenario.finger.joints[joint].limited:
                 farthest = float(columns[name][np.nanargmax(beyond)])
                 allowed = f"is beyond the range of {joint}, {low:.3g} to {high:.3g} rad (is it in degrees?); write"
                 hint = 'unit = "deg", or unit = "rad" if it is not'

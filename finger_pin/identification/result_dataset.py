@@ -17,31 +17,32 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
 from finger_pin.identification.comparison import LawComparison, bic
 from finger_pin.identification.estimate import Fit
-from finger_pin.identification.intervals import LEVEL, ProfileBound, SmallSample, covariance, free_directions
+from finger_pin.identification.intervals import CHI2_95, ProfileBound, SmallSample, covariance, free_directions
 from finger_pin.identification.likelihood import minus_twice_likelihood
-from finger_pin.identification.misfit import jackknife, outliers, repeats
+from finger_pin.identification.misfit import jackknife_covariance, outliers, repeats
 from finger_pin.identification.problem import Problem
-from finger_pin.identification.scenario_parameters import bare, column_of, owner
+from finger_pin.identification.scenario_parameters import corrected_column, recording_pattern, scenario_key
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.keys import describe
 from finger_pin.typing import Array
 
 
-def results(
+def result_dataset(
     problem: Problem,
     fits: Sequence[Fit],
     best: Fit,
-    sides: Mapping[tuple[int, int], ProfileBound],
-    spread: Array | None,
+    interval_ends: Mapping[tuple[int, int], ProfileBound],
+    z_covariance: Array | None,
     comparison: LawComparison | None,
     unfinished: str = "",
 ) -> xr.Dataset:
     """Return the Dataset of an identification; unfinished pieces are not a number."""
-    count, keys = problem.asked, problem.keys[: problem.asked]
-    free = free_directions(problem, best) if spread is not None else []
+    count, keys = problem.requested_count, problem.keys[: problem.requested_count]
+    open_directions = free_directions(problem, best) if z_covariance is not None else []
+    undetermined = [k for _, shown in open_directions for k in shown if k < count]
     variables: dict[str, Any] = {
-        **_estimates(problem, best, sides, spread, [k for _, shown in free for k in shown if k < count]),
-        **_signals(problem, best, None if spread is None else covariance(problem, best)),
+        **_estimates(problem, best, interval_ends, z_covariance, undetermined),
+        **_signals(problem, best, None if z_covariance is None else covariance(problem, best)),
         "start_objective": ("start", [each.objective for each in fits], {"units": "1"}),
         "start_estimate": (("start", "parameter"), [problem.values(each.z)[:count] for each in fits]),
     }
@@ -54,16 +55,17 @@ def results(
         coordinates["law"] = comparison.law
         for name in ("parameters", "bic", "rms", "held_out"):
             variables[f"law_{name}"] = ("law", getattr(comparison, name), {"units": "1"})
-    # What is met as well as at the ends of the intervals is the same minimum.
-    met = [minus_twice_likelihood(each.residuals, best.weights, problem.groups, problem.least_noise) for each in fits]
-    least = minus_twice_likelihood(best.residuals, best.weights, problem.groups, problem.least_noise)
-    searches_alike = sum(each < least + LEVEL for each in met)
+    # Searches that end within the interval's rise have found the same minimum.
+    least, *objectives = (
+        minus_twice_likelihood(each.residuals, best.weights, problem.groups, problem.least_noise)
+        for each in (best, *fits)
+    )
     attrs = {
         "scenario": problem.scenario.name,
         "scenario_toml": to_toml(problem.scenario),
-        "undetermined": [words for words, _ in free],
+        "undetermined": [words for words, _ in open_directions],
         "searches": len(fits),
-        "searches_alike": searches_alike,
+        "searches_alike": sum(each < least + CHI2_95 for each in objectives),
         "evaluations": problem.evaluations,
         "bic": bic(best.residuals, best.weights, count, problem.groups, problem.least_noise),
     }
@@ -74,26 +76,27 @@ def results(
 def _estimates(
     problem: Problem,
     best: Fit,
-    sides: Mapping[tuple[int, int], ProfileBound],
-    spread: Array | None,
+    interval_ends: Mapping[tuple[int, int], ProfileBound],
+    z_covariance: Array | None,
     undetermined: list[int],
 ) -> dict[str, Any]:
     """Return the variables along the parameters, some of which the recordings do not determine."""
-    count, keys = problem.asked, problem.keys[: problem.asked]
-    spread = None if spread is None else spread[:count, :count]
+    count, keys = problem.requested_count, problem.keys[: problem.requested_count]
+    unknown = np.full((count, count), np.nan)
+    z_covariance = unknown if z_covariance is None else z_covariance[:count, :count]
     ends = np.full((2, count), np.nan)
-    for (k, way), side in sides.items():
+    for (k, side), bound in interval_ends.items():
         z = best.z.copy()
-        z[k] = side.end if math.isfinite(side.end) else z[k]
-        ends[(way + 1) // 2, k] = problem.values(z)[k] if math.isfinite(side.end) else side.end
+        z[k] = bound.end if math.isfinite(bound.end) else z[k]
+        ends[(side + 1) // 2, k] = problem.values(z)[k] if math.isfinite(bound.end) else bound.end
     units = [_units(problem, key) for key in keys]
-    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0)) if spread is not None else np.full(count, np.nan)
+    deviation = np.sqrt(np.maximum(np.diag(z_covariance), 0.0))
     with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = spread / np.outer(deviation, deviation) if spread is not None else np.full((count, count), np.nan)
-    whole, wide = problem.values(best.z), np.zeros(len(best.z))
-    wide[:count] = deviation
-    estimate, linear = whole[:count], [problem.values(best.z + way * 1.96 * wide)[:count] for way in (-1.0, 1.0)]
-    profiles = _profiles(problem, best, sides)
+        correlation = z_covariance / np.outer(deviation, deviation)
+    estimate, all_deviations = problem.values(best.z)[:count], np.zeros(len(best.z))
+    all_deviations[:count] = deviation
+    linear = [problem.values(best.z + side * 1.96 * all_deviations)[:count] for side in (-1.0, 1.0)]
+    profiles = _profiles(problem, best, interval_ends)
     closed = np.isfinite(ends).all(axis=0)
     closed[undetermined] = False
     return {
@@ -109,7 +112,7 @@ def _estimates(
         "correlation": (("parameter", "other"), correlation, {"units": "1", "long_name": "of the estimates"}),
         "jackknife": (
             ("parameter", "other"),
-            jackknife(problem, best)[:count, :count] if spread is not None else np.full((count, count), np.nan),
+            jackknife_covariance(problem, best)[:count, :count] if z_covariance is not None else unknown,
             {"long_name": "covariance by leaving out one setting at a time; of logarithms where the least is positive"},
         ),
         "profile_value": (("parameter", "point"), profiles[0], {"long_name": "held value of a parameter"}),
@@ -121,11 +124,11 @@ def _estimates(
     }
 
 
-def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], ProfileBound]) -> tuple[Array, Array]:
+def _profiles(problem: Problem, best: Fit, bounds: Mapping[tuple[int, int], ProfileBound]) -> tuple[Array, Array]:
     """Return values and rises along every profile, ascending, filled up with NaN."""
     rows: list[Array] = []
-    for k in range(problem.asked):
-        paths = [side.path for (j, _), side in sides.items() if j == k]
+    for k in range(problem.requested_count):
+        paths = [bound.path for (j, _), bound in bounds.items() if j == k]
         points = np.unique(np.concatenate([np.array([[best.z[k], 0.0]]), *paths]), axis=0)
         values = np.array([problem.values(np.where(np.arange(len(best.z)) == k, z, best.z))[k] for z in points[:, 0]])
         rows.append(np.stack([values, points[:, 1]]))
@@ -137,27 +140,28 @@ def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Profi
 
 
 def _units(problem: Problem, key: str) -> str:
-    column = column_of(key, problem.units)
+    column = corrected_column(key, problem.units)
     if column is None:
-        return describe(bare(key))["units"]
+        return describe(scenario_key(key))["units"]
     return {"offset": problem.units[column], "delay": "s"}.get(key.rpartition(".")[2], "1")
 
 
-def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]:
-    signals, groups = problem.signals, problem.groups
-    few = None if naive is None else SmallSample.from_fit(problem, best, naive)
-    grown, shared = (np.ones(len(signals)),) * 2 if few is None else (few.noise, few.elsewhere)
-    errors, noise = best.residuals, best.noise
-    if problem.growth.acts:
+def _signals(problem: Problem, best: Fit, likelihood_covariance: Array | None) -> dict[str, Any]:
+    signals, groups, errors, noise = problem.signals, problem.groups, best.residuals, best.noise
+    noise_factors = pooled_factors = np.ones(len(signals))
+    if likelihood_covariance is not None:
+        small_sample = SmallSample.from_fit(problem, best, likelihood_covariance)
+        noise_factors, pooled_factors = small_sample.noise, small_sample.pooled_noise
+    if problem.growth.active:
         errors = problem.errors(best.z)
-        # That of a reading of zero.
+        # Noise of a reading of zero.
         noise = best.noise / problem.growth.levels(errors)
-    # The first of every output's windows stands for what they share.
+    # Windows of an output share its values: the first one has them.
     first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
     names = np.array([signals[k].name for k in first])
     squares = np.array([np.mean(noise[first][names == name] ** 2) for name in names])
-    known = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}
-    whole = {
+    repeated = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}
+    sample_columns = {
         "signal_index": np.repeat(groups, [len(s.measured) for s in signals]),
         "instant": np.concatenate([s.instant for s in signals]),
         "applied": np.concatenate([s.load for s in signals]),
@@ -165,7 +169,7 @@ def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]
         "residual": np.concatenate(errors),
         "outlier": np.concatenate(outliers(problem, best.residuals)),
     }
-    words = {
+    long_names = {
         "signal_index": "which signal",
         "instant": "time, s; number of a steady reading",
         "applied": "what pulls, N",
@@ -179,28 +183,28 @@ def _signals(problem: Problem, best: Fit, naive: Array | None) -> dict[str, Any]
         "noise": ("signal", noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
         "noise_deviation": (
             "signal",
-            (noise * grown)[first],
+            (noise * noise_factors)[first],
             {"long_name": "deviation of further readings, of which 95 % are within 1.96 of it"},
         ),
         "noise_elsewhere": (
             "signal",
-            np.sqrt(squares) * shared[first],
+            np.sqrt(squares) * pooled_factors[first],
             {"long_name": "deviation of readings of recordings that were not fitted, by all fitted ones of the name"},
         ),
         "replicate_noise": (
             "signal",
-            [math.sqrt(known[k].scatter) if k in known else math.nan for k in range(len(first))],
+            [math.sqrt(repeated[k].scatter) if k in repeated else math.nan for k in range(len(first))],
             {"long_name": "rms of equal readings, or of runs with equal inputs, about their mean"},
         ),
         "lack_of_fit": (
             "signal",
-            [known[k].chance if k in known else math.nan for k in range(len(first))],
+            [repeated[k].p_value if k in repeated else math.nan for k in range(len(first))],
             {"units": "1", "long_name": "probability that a model that misses nothing misses as much (F test)"},
         ),
-        "signal_samples": ("signal", np.bincount(whole["signal_index"], minlength=len(first))),
+        "signal_samples": ("signal", np.bincount(sample_columns["signal_index"], minlength=len(first))),
         "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
-        **{name: ("sample", values, {"long_name": words[name]}) for name, values in whole.items()},
+        **{name: ("sample", values, {"long_name": long_names[name]}) for name, values in sample_columns.items()},
     }
 
 
@@ -221,22 +225,21 @@ def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, probl
     stands for more or less than one entry, it is whole.
     """
     recordings = ", ".join(dict.fromkeys(signal.recording for signal in problem.signals))
-    single = all(owner(key) is not None or not {*"*{["} & {*key} for key in problem.keys[: problem.asked])
+    keys = problem.keys[: problem.requested_count]
+    single = all(recording_pattern(key) is not None or not {*"*{["} & {*key} for key in keys)
     extended = single and not isinstance(bench, Scenario) and load_scenario(bench) == problem.scenario
     lines = ["# What an identification has found; intervals at 95 %."]
     if extended:
-        lines += [tomli_w.dumps({"extends": _from_folder(str(bench), folder)}).strip(), ""]
+        lines += [tomli_w.dumps({"extends": _extends_entry(str(bench), folder)}).strip(), ""]
     numbers: dict[str, float] = {}
     for key, value, low, high, unit in zip(
-        problem.keys[: problem.asked],
-        *(result[each].values.tolist() for each in ("estimate", "lower", "upper", "units")),
-        strict=True,
+        keys, *(result[each].values.tolist() for each in ("estimate", "lower", "upper", "units")), strict=True
     ):
-        ends = f"{_end(low)} to {_end(high)}{'' if unit == '1' else f' {unit}'}"
-        if owner(key) is None:
+        ends = f"{_end_text(low)} to {_end_text(high)}{'' if unit == '1' else f' {unit}'}"
+        if recording_pattern(key) is None:
             numbers[key] = value
         if not extended or key not in numbers:
-            lines.append(f"# {key} = {value:.6g}, {ends}, from {owner(key) or recordings}")
+            lines.append(f"# {key} = {value:.6g}, {ends}, from {recording_pattern(key) or recordings}")
             continue
         lines.append(f"{key} = {value!r} # {ends}, from {recordings}")
     if not extended:
@@ -249,7 +252,7 @@ def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, probl
     return "\n".join(lines) + "\n"
 
 
-def _from_folder(bench: str, folder: Path) -> str:
+def _extends_entry(bench: str, folder: Path) -> str:
     """Return the entry ``extends`` of a scenario in a folder: a name as it is, a path from the folder."""
     path = Path(bench).expanduser()
     if path.suffix != ".toml":
@@ -261,5 +264,5 @@ def _from_folder(bench: str, folder: Path) -> str:
         return str(path.absolute())
 
 
-def _end(value: float) -> str:
+def _end_text(value: float) -> str:
     return "not known" if math.isnan(value) else "open" if math.isinf(value) else f"{value:.4g}"

@@ -16,8 +16,8 @@ from finger_pin.description.tables import split
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
-#: What may be found of a column itself, besides the scenario's numbers.
-OF_COLUMNS = ("offset", "scale", "delay")
+#: Corrections of a column that may be estimated, besides parameters of the scenario.
+COLUMN_CORRECTIONS = ("offset", "scale", "delay")
 
 
 @dataclass(frozen=True)
@@ -36,19 +36,19 @@ class ScenarioPart:
 
     Attributes:
         family: The scenarios.
-        places: Which of the parameters that are keys of a scenario, shape (k,).
+        indices: Which of the parameters that are keys of a scenario, shape (k,).
     """
 
     family: ParametrisedScenario
-    places: NDArray[np.intp]
+    indices: NDArray[np.intp]
 
-    def at(self, values: Array) -> Scenario:
+    def scenario_at(self, values: Array) -> Scenario:
         """Return the scenario at values of all parameters that are keys of a scenario.
 
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        return self.family.with_values(values[self.places].tolist())
+        return self.family.with_values(values[self.indices].tolist())
 
     @classmethod
     def from_keys(cls, scenario: Scenario, recording: str, keys: Sequence[str]) -> ScenarioPart:
@@ -57,75 +57,76 @@ class ScenarioPart:
         Raises:
             InputError: If the scenario has no such key.
         """
-        places = [k for k, key in enumerate(keys) if acts_on(key, recording)]
-        for key in (keys[k] for k in places if owner(keys[k])):
+        indices = [k for k, key in enumerate(keys) if acts_on(key, recording)]
+        for key in (keys[k] for k in indices if recording_pattern(keys[k])):
             try:
-                ParametrisedScenario(scenario, (bare(key),))
+                ParametrisedScenario(scenario, (scenario_key(key),))
             except InputError as error:
-                named = "" if error.entry == bare(key) else f"{error.entry}: "
+                named = "" if error.entry == scenario_key(key) else f"{error.entry}: "
                 raise InputError(entry_of(key), f"{named}{error.allowed}") from None
-        return cls(ParametrisedScenario(scenario, [bare(keys[k]) for k in places]), np.array(places, dtype=np.intp))
+        family = ParametrisedScenario(scenario, [scenario_key(keys[k]) for k in indices])
+        return cls(family, np.array(indices, dtype=np.intp))
 
 
 def nuisance_value(
-    nuisance: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0
+    nuisance: Mapping[str, float], recording: str, output: str, correction: str, default: float = 0.0
 ) -> float:
     """Return the offset, scale or delay of an input or output that is being found."""
-    return nuisance.get(f"recordings.{recording}.{output}.{what}", default)
+    return nuisance.get(f"recordings.{recording}.{output}.{correction}", default)
 
 
-def owner(key: str) -> str | None:
-    """Return the recording that a parameter is of, or the pattern of several; None if all share it."""
+def recording_pattern(key: str) -> str | None:
+    """Return the recording of a parameter, or the pattern of several; None if all share it."""
     return key.split(".")[1] if key.startswith(OF_RECORDINGS) else None
 
 
 def acts_on(key: str, recording: str) -> bool:
-    """Return whether a parameter is shared, of a recording, or of several of which this is one."""
-    pattern = owner(key)
+    """Return whether a parameter acts on a recording: shared, its own, or of a matching pattern."""
+    pattern = recording_pattern(key)
     return pattern is None or fnmatchcase(recording, pattern)
 
 
 def key_in(key: str, recording: str) -> str:
     """Return the key of a parameter of several recordings in one of them; any other key as it is."""
-    return f"{OF_RECORDINGS}{recording}.{bare(key)}" if owner(key) and acts_on(key, recording) else key
+    is_of_recording = recording_pattern(key) and acts_on(key, recording)
+    return f"{OF_RECORDINGS}{recording}.{scenario_key(key)}" if is_of_recording else key
 
 
-def check_single(keys: Sequence[str], recordings: Iterable[str]) -> None:
-    """Refuse two parameters that are one number of a recording.
+def check_duplicates(keys: Sequence[str], recordings: Iterable[str]) -> None:
+    """Refuse two parameters of the same entry of a recording.
 
     Raises:
         InputError: Naming one of them.
     """
     for recording in recordings:
-        known: dict[str, str] = {}
+        keys_by_target: dict[str, str] = {}
         for key in keys:
-            one = key_in(key, recording)
-            if one in known:
-                raise InputError(entry_of(key), f"is found for {recording} as {known[one]} too; leave out one of them")
-            known[one] = key
+            first = keys_by_target.setdefault(key_in(key, recording), key)
+            if first != key:
+                raise InputError(entry_of(key), f"is found for {recording} as {first} too; leave out one of them")
 
 
-def bare(key: str) -> str:
+def scenario_key(key: str) -> str:
     """Return the key of a parameter in its recording's scenario."""
     return key.split(".", 2)[2] if key.startswith(OF_RECORDINGS) else key
 
 
 def entry_of(key: str) -> str:
-    """Return the entry of a bench that a parameter stands at."""
-    recording = owner(key)
+    """Return the entry of a parameter in a bench."""
+    recording = recording_pattern(key)
     shared = recording is None or {*"*?["} & {*recording}
-    return f"identify.parameters.{key}" if shared else f"identify.recordings.{recording}.parameters.{bare(key)}"
+    return f"identify.parameters.{key}" if shared else f"identify.recordings.{recording}.parameters.{scenario_key(key)}"
 
 
-def column_of(key: str, columns: Iterable[str]) -> str | None:
-    """Return the first column, with its recording, whose offset, scale or delay a parameter is; None if it is none."""
-    name, _, what = bare(key).rpartition(".")
+def corrected_column(key: str, columns: Iterable[str]) -> str | None:
+    """Return the first column, with its recording, that a parameter corrects; None if it corrects none."""
+    name, _, correction = scenario_key(key).rpartition(".")
     parts = ((each, *each.split(".", 1)) for each in columns)
-    known = (each for each, recording, column in parts if column == name and acts_on(key, recording))
-    return next(known, None) if owner(key) and what in OF_COLUMNS else None
+    matching = (each for each, recording, column in parts if column == name and acts_on(key, recording))
+    return next(matching, None) if recording_pattern(key) and correction in COLUMN_CORRECTIONS else None
 
 
-def is_of_scenario(key: str, columns: Iterable[str]) -> bool:
+def is_scenario_key(key: str, columns: Iterable[str]) -> bool:
     """Return whether a parameter is a key of a scenario, not an offset, scale or delay of a column.
 
     Args:
@@ -135,24 +136,24 @@ def is_of_scenario(key: str, columns: Iterable[str]) -> bool:
     Raises:
         InputError: If it is neither.
     """
-    known = sorted(columns)
-    if owner(key) is None or column_of(key, known):
-        return owner(key) is None
-    there = any(acts_on(key, each.partition(".")[0]) for each in known)
-    if there and bare(key).partition(".")[0] in Scenario.model_fields:
+    names = sorted(columns)
+    if recording_pattern(key) is None or corrected_column(key, names):
+        return recording_pattern(key) is None
+    acts_somewhere = any(acts_on(key, each.partition(".")[0]) for each in names)
+    if acts_somewhere and scenario_key(key).partition(".")[0] in Scenario.model_fields:
         return True
-    allowed = f"must be a key of the scenario, or variable.label and .{', '.join(OF_COLUMNS)}; there are"
-    raise InputError(entry_of(key), f"{allowed} {', '.join(known)}")
+    allowed = f"must be a key of the scenario, or variable.label and .{', '.join(COLUMN_CORRECTIONS)}; there are"
+    raise InputError(entry_of(key), f"{allowed} {', '.join(names)}")
 
 
-def check_apart(recording: str, settings: RecordingSettings, keys: Sequence[str]) -> None:
+def check_shadowing(recording: str, settings: RecordingSettings, keys: Sequence[str]) -> None:
     """Refuse an entry of one recording that would hide, or be hidden by, a parameter that all recordings share.
 
     Raises:
         InputError: Naming the recording's entry.
     """
-    shared = [key for key in keys if owner(key) is None]
-    recording_keys = [bare(key) for key in keys if owner(key) and acts_on(key, recording)]
+    shared = [key for key in keys if recording_pattern(key) is None]
+    recording_keys = [scenario_key(key) for key in keys if recording_pattern(key) and acts_on(key, recording)]
     for group, names in (("values", settings.values), ("parameters", recording_keys)):
         for key in names:
             hidden = next((each for each in shared if _overlap(key, each)), None)
@@ -178,8 +179,8 @@ def with_recorded_values(scenario: Scenario, recording: str, settings: Recording
     return scenario
 
 
-def _overlap(one: str, other: str) -> bool:
+def _overlap(first_key: str, second_key: str) -> bool:
     """Return whether two keys, with stars or indices, are of the same entry, or one of a table that has the other."""
-    (a, first), (b, second) = split(one), split(other)
-    same = all(x == y or "*" in (x, y) for x, y in zip(a.split("."), b.split("."), strict=False))
-    return same and (first is None or second is None or first == second)
+    (a, first), (b, second) = split(first_key), split(second_key)
+    same_entry = all(x == y or "*" in (x, y) for x, y in zip(a.split("."), b.split("."), strict=False))
+    return same_entry and (first is None or second is None or first == second)

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.recordings import BEYOND, Recording
+from finger_pin.identification.recordings import RANGE_MARGIN, Recording
 from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
 
-# How far a start that is to be found may be from where it was recorded, rad.
-_NEAR = 0.3
-# Samples at a window's start that its position and velocity are read from.
-_FIRST = 9
-# From which part of a joint's range on a start is far from where the recording begins.
-_FAR = 0.1
+# Half range of an estimated start about the recorded one, rad.
+_START_MARGIN = 0.3
+# Number of samples at a window's start for the line that gives its position and velocity.
+_START_SAMPLES = 9
+# Distance of a start from the recorded one above which to warn, part of the joint's range.
+_FAR_START_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +40,8 @@ class RecordedStart:
     def corrected(self, recording: str, nuisance: Mapping[str, float]) -> tuple[float, float]:
         """Return angle, rad, and speed, rad/s, of the joint with a scale, offset and delay that are being found."""
         scale, offset, delay = (
-            nuisance_value(nuisance, recording, self.column, what, default)
-            for what, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
+            nuisance_value(nuisance, recording, self.column, correction, default)
+            for correction, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
         )
         return (self.angle + self.speed * (self.delay + delay) - offset) / scale, self.speed / scale
 
@@ -51,48 +51,48 @@ def recorded_starts(recording: Recording, rows: NDArray[np.intp], joints: Collec
     starts = {}
     for name, values in recording.outputs.items():
         variable, _, joint = name.partition(".")
-        there = rows[:_FIRST][np.isfinite(values[rows[:_FIRST]])]
-        if variable != "joint_position" or joint not in joints or not len(there):
+        samples = rows[:_START_SAMPLES][np.isfinite(values[rows[:_START_SAMPLES]])]
+        if variable != "joint_position" or joint not in joints or not len(samples):
             continue
-        degree = 1 if len(there) > 3 else 0
-        line = np.polyfit(recording.time[there] - recording.time[rows[0]], values[there], degree)
+        degree = 1 if len(samples) > 3 else 0
+        line = np.polyfit(recording.time[samples] - recording.time[rows[0]], values[samples], degree)
         delay = recording.settings.outputs[name].delay
         starts[joint] = RecordedStart(name, float(line[-1]), float(line[0]) if degree else 0.0, delay)
     return starts
 
 
 def check_reachable(entry: str, starts: Mapping[str, tuple[float, float]], scenario: Scenario) -> None:
-    """Refuse angles and speeds to start from that are far beyond joints' ranges.
+    """Refuse starts whose angles are far beyond joints' ranges.
 
     Raises:
         InputError: Naming the entry.
     """
     for joint, (angle, _) in starts.items():
         low, high = scenario.finger.joints[joint].range
-        if not low - BEYOND <= angle <= high + BEYOND:
+        if not low - RANGE_MARGIN <= angle <= high + RANGE_MARGIN:
             allowed = f"cannot be reached: {joint} begins at {angle:.3g} rad, and its range is {low:.3g} to {high:.3g}"
             raise InputError(entry, allowed)
 
 
-def starts_to_find(
+def start_parameters(
     recording: str, window: int, starts: Mapping[str, tuple[float, float]]
 ) -> tuple[NuisanceParameter, ...]:
-    """Return the starts of joints that are to be found near those that were recorded."""
+    """Return the nuisance parameters of joints' starts, near the recorded ones."""
     prefix = f"recordings.{recording}.start.{window}"
     return tuple(
-        NuisanceParameter(f"{prefix}.{joint}", angle - _NEAR, angle + _NEAR, angle)
+        NuisanceParameter(f"{prefix}.{joint}", angle - _START_MARGIN, angle + _START_MARGIN, angle)
         for joint, (angle, _) in starts.items()
     )
 
 
-def far_start(
+def far_start_warning(
     recording: Recording, starts: Mapping[str, RecordedStart], position: Mapping[str, float], scenario: Scenario
 ) -> str:
     """Return a warning about a joint whose motion starts far from its recording's start; empty without any."""
     for joint, start in starts.items():
         low, high = scenario.finger.joints[joint].range
         angle = start.corrected(recording.name, {})[0]
-        if abs(angle - position[joint]) > _FAR * (high - low):
+        if abs(angle - position[joint]) > _FAR_START_SHARE * (high - low):
             return (
                 f"identify.recordings.{recording.name}: {joint} begins at {angle:.3g} rad, and the scenario starts at "
                 f'{position[joint]:.3g} rad; with start = "recorded" it starts where the recording does'

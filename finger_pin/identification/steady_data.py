@@ -11,15 +11,15 @@ from finger_pin.description.finger import FingerDescription
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.recordings import At, Recording, check_pulling
+from finger_pin.identification.recordings import Recording, ScenarioMap, check_tension_sign
 from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
 from finger_pin.identification.settled import resting_finger, settled_posture, wound_length
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
-# Change of a number that slopes are taken by, of its size or its range.
-_CHANGE = 1e-5
+# Change of a parameter for differences, part of its size or range.
+_DIFFERENCE_SHARE = 1e-5
 _POSTURE, _TENSIONS, _GOALS = "joint_position", ("tendon_command", "spool_tension"), ("spool_angle", "tendon_winding")
 _OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current", _POSTURE)
 
@@ -30,12 +30,12 @@ class SteadyReadings:
     Attributes:
         recording: The recording.
         load: The pull at the entrance of the canals, N, or of wound tendons the angle or length, shape (m, a).
-        wound: Tendons that a winch or a motor winds, by input.
+        wound_tendons: Tendons that a winch or a motor winds, by input.
         scenario: Whose states they are.
         nuisance_parameters: Nothing is to be found for them alone.
     """
 
-    def __init__(self, recording: Recording, scenario: Scenario, replacing: Finger | None = None) -> None:
+    def __init__(self, recording: Recording, scenario: Scenario, replacement: Finger | None = None) -> None:
         """Find the inputs; a finger may replace the one that the scenario describes.
 
         Raises:
@@ -44,10 +44,12 @@ class SteadyReadings:
         """
         self.recording, self._entry = recording, f"identify.recordings.{recording.name}"
         goals = [name for name in recording.inputs if name.partition(".")[0] in _GOALS]
-        self._motor = {tendon: motor for motor, each in scenario.finger.actuators.items() for tendon in each.tendons}
-        self.wound = {name: self._wound_tendon(scenario.finger, name) for name in goals}
-        self.scenario = _with_windings(scenario, [each for each in self.wound.values() if each not in self._motor])
-        finger, self._replacing = self.scenario.finger, replacing
+        actuators = scenario.finger.actuators.items()
+        self._motor_of_tendon = {tendon: motor for motor, each in actuators for tendon in each.tendons}
+        self.wound_tendons = {name: self._wound_tendon(scenario.finger, name) for name in goals}
+        without_motor = [each for each in self.wound_tendons.values() if each not in self._motor_of_tendon]
+        self.scenario = _with_windings(scenario, without_motor)
+        finger, self._replacement = self.scenario.finger, replacement
         self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
         rows = len(recording.speed)
         joints, tendons = list(finger.joints), list(finger.actuated_names)
@@ -63,16 +65,17 @@ class SteadyReadings:
             variable, _, label = name.partition(".")
             if variable not in _OUTPUTS:
                 raise InputError(f"{self._entry}.outputs.{name}", f"a steady state has {', '.join(_OUTPUTS)}")
-            place = self._place(f"outputs.{name}", label, places.get(variable, tendons))
-            self._outputs.append((variable, place))
+            index = self._index(f"outputs.{name}", label, places.get(variable, tendons))
+            self._outputs.append((variable, index))
             if variable == _POSTURE:
                 recorded = recording.outputs[name]
-                self._position[:, place] = np.where(np.isfinite(recorded), recorded, self._position[:, place])
-        if self.wound and (recording.settings.speed is not None or {each for each, _ in self._outputs} != {_POSTURE}):
+                self._position[:, index] = np.where(np.isfinite(recorded), recorded, self._position[:, index])
+        only_postures = {each for each, _ in self._outputs} == {_POSTURE}
+        if self.wound_tendons and (recording.settings.speed is not None or not only_postures):
             allowed = "tells postures without friction: joint_position is compared, without a speed"
             raise InputError(f"{self._entry}.inputs.{goals[0]}", allowed)
-        self._settles = any(variable == _POSTURE for variable, _ in self._outputs)
-        if self._settles:
+        self._compares_posture = any(variable == _POSTURE for variable, _ in self._outputs)
+        if self._compares_posture:
             self._check_direction()
             self._check_drives()
             self.check({})
@@ -83,17 +86,17 @@ class SteadyReadings:
             variable, _, label = name.partition(".")
             if variable in (*_TENSIONS, *_GOALS):
                 if variable in _TENSIONS:
-                    check_pulling(f"{self._entry}.inputs.{name}", values)
-                place = self._place(f"inputs.{name}", self.wound.get(name, label), tendons)
-                other = next((each for each, group, k in self._inputs if group is self.load and k == place), None)
+                    check_tension_sign(f"{self._entry}.inputs.{name}", values)
+                index = self._index(f"inputs.{name}", self.wound_tendons.get(name, label), tendons)
+                other = next((each for each, group, k in self._inputs if group is self.load and k == index), None)
                 if other is not None:
                     raise InputError(f"{self._entry}.inputs.{name}", f"is of the same cord as {other}: leave one out")
-                self.load[:, place] = values
-                self._inputs.append((name, self.load, place))
+                self.load[:, index] = values
+                self._inputs.append((name, self.load, index))
             elif variable == "joint_position":
-                place = self._place(f"inputs.{name}", label, joints)
-                self._position[:, place] = values
-                self._inputs.append((name, self._position, place))
+                index = self._index(f"inputs.{name}", label, joints)
+                self._position[:, index] = values
+                self._inputs.append((name, self._position, index))
             else:
                 allowed = f"a steady state is given {', '.join([*_TENSIONS, *_GOALS])} and {_POSTURE}"
                 raise InputError(f"{self._entry}.inputs.{name}", allowed)
@@ -102,9 +105,9 @@ class SteadyReadings:
         """Return the computed values of every output, shape (m,) each."""
         settings = self.recording.settings
         load, position = self._corrected(nuisance)
-        if self._settles:
-            position = self._settled(scenario, load)
-        at_rest = settings.at_rest or self._settles
+        if self._compares_posture:
+            position = self._settled_postures(scenario, load)
+        at_rest = settings.at_rest or self._compares_posture
         steady = steady_state(scenario.finger, load, self.recording.speed, position, at_rest)
         by_name = {
             "tendon_tension": steady.tension,
@@ -114,87 +117,87 @@ class SteadyReadings:
         by_name[_POSTURE] = position
         name = self.recording.name
         return [
-            nuisance_value(nuisance, name, output, "scale", 1.0) * by_name[variable][:, place]
+            nuisance_value(nuisance, name, output, "scale", 1.0) * by_name[variable][:, index]
             + nuisance_value(nuisance, name, output, "offset")
-            for output, (variable, place) in zip(self.recording.outputs, self._outputs, strict=True)
+            for output, (variable, index) in zip(self.recording.outputs, self._outputs, strict=True)
         ]
 
-    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
+    def slopes(self, scenario_map: ScenarioMap, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of the outputs by the values, shape (m, p) each; by differences."""
-        columns, here = [], at(values)
-        computed = self.compute(*here)
+        columns, current = [], scenario_map(values)
+        computed = self.compute(*current)
 
-        def end(k: int, change: float) -> tuple[float, list[Array]]:
-            moved = values.copy()
-            moved[k] += change
+        def one_sided(k: int, change: float) -> tuple[float, list[Array]]:
+            changed_values = values.copy()
+            changed_values[k] += change
             try:
-                there = at(moved)
-                # What is of another recording changes nothing.
-                return moved[k], computed if there == here else self.compute(*there)
+                changed = scenario_map(changed_values)
+                # A parameter of another recording changes nothing.
+                return changed_values[k], computed if changed == current else self.compute(*changed)
             except InputError:
-                # At the edge of what is allowed there is one side only.
+                # At the edge of the allowed values there is one side only.
                 return values[k], computed
 
-        for k, size in enumerate(_CHANGE * sizes):
-            ends = [end(k, change) for change in (size, -size)]
+        for k, size in enumerate(_DIFFERENCE_SHARE * sizes):
+            ends = [one_sided(k, change) for change in (size, -size)]
             (right, up), (left, down) = ends
             columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
-    def doubt(self, sought: Collection[str]) -> str:
+    def warning(self, searched_keys: Collection[str]) -> str:
         """Return an empty text: readings have no start."""
         return ""
 
     def check(self, nuisance: Mapping[str, float]) -> None:
-        """Raise the error of goals that a motor's encoder cannot be told."""
+        """Raise an error for goals beyond the range of a motor's encoder."""
         load, _ = self._corrected(nuisance)
-        for name, tendon in self.wound.items():
-            if tendon not in self._motor:
+        for name, tendon in self.wound_tendons.items():
+            if tendon not in self._motor_of_tendon:
                 continue
-            motor, place = self._motor[tendon], self.scenario.finger.actuated_names.index(tendon)
+            motor, index = self._motor_of_tendon[tendon], self.scenario.finger.actuated_names.index(tendon)
             actuator = self.scenario.finger.actuators[motor]
-            angle, encoder = load[:, place], actuator.motor.encoder
+            angle, encoder = load[:, index], actuator.motor.encoder
             angle = angle if name.startswith("spool_angle.") else angle / actuator.radii[0]
             if encoder is not None and not encoder.range[0] <= angle.min() <= angle.max() <= encoder.range[1]:
                 allowed = f"{self._entry}.inputs.{name} takes the spool from {angle.min():.4g} to {angle.max():.4g} rad"
                 raise InputError(f"finger.actuators.{motor}.motor.encoder.range", allowed, list(encoder.range))
 
-    def tune(self, factor: float) -> None:
+    def scale_tolerances(self, factor: float) -> None:
         """Do nothing: a closed form has no errors."""
 
     def _corrected(self, nuisance: Mapping[str, float]) -> tuple[Array, Array]:
         """Return tensions, shape (m, a), N, and angles, (m, n), rad, with scales and offsets that are being found."""
         load, position = self.load.copy(), self._position.copy()
-        for name, group, place in self._inputs:
+        for name, group, index in self._inputs:
             scale = nuisance_value(nuisance, self.recording.name, name, "scale", 1.0)
-            values = scale * group[:, place] + nuisance_value(nuisance, self.recording.name, name, "offset")
-            if group is self.load and name not in self.wound:
-                # A tendon only pulls: what a wrong zero takes below it is a slack one.
-                load[:, place] = np.maximum(values, 0.0)
+            values = scale * group[:, index] + nuisance_value(nuisance, self.recording.name, name, "offset")
+            if group is self.load and name not in self.wound_tendons:
+                # A tendon only pulls: a tension below zero by a wrong zero is that of a slack one.
+                load[:, index] = np.maximum(values, 0.0)
             else:
-                (load if group is self.load else position)[:, place] = values
+                (load if group is self.load else position)[:, index] = values
         return load, position
 
     def _finger(self, scenario: Scenario) -> Finger:
         """Return the finger at rest, with sources and winches in place of motors."""
         finger, objects = scenario.finger, scenario.environment.objects
-        resting = resting_finger(finger, self.wound.values()) if finger.actuators else finger
-        if self._replacing is not None:
-            replacing = with_parameters_of(self._replacing, self.scenario, scenario)
-            return replacing.changed(resting, objects) if finger.actuators else replacing
+        resting = resting_finger(finger, self.wound_tendons.values()) if finger.actuators else finger
+        if self._replacement is not None:
+            replacement = with_parameters_of(self._replacement, self.scenario, scenario)
+            return replacement.changed(resting, objects) if finger.actuators else replacement
         return Finger(resting, objects=objects)
 
-    def _settled(self, scenario: Scenario, load: Array) -> Array:
+    def _settled_postures(self, scenario: Scenario, load: Array) -> Array:
         """Return the posture at rest of every row nearest to the recorded one, shape (m, n), rad."""
         finger, forces = self._finger(scenario), [each.fingertip_force for each in scenario.environments().values()]
         force, load = np.array(forces if len(forces) > 1 else forces[0]), load.copy()
-        for name, tendon in self.wound.items():
-            if tendon in self._motor:
-                place, angle = scenario.finger.actuated_names.index(tendon), name.startswith("spool_angle.")
-                load[:, place] = wound_length(scenario.finger, self._motor[tendon], load[:, place], angle)
+        for name, tendon in self.wound_tendons.items():
+            if tendon in self._motor_of_tendon:
+                index, angle = scenario.finger.actuated_names.index(tendon), name.startswith("spool_angle.")
+                load[:, index] = wound_length(scenario.finger, self._motor_of_tendon[tendon], load[:, index], angle)
         speeds = [None] * len(load) if self.recording.settings.speed is None else self.recording.speed.tolist()
         rows = zip(load, speeds, self._position, strict=True)
-        return np.array([settled_posture(finger, each, speed, near, force) for each, speed, near in rows])
+        return np.array([settled_posture(finger, each, speed, guess, force) for each, speed, guess in rows])
 
     def _check_direction(self) -> None:
         """Refuse joints that are both input and output, and a direction that leaves the friction open.
@@ -208,8 +211,8 @@ class SteadyReadings:
         pins = finger.joint_friction
         joints_rub = bool(np.any(pins.bearing & ((pins.kinetic > 0.0) | (pins.static > 0.0) | (pins.drag > 0.0))))
         tendons_rub = bool(np.any((finger.tendons.surface > 0.0) | (finger.tendons.drag > 0.0)))
-        several = tendons_rub and len(finger.tendons.surface) > 1
-        if self.recording.settings.speed is not None and (joints_rub or several):
+        several_tendons_rub = tendons_rub and len(finger.tendons.surface) > 1
+        if self.recording.settings.speed is not None and (joints_rub or several_tendons_rub):
             rubbing = "joints rub" if joints_rub else "several tendons rub"
             allowed = (
                 f"does not tell where the finger rests, as its {rubbing}: leave speed out for postures without "
@@ -222,7 +225,7 @@ class SteadyReadings:
         tensions = {each.partition(".")[2] for each in self.recording.inputs if each.startswith("spool_tension.")}
         for motor, actuator in self.scenario.finger.actuators.items():
             tendon = actuator.tendons[0]
-            if actuator.drive == "position" and not {*actuator.tendons} <= {*self.wound.values()} | tensions:
+            if actuator.drive == "position" and not {*actuator.tendons} <= {*self.wound_tendons.values()} | tensions:
                 allowed = (
                     f"lack what {motor} in position drive rests at: spool_angle.{motor}, or spool_tension.{tendon}"
                 )
@@ -232,8 +235,8 @@ class SteadyReadings:
         """Return the tendon that an input winds; refuse a motor whose goal does not tell where it rests."""
         variable, _, label = name.partition(".")
         if variable == "spool_angle":
-            self._place(f"inputs.{name}", label, list(finger.actuators))
-        motor = label if variable == "spool_angle" else self._motor.get(label)
+            self._index(f"inputs.{name}", label, list(finger.actuators))
+        motor = label if variable == "spool_angle" else self._motor_of_tendon.get(label)
         if motor is None:
             return label
         actuator = finger.actuators[motor]
@@ -251,7 +254,7 @@ class SteadyReadings:
             raise InputError(f"{self._entry}.inputs.{name}", f"{allowed}, and no torque_off; it has {unsupported}")
         return actuator.tendons[0]
 
-    def _place(self, where: str, label: str, names: Sequence[str]) -> int:
+    def _index(self, where: str, label: str, names: Sequence[str]) -> int:
         if label not in names:
             raise InputError(f"{self._entry}.{where}", f"there is no {label}; there are {', '.join(names) or 'none'}")
         return names.index(label)

@@ -42,8 +42,8 @@ ACTUATOR = Law(
     supplies=("actuators",),
 )
 
-# How fast a state comes to rest at its limits, 1/s.
-_STOPS = 1e3
+# Rate at which a state returns to its limits, 1/s.
+_LIMIT_RATE = 1e3
 
 
 def _command_and_rates(row: Row, p: Parameters) -> Numbers:
@@ -52,28 +52,30 @@ def _command_and_rates(row: Row, p: Parameters) -> Numbers:
     command = np.minimum(np.maximum(row.command, lowest), highest)
     rate = by_input * command + by_length * row.length + by_state * row.state
     limited = np.minimum(np.maximum(rate, -slew), slew)
-    return command, rate, np.minimum(np.maximum(limited, _STOPS * (least - row.state)), _STOPS * (most - row.state))
+    lowest_rate, highest_rate = _LIMIT_RATE * (least - row.state), _LIMIT_RATE * (most - row.state)
+    return command, rate, np.minimum(np.maximum(limited, lowest_rate), highest_rate)
 
 
-def _value_of_state(row: Row, p: Parameters) -> Numbers:
+def _state_value(row: Row, p: Parameters) -> Numbers:
     gain, offset, by_length, by_speed, _, _, least, most, by_state, _, _, _, _, _, _ = p
     command, free, rate = _command_and_rates(row, p)
     wanted = gain * command + offset + by_length * row.length + by_speed * row.speed + by_state * row.state
     return np.minimum(np.maximum(wanted, least), most), rate, wanted, free
 
 
-def _slopes_of_state(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
+def _state_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     gain, _, by_length, by_speed, lowest, highest, least, most, by_state = p[:9]
     rate_by_input, rate_by_length, rate_by_state, least_state, most_state, slew = p[9:]
     wanted, rate = signals
     free = 1.0 * (wanted > least) * (wanted < most)
-    heard = 1.0 * (row.command > lowest) * (row.command < highest)
+    command_free = 1.0 * (row.command > lowest) * (row.command < highest)
     limited = np.minimum(np.maximum(rate, -slew), slew)
-    stopped = 1.0 * (limited > _STOPS * (most_state - row.state)) + 1.0 * (limited < _STOPS * (least_state - row.state))
-    moves = (1.0 - stopped) * (rate > -slew) * (rate < slew)
-    force = (free * by_length, free * by_speed, free * by_state, 0.0, 0.0, free * heard * gain, 0.0)
-    rate_slope = moves * rate_by_state - stopped * _STOPS
-    return force, (moves * rate_by_length, 0.0, rate_slope, 0.0, moves * heard * rate_by_input, 0.0)
+    at_most = 1.0 * (limited > _LIMIT_RATE * (most_state - row.state))
+    at_limit = at_most + 1.0 * (limited < _LIMIT_RATE * (least_state - row.state))
+    rate_free = (1.0 - at_limit) * (rate > -slew) * (rate < slew)
+    force = (free * by_length, free * by_speed, free * by_state, 0.0, 0.0, free * command_free * gain, 0.0)
+    rate_slope = rate_free * rate_by_state - at_limit * _LIMIT_RATE
+    return force, (rate_free * rate_by_length, 0.0, rate_slope, 0.0, rate_free * command_free * rate_by_input, 0.0)
 
 
 #: The same with a state: a lag, an integrating input, or the integral part of a servo.
@@ -89,8 +91,8 @@ ACTUATOR_WITH_STATE = Law(
         "most_state",
         "slew",
     ),
-    value=_value_of_state,
-    slopes=_slopes_of_state,
+    value=_state_value,
+    slopes=_state_slopes,
     account=_account,
     signals=("wanted", "free_rate"),
     supplies=("actuators",),

@@ -86,9 +86,9 @@ def friction_level(normal: Number, coefficient: Number, floor: Number, drag: Num
     return np.maximum(normal * coefficient + drag, floor)
 
 
-def directed_drag(drag: Numeric, asymmetry: Numeric, way: Numeric) -> Numeric:
+def directed_drag(drag: Numeric, asymmetry: Numeric, sign: Numeric) -> Numeric:
     """Return the drag in a direction of motion, 1 or -1: drag (1 + a) or drag (1 - a)."""
-    return drag * (1.0 + asymmetry * way)
+    return drag * (1.0 + asymmetry * sign)
 
 
 def bristle_stiffness(stiction: Number, stiffness: Number, hardening: Number) -> Number:
@@ -96,11 +96,11 @@ def bristle_stiffness(stiction: Number, stiffness: Number, hardening: Number) ->
     return stiffness + hardening * np.abs(stiction)
 
 
-def bristle_give(force: Number, stiffness: Number, hardening: Number) -> Number:
+def bristle_deflection(force: Number, stiffness: Number, hardening: Number) -> Number:
     """Return the deflection of bristles under a force before they slip, m or rad."""
-    harder = 1.0 * (hardening > 0.0)
-    length = 1.0 / (hardening + (1.0 - harder))
-    return (1.0 - harder) * force / stiffness + harder * length * np.log1p(force / (stiffness * length))
+    hardens = 1.0 * (hardening > 0.0)
+    length = 1.0 / (hardening + (1.0 - hardens))
+    return (1.0 - hardens) * force / stiffness + hardens * length * np.log1p(force / (stiffness * length))
 
 
 def stiction_rate(stiction: Number, velocity: Number, level: Number, stiffness: Number, side: Number = 0.0) -> Number:
@@ -139,11 +139,11 @@ def bristle_energy(stiction: Number, stiffness: Number, hardening: Number = 0.0)
 
     With the length delta of hardening and u = |F^s| / (delta sigma_0) that is delta^2 sigma_0 (u - ln(1 + u)).
     """
-    harder = 1.0 * (hardening > 0.0)
-    length = 1.0 / (hardening + (1.0 - harder))
+    hardens = 1.0 * (hardening > 0.0)
+    length = 1.0 / (hardening + (1.0 - hardens))
     stretch = np.abs(stiction) / (length * stiffness)
     hard = length * length * stiffness * (stretch - np.log1p(stretch))
-    return (1.0 - harder) * stiction * stiction / (2.0 * stiffness) + harder * hard
+    return (1.0 - hardens) * stiction * stiction / (2.0 * stiffness) + hardens * hard
 
 
 def coulomb_loss(stiction: Number, velocity: Number, level: Number) -> Number:
@@ -152,7 +152,7 @@ def coulomb_loss(stiction: Number, velocity: Number, level: Number) -> Number:
 
 
 def viscous_loss(velocity: Number, viscous: Number) -> Number:
-    """Return the power lost in the viscous part of (9c), b v^2."""
+    """Return the power lost in viscous friction, as in (9c), or in a damper: b v^2."""
     return viscous * velocity * velocity
 
 
@@ -176,26 +176,26 @@ def steady_force(velocity: Number, normal: Number, coefficient: Number, viscous:
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
-    kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag, asymmetry = p
+    kinetic, static, base_stiffness, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag, asymmetry = p
     share = friction_coefficient(row.speed, 0.0, 1.0, stribeck, exponent, row.side)
     coefficient = kinetic + (static - kinetic) * share
-    unloaded = directed_drag(drag + (static_drag - drag) * share, asymmetry, direction(row.speed, row.side))
-    level = friction_level(row.load, coefficient, floor, unloaded)
-    stiffness = bristle_stiffness(row.state, soft, hardening)
+    drag_level = directed_drag(drag + (static_drag - drag) * share, asymmetry, direction(row.speed, row.side))
+    level = friction_level(row.load, coefficient, floor, drag_level)
+    stiffness = bristle_stiffness(row.state, base_stiffness, hardening)
     rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
     return -loss, rate, loss, row.load, coefficient, level
 
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    kinetic, static, soft, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag, asymmetry = p
+    kinetic, static, base_stiffness, viscous, stribeck, floor, exponent, _, hardening, drag, static_drag, asymmetry = p
     _, _, coefficient, level = signals
-    stiffness = bristle_stiffness(row.state, soft, hardening)
+    stiffness = bristle_stiffness(row.state, base_stiffness, hardening)
     by_stiction, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
     by_level = by_level * (level > floor)
-    way = direction(row.speed, row.side)
+    sign = direction(row.speed, row.side)
     by_share = row.load * (static - kinetic)
-    by_share = by_share + directed_drag(static_drag, asymmetry, way) - directed_drag(drag, asymmetry, way)
+    by_share = by_share + directed_drag(static_drag, asymmetry, sign) - directed_drag(drag, asymmetry, sign)
     by_speed = by_speed + by_level * by_share * friction_coefficient_slope(
         row.speed, 0.0, 1.0, stribeck, exponent, row.side
     )

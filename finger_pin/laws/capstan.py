@@ -31,9 +31,9 @@ from finger_pin.laws.bristle import (
 from finger_pin.laws.law import Law, Row, direction, magnitude
 from finger_pin.typing import Number, Numbers, Numeric, Parameters
 
-# More than any tendon bears, N.
-_ANY_FORCE = 1e30
-# What integrators take for an instant, s: about a hundred times the resolution of time.
+# Force without a limit, N: more than any tendon bears.
+_UNLIMITED_FORCE = 1e30
+# Shortest time constant for integrators, s: about a hundred times the resolution of time.
 _INSTANT = 1e-12
 
 
@@ -46,8 +46,8 @@ def capstan_coefficient(surface: Numeric, curvature: Numeric) -> Numeric:
         surface: mu_e, Coulomb coefficient between tendon and canal.
         curvature: phi, total curvature of the path, rad.
     """
-    left = np.exp(-surface * curvature)
-    return (1.0 - left) / (1.0 + left)
+    transmitted = np.exp(-surface * curvature)
+    return (1.0 - transmitted) / (1.0 + transmitted)
 
 
 def capstan_slope(surface: Number, coefficient: Number) -> Number:
@@ -60,7 +60,7 @@ def delivered_tension(command: Number, loss: Number) -> Number:
     return np.maximum(0.0, command - loss)
 
 
-def _haste(stiffness: Number, viscous: Number) -> Number:
+def _least_level_per_speed(stiffness: Number, viscous: Number) -> Number:
     """Return the least level over the speed, N s/m: beyond the floor's reach, (9a) must not get faster.
 
     As a driven tendon goes slack that slides against its stretched bristles, the tension in (14), y = |F^s| - b v,
@@ -71,8 +71,8 @@ def _haste(stiffness: Number, viscous: Number) -> Number:
     return np.sqrt(_INSTANT * stiffness * viscous) + _INSTANT * stiffness
 
 
-def _haste_slope(stiffness: Number, viscous: Number) -> Number:
-    """Return the derivative of `_haste` by the stiffness."""
+def _least_level_slope(stiffness: Number, viscous: Number) -> Number:
+    """Return the derivative of `_least_level_per_speed` by the stiffness."""
     return 0.5 * np.sqrt(_INSTANT * viscous / stiffness) + _INSTANT
 
 
@@ -92,31 +92,31 @@ def sliding_tension(
         drag: N.
         floor: g_min, N.
     """
-    way = np.sign(speed)
-    signed, lost = way * coefficient, viscous * speed
-    left = ((1.0 - signed) * command - way * drag - lost) / (1.0 + signed)
-    return np.maximum(0.0, left - way * np.maximum(0.0, floor - way * (command - left - lost)))
+    sign = np.sign(speed)
+    signed, lost = sign * coefficient, viscous * speed
+    delivered = ((1.0 - signed) * command - sign * drag - lost) / (1.0 + signed)
+    return np.maximum(0.0, delivered - sign * np.maximum(0.0, floor - sign * (command - delivered - lost)))
 
 
 def _level(normal: Number, sliding: Number, row: Row, p: Parameters) -> Number:
     """Return F^n M + drag, or its floor."""
     stiffness = bristle_stiffness(row.state, p[BRISTLE.stiffness], p[BRISTLE.hardening])
-    fastest = _haste(stiffness, p[BRISTLE.viscous]) * magnitude(row.speed, row.side)
-    return friction_level(1.0, normal * sliding + p[BRISTLE.drag], np.maximum(p[BRISTLE.floor], fastest))
+    least_level = _least_level_per_speed(stiffness, p[BRISTLE.viscous]) * magnitude(row.speed, row.side)
+    return friction_level(1.0, normal * sliding + p[BRISTLE.drag], np.maximum(p[BRISTLE.floor], least_level))
 
 
 def _rate_slopes(
     row: Row, normal: Number, coefficient: Number, sliding: Number, level: Number, p: Parameters
 ) -> Numbers:
     """Return the derivatives of F^s' by v, F^s, F^n and phi."""
-    surface, ratio, soft, viscous, stribeck, floor, exponent, _, hardening, _ = p[:10]
-    stiffness, fast = bristle_stiffness(row.state, soft, hardening), magnitude(row.speed, row.side)
-    by_stiction, by_speed, by_any = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
-    haste, haste_slope = _haste(stiffness, viscous), _haste_slope(stiffness, viscous)
-    hasty = 1.0 * (level > floor) * (level <= haste * fast)
-    by_stiction = by_stiction + hasty * by_any * fast * haste_slope * hardening * np.sign(row.state)
-    by_speed = by_speed + hasty * by_any * haste * direction(row.speed, row.side)
-    by_level = by_any * (level > floor) * (1.0 - hasty)
+    surface, ratio, base_stiffness, viscous, stribeck, floor, exponent, _, hardening, _ = p[:10]
+    stiffness, speed = bristle_stiffness(row.state, base_stiffness, hardening), magnitude(row.speed, row.side)
+    by_stiction, by_speed, by_free = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
+    level_per_speed, level_slope = _least_level_per_speed(stiffness, viscous), _least_level_slope(stiffness, viscous)
+    limited = 1.0 * (level > floor) * (level <= level_per_speed * speed)
+    by_stiction = by_stiction + limited * by_free * speed * level_slope * hardening * np.sign(row.state)
+    by_speed = by_speed + limited * by_free * level_per_speed * direction(row.speed, row.side)
+    by_level = by_free * (level > floor) * (1.0 - limited)
     slope = friction_coefficient_slope(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     # M is proportional to mu^d, which depends on the posture through the curvature.
     share = sliding / np.maximum(coefficient, 1e-300)
@@ -124,14 +124,14 @@ def _rate_slopes(
     return by_speed + by_level * normal * slope, by_stiction, by_level * sliding, by_curvature
 
 
-def _driven(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, soft, viscous, stribeck, _, exponent, _, hardening, _, acting = p
+def _driven_value(row: Row, p: Parameters) -> Numbers:
+    surface, ratio, base_stiffness, viscous, stribeck, _, exponent, _, hardening, _, acting = p
     coefficient = capstan_coefficient(surface, row.curvature)
     pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
     normal = np.abs(pressing) + np.abs(row.command)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     level = _level(normal, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, soft, hardening), row.side)
+    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, base_stiffness, hardening), row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
     force = delivered_tension(row.command, loss) - acting * row.command
     return force, rate, loss, normal, coefficient, sliding, level, pressing
@@ -157,12 +157,12 @@ def _driven_account(row: Row, p: Parameters, force: Number, rate: Number, signal
     return stored, (1.0 - acting) * row.command * row.speed, coulomb, viscous, micro, slack
 
 
-def _passive(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, soft, viscous, stribeck, _, exponent, _, hardening, _ = p
+def _passive_value(row: Row, p: Parameters) -> Numbers:
+    surface, ratio, base_stiffness, viscous, stribeck, _, exponent, _, hardening, _ = p
     coefficient = capstan_coefficient(surface, row.curvature)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     level = _level(row.load, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, soft, hardening), row.side)
+    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, base_stiffness, hardening), row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
     return -loss, rate, loss, row.load, coefficient, sliding, level
 
@@ -185,7 +185,7 @@ _PARAMETERS = ("surface", "ratio", *BRISTLE._fields)
 DRIVEN_TENDON = Law(
     name="driven tendon (12), (14), (16)",
     parameters=(*_PARAMETERS, "acting"),
-    value=_driven,
+    value=_driven_value,
     slopes=_driven_slopes,
     account=_driven_account,
     signals=("friction", "normal_force", "coefficient", "sliding_coefficient", "level", "pressing"),
@@ -199,7 +199,7 @@ DRIVEN_TENDON = Law(
 PASSIVE_FRICTION = Law(
     name="passive tendon (14), (16)",
     parameters=_PARAMETERS,
-    value=_passive,
+    value=_passive_value,
     slopes=_passive_slopes,
     account=_passive_account,
     signals=("friction", "normal_force", "coefficient", "sliding_coefficient", "level"),
@@ -209,26 +209,26 @@ PASSIVE_FRICTION = Law(
 )
 
 
-def _canal(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, soft, viscous, stribeck, _, exponent, _, hardening, _, one_way = p
-    # What pushes, where it can.
-    lowest = -_ANY_FORCE * (one_way <= 0.0)
+def _canal_value(row: Row, p: Parameters) -> Numbers:
+    surface, ratio, base_stiffness, viscous, stribeck, _, exponent, _, hardening, _, one_way = p
+    # Lowest tension: tendons that cannot push end at zero.
+    lowest = -_UNLIMITED_FORCE * (one_way <= 0.0)
     tension = np.maximum(row.command, lowest)
     coefficient = capstan_coefficient(surface, row.curvature)
-    left = tension - friction_force(row.state, row.speed, viscous)
-    pressing = np.maximum(left, lowest)
+    delivered = tension - friction_force(row.state, row.speed, viscous)
+    pressing = np.maximum(delivered, lowest)
     normal = np.abs(pressing) + np.abs(tension)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     level = _level(normal, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, soft, hardening), row.side)
+    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, base_stiffness, hardening), row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
     force = np.maximum(-loss, lowest - tension)
     return force, rate, loss, normal, coefficient, sliding, level, pressing
 
 
 def _canal_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    _, _, _, viscous, _, _, _, _, _, _, only_pulls = p
-    lag, one_way = micro_lag(row.state, p), 1.0 * (only_pulls > 0.0)
+    _, _, _, viscous, _, _, _, _, _, _, one_way_flag = p
+    lag, one_way = micro_lag(row.state, p), 1.0 * (one_way_flag > 0.0)
     loss, normal, coefficient, sliding, level, pressing = signals
     by_speed, by_stiction, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
     pulled = 1.0 - one_way * (row.command <= 0.0)
@@ -251,7 +251,7 @@ def _canal_account(row: Row, p: Parameters, force: Number, rate: Number, signals
 CANAL_FRICTION = Law(
     name="tendon in its canal (14), (16)",
     parameters=(*_PARAMETERS, "one_way"),
-    value=_canal,
+    value=_canal_value,
     slopes=_canal_slopes,
     account=_canal_account,
     signals=("friction", "normal_force", "coefficient", "sliding_coefficient", "level", "pressing"),
@@ -261,18 +261,18 @@ CANAL_FRICTION = Law(
 )
 
 
-def _shared(row: Row, p: Parameters) -> Numbers:
+def _cord_tension(row: Row, p: Parameters) -> Numbers:
     (both_ways,) = p
     return np.maximum(row.command, 0.0) + both_ways * np.maximum(-row.command, 0.0), 0.0 * row.command
 
 
-def _shared_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
+def _cord_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     (both_ways,) = p
     by_command = 1.0 * (row.command > 0.0) - both_ways * (row.command < 0.0)
     return (0.0, 0.0, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _shared_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
+def _cord_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     # Without an arm it has no speed, and no power.
     return 0.0 * force, force * row.speed
 
@@ -280,5 +280,5 @@ def _shared_account(row: Row, p: Parameters, force: Number, rate: Number, signal
 #: The tension of a cord that turns a joint, by its share of what drives the joint: its input where that pulls it, and
 #: its magnitude where one cord, or what stands for a pair, turns it both ways. It has no arm: the drive itself acts.
 CORD_TENSION = Law(
-    "tension of a cord", ("both_ways",), _shared, _shared_slopes, _shared_account, supplies=("actuators",)
+    "tension of a cord", ("both_ways",), _cord_tension, _cord_slopes, _cord_account, supplies=("actuators",)
 )

@@ -97,16 +97,16 @@ def _slopes(touch: Touch, p: Parameters, signals: Numbers) -> tuple[Numbers, ...
     pressing, pressed = np.maximum(normal, 0.0), 1.0 * ((normal > 0.0) | (touch.side > 0.0))
     bend_1, bend_2, bend_3, bend, sliding, friction, excess = _cone(touch, pressing, p)
     level = friction * pressing
-    reach = np.maximum(np.maximum(stiffness * bend, level), floor)
-    share = level / reach
+    scale_force = np.maximum(np.maximum(stiffness * bend, level), floor)
+    share = level / scale_force
     # Of mu by |w|, then of the level and of the share by f_n and by |w|.
     falling = -2.0 * excess * sliding / (stribeck * stribeck * lag)
     level_n = (friction - pressing * falling * static / stiffness) * pressed
     level_b = pressing * falling
     outside = 1.0 * ((stiffness * bend >= level) & (stiffness * bend >= floor))
     inside = 1.0 * ((level > stiffness * bend) & (level >= floor))
-    share_n = level_n * (1.0 - inside * share) / reach
-    share_b = (level_b * (1.0 - inside * share) - outside * share * stiffness) / reach
+    share_n = level_n * (1.0 - inside * share) / scale_force
+    share_b = (level_b * (1.0 - inside * share) - outside * share * stiffness) / scale_force
     # |w| by its components; at w = 0 it has no slope, and needs none.
     scale = np.maximum(bend, 1e-300)
     along_1, along_2, along_3 = bend_1 / scale, bend_2 / scale, bend_3 / scale
@@ -119,23 +119,23 @@ def _slopes(touch: Touch, p: Parameters, signals: Numbers) -> tuple[Numbers, ...
     first, second, third = (n_1, b_11, b_12, b_13), (n_2, b_12, b_22, b_23), (n_3, b_13, b_23, b_33)
     return (
         (by_gap, by_speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        _of_force(-stiffness, first, by_normal, lag, radius),
-        _of_force(-stiffness, second, by_normal, lag, radius),
-        _of_force(-stiffness * radius, third, by_normal, lag, radius),
-        _of_rate((1.0, 0.0, 0.0), first, by_normal, lag, radius),
-        _of_rate((0.0, 1.0, 0.0), second, by_normal, lag, radius),
-        _of_rate((0.0, 0.0, 1.0), third, by_normal, lag, radius),
+        _force_slopes(-stiffness, first, by_normal, lag, radius),
+        _force_slopes(-stiffness, second, by_normal, lag, radius),
+        _force_slopes(-stiffness * radius, third, by_normal, lag, radius),
+        _rate_slopes((1.0, 0.0, 0.0), first, by_normal, lag, radius),
+        _rate_slopes((0.0, 1.0, 0.0), second, by_normal, lag, radius),
+        _rate_slopes((0.0, 0.0, 1.0), third, by_normal, lag, radius),
     )
 
 
-def _of_force(factor: Number, bend: Numbers, by_normal: Numbers, lag: Number, radius: Number) -> Numbers:
+def _force_slopes(factor: Number, bend: Numbers, by_normal: Numbers, lag: Number, radius: Number) -> Numbers:
     """Return the slopes of a multiple of a component of the tip's bend, given by f_n and by w."""
     n, b_1, b_2, b_3 = bend
     by_1, by_2, by_3, (by_gap, by_speed) = factor * b_1, factor * b_2, factor * b_3, by_normal
     return factor * n * by_gap, factor * n * by_speed, lag * by_1, lag * by_2, lag * radius * by_3, by_1, by_2, by_3
 
 
-def _of_rate(unit: Numbers, bend: Numbers, by_normal: Numbers, lag: Number, radius: Number) -> Numbers:
+def _rate_slopes(unit: Numbers, bend: Numbers, by_normal: Numbers, lag: Number, radius: Number) -> Numbers:
     """Return the slopes of z' = (tip - z) / T of a component."""
     (n, b_1, b_2, b_3), (u_1, u_2, u_3), (by_gap, by_speed) = bend, unit, by_normal
     by_states = (b_1 - u_1) / lag, (b_2 - u_2) / lag, (b_3 - u_3) / lag

@@ -30,7 +30,7 @@ from finger_pin.typing import Number, Numbers, Parameters
 
 _EPSILON = 1e-4
 # Least level, N m: it keeps (9a) finite for a gearbox without dry friction.
-_FLOOR = 1e-9
+_LEAST_LEVEL = 1e-9
 
 
 def stribeck_share(speed: Number, stribeck: Number, exponent: Number) -> Number:
@@ -47,16 +47,16 @@ def stribeck_share_slope(speed: Number, stribeck: Number, exponent: Number, shar
 
 def loss_share(pull: Number, speed: Number, driving: Number, driven: Number, side: Number = 0.0) -> Number:
     """Return the share of the tendons' torque T that gears lose, by the direction of power through them."""
-    way = np.sign(pull) * direction(speed, side)
-    return 0.5 * ((1.0 + way) * driving + (1.0 - way) * driven)
+    direction_sign = np.sign(pull) * direction(speed, side)
+    return 0.5 * ((1.0 + direction_sign) * driving + (1.0 - direction_sign) * driven)
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
     base, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     share = stribeck_share(row.speed, velocity, exponent)
     dry = base + by_load * row.load + (stribeck + stribeck_by_load * row.load) * share
-    lost = loss_share(row.command, row.speed, driving, driven, row.side) * np.abs(row.command)
-    level = friction_level(1.0, dry + lost, _FLOOR)
+    torque_loss = loss_share(row.command, row.speed, driving, driven, row.side) * np.abs(row.command)
+    level = friction_level(1.0, dry + torque_loss, _LEAST_LEVEL)
     loss = friction_force(row.state, row.speed, viscous)
     return -loss, stiction_rate(row.state, row.speed, level, stiffness, row.side), loss, share, level
 
@@ -65,11 +65,12 @@ def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers
     _, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     _, share, level = signals
     by_stiction, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
-    by_level = by_level * (level > _FLOOR)
-    steep = (stribeck + stribeck_by_load * row.load) * stribeck_share_slope(row.speed, velocity, exponent, share)
-    pressed = by_level * (by_load + stribeck_by_load * share)
-    pulled = by_level * loss_share(row.command, row.speed, driving, driven, row.side) * np.sign(row.command)
-    rate = (0.0, by_speed + by_level * steep, by_stiction, pressed, pulled, 0.0)
+    by_level = by_level * (level > _LEAST_LEVEL)
+    share_slope = stribeck_share_slope(row.speed, velocity, exponent, share)
+    stribeck_slope = (stribeck + stribeck_by_load * row.load) * share_slope
+    rate_by_load = by_level * (by_load + stribeck_by_load * share)
+    rate_by_command = by_level * loss_share(row.command, row.speed, driving, driven, row.side) * np.sign(row.command)
+    rate = (0.0, by_speed + by_level * stribeck_slope, by_stiction, rate_by_load, rate_by_command, 0.0)
     return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), rate
 
 

@@ -40,7 +40,7 @@ class Row(NamedTuple):
     reading: Number = 0.0
 
 
-def beyond(kink: Number, side: Number) -> Number:
+def on_positive_side(kink: Number, side: Number) -> Number:
     """Return 1 for a row on the positive side of its kink, or held there; else 0."""
     return 1.0 * (kink * (side == 0.0) + side > 0.0)
 
@@ -177,24 +177,24 @@ class ContactLaw:
     def arguments(self, row: Any) -> Touch:
         """Return the arguments for k contacts from a `Row`: of arms, shape (..., a k), and states, (..., (a - 1) k)."""
         gap, speed = row.length[..., :: self.arms], row.speed[..., :: self.arms]
-        return Touch(gap, speed, *_apart(row.speed, self.arms, 4)[1:], *_apart(row.state, self.states, 3))
+        return Touch(gap, speed, *_split(row.speed, self.arms, 4)[1:], *_split(row.state, self.states, 3))
 
     def act(self, touch: Touch, p: Parameters) -> tuple[Array, Array, tuple[Array, ...]]:
         """Return the contacts' forces, shape (..., a k), the rates of their states, (..., (a - 1) k), and signals."""
         values = self.value(touch, p)
-        return _side_by_side(values[: self.arms]), _side_by_side(values[4 : 4 + self.states]), tuple(values[7:])
+        return (_interleave(values[: self.arms]), _interleave(values[4 : 4 + self.states]), tuple(values[7:]))
 
     def energy_terms(self, touch: Touch, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
         """Return stored energy, J, and powers, W, from the results of `act`."""
-        return self.account(touch, p, _apart(force, self.arms, 4), _apart(rate, self.states, 3), signals)
+        return self.account(touch, p, _split(force, self.arms, 4), _split(rate, self.states, 3), signals)
 
 
-def _apart(values: Array, count: int, most: int) -> list[Array]:
+def _split(values: Array, count: int, size: int) -> list[Array]:
     """Return the numbers of each arm or state of contacts, zero for those that they do not have."""
     parts = [values[..., each::count] for each in range(count)]
-    return parts + [np.zeros_like(parts[0])] * (most - count)
+    return parts + [np.zeros_like(parts[0])] * (size - count)
 
 
-def _side_by_side(parts: Sequence[Number]) -> Array:
+def _interleave(parts: Sequence[Number]) -> Array:
     stacked = np.stack(np.broadcast_arrays(*parts), axis=-1)
     return stacked.reshape(*stacked.shape[:-2], -1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.laws.law import Law, Row, beyond
+from finger_pin.laws.law import Law, Row, on_positive_side
 from finger_pin.typing import Number, Numbers, Parameters
 
 
@@ -50,21 +50,21 @@ def _nearer_end(row: Row, p: Parameters) -> Numbers:
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
-    end, past, factor = _nearer_end(row, p)
+    end, depth, factor = _nearer_end(row, p)
     _, _, stiffness, _, viscous = p
-    push = stiffness * end * past * factor + viscous * row.speed
+    push = stiffness * end * depth * factor + viscous * row.speed
     # The torque bends or jumps where the joint meets its limit, and bends where the limiter would begin to pull.
-    grip = np.minimum(past, factor + (viscous > 0.0) * (end * push - factor))
-    torque = push * beyond(grip, row.side)
-    return -torque, 0.0 * row.length, end * np.maximum(past, 0.0), grip
+    grip = np.minimum(depth, factor + (viscous > 0.0) * (end * push - factor))
+    torque = push * on_positive_side(grip, row.side)
+    return -torque, 0.0 * row.length, end * np.maximum(depth, 0.0), grip
 
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, _, stiffness, damping, viscous = p
-    _, past, factor = _nearer_end(row, p)
-    pushes = beyond(signals[1], row.side)
+    _, depth, factor = _nearer_end(row, p)
+    pushes = on_positive_side(signals[1], row.side)
     gripping = stiffness * pushes
-    by_speed = -damping * past * gripping - viscous * pushes
+    by_speed = -damping * depth * gripping - viscous * pushes
     return (-factor * gripping, by_speed, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

@@ -19,7 +19,7 @@ from finger_pin.typing import Number, Numbers, Parameters
 #: The voltage that means none: no current flows.
 OPEN_CIRCUIT = 1e30
 # Least share of a torque that gears are expected to leave.
-_LEAST = 1e-3
+_LEAST_SHARE = 1e-3
 
 
 def friction_torque(speed: Number, torque: Number, p: Parameters) -> tuple[Number, Number, Number]:
@@ -36,32 +36,32 @@ def friction_torque(speed: Number, torque: Number, p: Parameters) -> tuple[Numbe
         The torque, and its derivatives by w and by T.
     """
     _, _, _, _, _, _, dry, by_torque, by_load, viscous, reversal = p
-    eased, pull = np.tanh(speed / reversal), np.maximum(torque, 0.0)
+    sign, pull = np.tanh(speed / reversal), np.maximum(torque, 0.0)
     # Of numbers, np.where would make arrays in compiled code.
-    side = 2.0 * (by_torque * pull + by_load * eased * dry >= 0.0) - 1.0
-    left = np.maximum(1.0 - side * by_load * eased, _LEAST)
-    level = (dry + side * by_torque * pull) / left
-    by_eased = level * (1.0 + side * by_load * eased / left * (left > _LEAST))
-    by_speed = by_eased * (1.0 - eased * eased) / reversal + viscous
-    return eased * level + viscous * speed, by_speed, eased * side * by_torque / left * (torque > 0.0)
+    side = 2.0 * (by_torque * pull + by_load * sign * dry >= 0.0) - 1.0
+    share = np.maximum(1.0 - side * by_load * sign, _LEAST_SHARE)
+    level = (dry + side * by_torque * pull) / share
+    by_sign = level * (1.0 + side * by_load * sign / share * (share > _LEAST_SHARE))
+    by_speed = by_sign * (1.0 - sign * sign) / reversal + viscous
+    return sign * level + viscous * speed, by_speed, sign * side * by_torque / share * (torque > 0.0)
 
 
-def asked_voltage(speed: Number, command: Number, p: Parameters) -> Number:
+def requested_voltage(speed: Number, command: Number, p: Parameters) -> Number:
     """Return the voltage that the drive asks for before any limit, V; see `MOTOR` for ``p``."""
     constant, resistance, _, _, by_current, gain, _, _, _, _, _ = p
     torque = gain * command + friction_torque(speed, gain * command, p)[0]
     return by_current * (resistance * torque / constant + constant * speed) + (1.0 - by_current) * command
 
 
-def free_current(speed: Number, asked: Number, p: Parameters) -> Number:
-    """Return the current without its limit, A, for an asked voltage, V."""
+def free_current(speed: Number, requested: Number, p: Parameters) -> Number:
+    """Return the current without its limit, A, for a requested voltage, V."""
     constant, resistance, supply, _, _, _, _, _, _, _, _ = p
-    return (np.minimum(np.maximum(asked, -supply), supply) - constant * speed) / resistance
+    return (np.minimum(np.maximum(requested, -supply), supply) - constant * speed) / resistance
 
 
 def _value(row: Row, p: Parameters) -> Numbers:
     constant, resistance, _, limit, _, _, _, _, _, _, _ = p
-    free = free_current(row.speed, asked_voltage(row.speed, row.command, p), p)
+    free = free_current(row.speed, requested_voltage(row.speed, row.command, p), p)
     current = np.minimum(np.maximum(free, -limit), limit) * (row.command < OPEN_CIRCUIT)
     voltage = resistance * current + constant * row.speed
     return constant * current, 0.0 * row.length, current, voltage
@@ -69,12 +69,14 @@ def _value(row: Row, p: Parameters) -> Numbers:
 
 def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     constant, resistance, supply, limit, by_current, gain, _, _, _, _, _ = p
-    asked = asked_voltage(row.speed, row.command, p)
-    within = constant / resistance * (np.abs(free_current(row.speed, asked, p)) < limit) * (row.command < OPEN_CIRCUIT)
-    followed = within * (np.abs(asked) < supply)
-    _, steeper, by_torque = friction_torque(row.speed, gain * row.command, p)
-    by_speed = followed * by_current * (resistance * steeper / constant + constant) - within * constant
-    by_command = followed * (by_current * resistance * gain * (1.0 + by_torque) / constant + 1.0 - by_current)
+    requested = requested_voltage(row.speed, row.command, p)
+    within_limit = np.abs(free_current(row.speed, requested, p)) < limit
+    current_slope = constant / resistance * within_limit * (row.command < OPEN_CIRCUIT)
+    voltage_slope = current_slope * (np.abs(requested) < supply)
+    _, friction_slope, by_torque = friction_torque(row.speed, gain * row.command, p)
+    by_speed = voltage_slope * by_current * (resistance * friction_slope / constant + constant)
+    by_speed = by_speed - current_slope * constant
+    by_command = voltage_slope * (by_current * resistance * gain * (1.0 + by_torque) / constant + 1.0 - by_current)
     return (0.0, by_speed, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

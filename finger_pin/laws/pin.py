@@ -28,26 +28,26 @@ SIGNALS = ("friction", "normal_force", "coefficient", "level")
 
 
 def _dahl_value(row: Row, p: Parameters) -> Numbers:
-    kinetic, soft, viscous, floor, hardening, drag, asymmetry = p
-    unloaded = directed_drag(drag, asymmetry, direction(row.speed, row.side))
-    level = friction_level(row.load, kinetic, floor, unloaded)
-    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, soft, hardening), row.side)
+    kinetic, base_stiffness, viscous, floor, hardening, drag, asymmetry = p
+    drag_level = directed_drag(drag, asymmetry, direction(row.speed, row.side))
+    level = friction_level(row.load, kinetic, floor, drag_level)
+    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, base_stiffness, hardening), row.side)
     loss = friction_force(row.state, row.speed, viscous)
     return -loss, rate, loss, row.load, kinetic + 0.0 * row.load, level
 
 
 def _dahl_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    kinetic, soft, viscous, floor, hardening, _, _ = p
+    kinetic, base_stiffness, viscous, floor, hardening, _, _ = p
     level = signals[3]
-    stiffness = bristle_stiffness(row.state, soft, hardening)
+    stiffness = bristle_stiffness(row.state, base_stiffness, hardening)
     by_stiction, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
     by_load = by_level * (level > floor) * kinetic
     return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, by_stiction, by_load, 0.0, 0.0)
 
 
 def _dahl_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    _, soft, viscous, _, hardening, _, _ = p
-    return bristle_account(row.speed, row.state, rate, signals[3], soft, viscous, 0.0, hardening)
+    _, base_stiffness, viscous, _, hardening, _, _ = p
+    return bristle_account(row.speed, row.state, rate, signals[3], base_stiffness, viscous, 0.0, hardening)
 
 
 def _coulomb_value(row: Row, p: Parameters) -> Numbers:

@@ -14,8 +14,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.laws.bristle import bristle_energy, coulomb_loss, friction_level, stiction_rate, stiction_rate_slopes
-from finger_pin.laws.law import Law, Row, beyond
+from finger_pin.laws.bristle import (
+    bristle_energy,
+    coulomb_loss,
+    friction_level,
+    stiction_rate,
+    stiction_rate_slopes,
+    viscous_loss,
+)
+from finger_pin.laws.law import Law, Row, on_positive_side
 from finger_pin.laws.limiter import penetration
 from finger_pin.typing import Number, Numbers, Numeric, Parameters
 
@@ -40,11 +47,6 @@ def spring_energy(position: Number, stiffness: Number, rest: Number) -> Number:
     return 0.5 * stiffness * (position - rest) * (position - rest)
 
 
-def spring_loss(velocity: Number, damping: Number) -> Number:
-    """Return the power lost in the damping, c theta'^2, W."""
-    return damping * velocity * velocity
-
-
 def _value(row: Row, p: Parameters) -> Numbers:
     stiffness, rest, damping = p
     return -spring_torque(row.length, row.speed, stiffness, rest, damping), 0.0 * row.length
@@ -57,7 +59,7 @@ def _slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers
 
 def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stiffness, rest, damping = p
-    return spring_energy(row.length, stiffness, rest), spring_loss(row.speed, damping)
+    return spring_energy(row.length, stiffness, rest), viscous_loss(row.speed, damping)
 
 
 #: A torsion spring between the links of a joint.
@@ -94,11 +96,6 @@ def half_tension(stretch: Number, stiffness: Number) -> Number:
     return np.maximum(0.0, stiffness * stretch)
 
 
-def half_energy(stretch: Number, stiffness: Number) -> Number:
-    """Return the elastic energy of one half of a passive tendon, J; zero when slack."""
-    return 0.5 * stiffness * np.maximum(0.0, stretch) ** 2
-
-
 def _half_value(row: Row, p: Parameters) -> Numbers:
     (stiffness,) = p
     return half_tension(-row.length, stiffness), 0.0 * row.length
@@ -112,7 +109,7 @@ def _half_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Nu
 
 def _half_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     (stiffness,) = p
-    return (half_energy(-row.length, stiffness),)
+    return (elastic_energy(-row.length, stiffness),)
 
 
 #: One half of a passive tendon, a spring that only pulls; it is stretched where its length is negative.
@@ -126,19 +123,19 @@ TENDON_HALF = Law(
 
 
 def elastic_energy(stretch: Number, stiffness: Number) -> Number:
-    """Return the elastic energy K e^2 / 2, J; zero when slack."""
+    """Return the elastic energy K e^2 / 2 of a tendon or of one half of a passive one, J; zero when slack."""
     return 0.5 * stiffness * np.maximum(0.0, stretch) ** 2
 
 
 def _elastic_value(row: Row, p: Parameters) -> Numbers:
     stiffness, damping = p
     pull = -stiffness * row.length - damping * row.speed
-    return pull * beyond(pull, row.side), 0.0 * row.length, pull
+    return pull * on_positive_side(pull, row.side), 0.0 * row.length, pull
 
 
 def _elastic_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     stiffness, damping = p
-    taut = beyond(signals[0], row.side)
+    taut = on_positive_side(signals[0], row.side)
     return (-stiffness * taut, -damping * taut, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -174,7 +171,7 @@ def _dead_band_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Number
 
 def _dead_band_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     stiffness, _, _, damping = p
-    return spring_energy(signals[0], stiffness, 0.0), spring_loss(row.speed, damping)
+    return spring_energy(signals[0], stiffness, 0.0), viscous_loss(row.speed, damping)
 
 
 #: The spring of a MuJoCo tendon: it pushes below the first and pulls beyond the second of its spring lengths.
@@ -207,7 +204,7 @@ def _hysteresis_account(row: Row, p: Parameters, force: Number, rate: Number, si
     return bristle_energy(row.state, stiffness), coulomb_loss(row.state, row.speed, signals[0])
 
 
-#: What a spring loses in a cycle whatever its speed; the load is the spring's force.
+#: Rate-independent loss of a spring in a cycle; the load is the spring's force.
 HYSTERESIS = Law(
     name="hysteresis of a spring",
     parameters=("share", "stiffness", "floor"),
@@ -219,5 +216,5 @@ HYSTERESIS = Law(
     scale=1e-2,
     kink="speed",
 )
-#: The stiffness of its bristles over the spring's own: how sharply the force turns where the motion does.
-STIFFER = 10.0
+#: Stiffness of the bristles over the spring's: how sharply the force turns at a reversal.
+BRISTLE_RATIO = 10.0

@@ -115,9 +115,9 @@ class BatchedLoop(ClosedLoop):
         ]
         return np.array(goals) if goals else None
 
-    def wound(self, angle: Array) -> Array:
+    def wound_lengths(self, angle: Array) -> Array:
         """Return the lengths that every world's spools wind in, shape (w, k'), m."""
-        return np.array([loop.wound(goals[None])[0] for loop, goals in zip(self.loops, angle, strict=True)])
+        return np.array([loop.wound_lengths(goals[None])[0] for loop, goals in zip(self.loops, angle, strict=True)])
 
     @property
     def shared(self) -> bool:
@@ -142,7 +142,7 @@ class BatchedLoop(ClosedLoop):
             voltages = [action.voltages(each) for action, each in zip(self.actions, times, strict=True)]
             command[:, self.drives.channels] = voltages
         base = None
-        if outputs == "all" and (self.palm or self.guides):
+        if outputs == "all" and (self.palm or self.prescribed_motion):
             base = np.array([loop.base(each) for loop, each in zip(self.loops, times, strict=True)])
         nothing = np.zeros((len(times), len(routing.joints)))
         finger = self.dynamics.evaluate(x, command, self.force(time), base, outputs)

@@ -15,7 +15,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.laws.bristle import directed_drag
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
-from finger_pin.laws.spring import HYSTERESIS, JOINT_SPRING, STIFFER, spring_torque
+from finger_pin.laws.spring import BRISTLE_RATIO, HYSTERESIS, JOINT_SPRING, spring_torque
 from finger_pin.mechanism.joint_laws import joint_law
 from finger_pin.mechanism.rows import Energy, Rows, energy
 from finger_pin.typing import Array
@@ -267,7 +267,7 @@ def hysteresis_rows(group: str, springs: Rows, shares: Array, floor: float, lost
             group=group,
             law=HYSTERESIS,
             names=tuple(springs.names[k] for k in lossy),
-            parameters=np.array([shares[lossy], STIFFER * stiffness[lossy], np.full(len(lossy), floor)]),
+            parameters=np.array([shares[lossy], BRISTLE_RATIO * stiffness[lossy], np.full(len(lossy), floor)]),
             arm=springs.arm[lossy],
             loads={springs.group: np.eye(springs.count)[lossy]},
             stored=springs.stored,

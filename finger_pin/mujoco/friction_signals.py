@@ -40,10 +40,10 @@ class Signals:
         Raises:
             InputError: If it has no friction.
         """
-        return place_of(name, self.names)
+        return friction_index(name, self.names)
 
 
-def place_of(name: str, names: Sequence[str]) -> int:
+def friction_index(name: str, names: Sequence[str]) -> int:
     """Return the index of a friction by its name.
 
     Raises:
@@ -66,7 +66,9 @@ def friction(model: mujoco.MjModel, data: mujoco.MjData) -> Signals:
     register()
     if int(model.opt.integrator) == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1)):
         raise InputError("model.opt.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
-    actuators = [i for i in range(model.nactuator) if model.actuator_plugin[i] >= 0 and _table(model, i) is not None]
+    actuators = [
+        i for i in range(model.nactuator) if model.actuator_plugin[i] >= 0 and _tuple_index(model, i) is not None
+    ]
     if not actuators:
         raise InputError("model", "has no friction: add_friction(spec, ...) before compiling it")
     signals = [_signals(model, data, i) for i in actuators]
@@ -80,23 +82,23 @@ def friction(model: mujoco.MjModel, data: mujoco.MjData) -> Signals:
     return Signals(tuple(name for each in signals for name in each.names), **arrays)
 
 
-def _table(model: mujoco.MjModel, actuator: int) -> int | None:
+def _tuple_index(model: mujoco.MjModel, actuator: int) -> int | None:
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) or ""
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TUPLE, name)
     return index if index >= 0 and name.endswith(NAME) else None
 
 
 def _signals(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Signals:
-    table = _table(model, actuator)
+    table = _tuple_index(model, actuator)
     assert table is not None
-    e = int(model.tuple_adr[table])
-    end, z = e + int(model.tuple_size[table]), int(model.actuator_actadr[actuator])
+    element = int(model.tuple_adr[table])
+    end, activation = element + int(model.tuple_size[table]), int(model.actuator_actadr[actuator])
     names = []
-    while e < end:
-        kind = mujoco.mjtObj(int(model.tuple_objtype[e]))
-        names.append(mujoco.mj_id2name(model, kind, int(model.tuple_objid[e])))
-        e += int(model.tuple_objprm[e + ELEMENT.length])
+    while element < end:
+        kind = mujoco.mjtObj(int(model.tuple_objtype[element]))
+        names.append(mujoco.mj_id2name(model, kind, int(model.tuple_objid[element])))
+        element += int(model.tuple_objprm[element + ELEMENT.length])
     first = int(model.plugin_stateadr[model.actuator_plugin[actuator]])
     states = data.plugin_state[first : first + SIGNALS * len(names)].reshape(-1, SIGNALS)
     level, force, load, turn = (states[:, k] for k in SIGNAL)
-    return Signals(tuple(names), level, force, data.act[z : z + len(names)], load, turn)
+    return Signals(tuple(names), level, force, data.act[activation : activation + len(names)], load, turn)

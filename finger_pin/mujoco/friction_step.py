@@ -18,14 +18,14 @@ def coefficient(speed: float, kinetic: float, static: float, stribeck: float, ex
     return kinetic + (static - kinetic) * math.exp(-ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio))
 
 
-def relaxed(x: float) -> float:
+def one_minus_exp(x: float) -> float:
     """Return 1 - exp(-x) of x >= 0, exact to rounding for small x too."""
     if x > 0.64:
         return 1.0 - math.exp(-x)
     # The series at an eighth of it, and three times 1 - exp(-2 y) = g (2 - g) with g = 1 - exp(-y).
     y = 0.125 * x
-    higher = 1.0 / 720.0 - y * (1.0 / 5040.0 - y * (1.0 / 40320.0 - y / 362880.0))
-    eighth = y * (1.0 - y * (1.0 / 2.0 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0 - y * higher)))))
+    higher_terms = 1.0 / 720.0 - y * (1.0 / 5040.0 - y * (1.0 / 40320.0 - y / 362880.0))
+    eighth = y * (1.0 - y * (1.0 / 2.0 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0 - y * higher_terms)))))
     quarter = eighth * (2.0 - eighth)
     half = quarter * (2.0 - quarter)
     return half * (2.0 - half)
@@ -33,14 +33,14 @@ def relaxed(x: float) -> float:
 
 def capstan(surface: float, turn: float) -> float:
     """Return mu^d of (16)."""
-    lost = relaxed(surface * turn)
-    return lost / (2.0 - lost)
+    loss = one_minus_exp(surface * turn)
+    return loss / (2.0 - loss)
 
 
-def slide(force: float, moved: float, level: float) -> tuple[float, float]:
+def slide(force: float, displacement: float, level: float) -> tuple[float, float]:
     """Return the change of F^s by (9a) over s0 v dt at this speed and level, exactly, and the share that is left."""
-    gone = relaxed(abs(moved) / level)
-    return (math.copysign(level, moved) - force) * gone, 1.0 - gone
+    slipped = one_minus_exp(abs(displacement) / level)
+    return (math.copysign(level, displacement) - force) * slipped, 1.0 - slipped
 
 
 def delivered(pull: float, tension: float, force: float, viscous: float, speed: float) -> tuple[float, float]:
@@ -48,12 +48,12 @@ def delivered(pull: float, tension: float, force: float, viscous: float, speed: 
 
     Of a pulled tendon the length's speed is negative when it is wound in.
     """
-    way = 1.0 if pull > 0.0 else -1.0
-    loss = way * (force + viscous * speed)
+    sign = 1.0 if pull > 0.0 else -1.0
+    loss = sign * (force + viscous * speed)
     return loss, max(tension - loss, 0.0)
 
 
-def level_of(
+def sliding_level(
     of_pin: bool,
     coulomb: float,
     static: float,
@@ -73,24 +73,24 @@ def level_of(
     return max(pressing * sliding_coefficient + drag * drag_share, floor)
 
 
-def exerted(
+def row_terms(
     level: float,
     stiffness: float,
     viscous: float,
     micro_damping: float,
     speed: float,
     tension: float,
-    most: float,
+    largest: float,
     force: float,
     dt: float,
 ) -> tuple[float, float, float]:
     """Return a friction's part of its row: F - x, c + b, and the most that it exerts."""
     if tension == 0.0 and force == 0.0:
-        return 0.0, stiffness * dt + viscous + micro_damping, min(level + viscous * abs(speed), most)
-    moved = stiffness * dt * speed
-    change, left = slide(force, moved, level)
+        return 0.0, stiffness * dt + viscous + micro_damping, min(level + viscous * abs(speed), largest)
+    displacement = stiffness * dt * speed
+    change, remaining = slide(force, displacement, level)
     # The micro-damping's sigma_1 z', as z goes at this speed; it may help the motion.
-    micro = micro_damping * (change / moved if moved != 0.0 else 1.0)
+    micro = micro_damping * (change / displacement if displacement != 0.0 else 1.0)
     limit = max(level, abs(force + change)) + (viscous + micro) * abs(speed)
-    pull = force - (moved - change) * left + min(micro, 0.0) * speed
-    return pull, stiffness * dt + viscous + max(micro, 0.0), min(limit, most)
+    pull = force - (displacement - change) * remaining + min(micro, 0.0) * speed
+    return pull, stiffness * dt + viscous + max(micro, 0.0), min(limit, largest)

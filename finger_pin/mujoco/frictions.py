@@ -39,16 +39,15 @@ def frictions(
         InputError: If nothing pulls a tendon that was named, or a named joint neither turns nor slides.
     """
     plugin_frictions: list[PluginFriction] = []
-    first: list[tuple[str, Array]] = []
-    for name, (law, named) in tendons.items():
-        if not _is_pulled(model, model.tendon(name).id) and not _share(model, model.tendon(name).id, list(tendons)):
-            if named:
-                raise InputError(
-                    f"tendons.{name}", "nothing pulls it: no actuator, spring, limit or equality of tendons"
-                )
+    spatial_rows: list[tuple[str, Array]] = []
+    for name, (law, explicit) in tendons.items():
+        share = _link_share(model, model.tendon(name).id, list(tendons))
+        if not share and not _is_pulled(model, model.tendon(name).id):
+            if explicit:
+                allowed = "nothing pulls it: no actuator, spring, limit or equality of tendons"
+                raise InputError(f"tendons.{name}", allowed)
             continue
-        row, of_joint, ratio = _row(model, name, first)
-        share = _share(model, model.tendon(name).id, list(tendons))
+        row, of_joint, ratio = _row(model, name, spatial_rows)
         kind = LINK if share else TENDON
         numbers = _tendon_law(model, name, law)
         # What neither bends it nor has a pin that it loads would be passed over at every step.
@@ -58,12 +57,13 @@ def frictions(
             PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio), constrained)
         )
         # Drag and what the model does not show count once.
-        behind = numbers._replace(drag=0.0, curvature_offset=0.0)
+        branch_numbers = numbers._replace(drag=0.0, curvature_offset=0.0)
         for number, (branch, part) in enumerate(branches.get(name, []), start=1):
             crossed = tuple(each for each in _crossed(model, branch, law) if each[1] in joints)
-            more = ((False, name, part), *crossed)
-            plugin_frictions.append(PluginFriction(BRANCH, branch, branch, False, 1.0, behind, more, float(number)))
-    for name, (law, named) in joints.items():
+            elements = ((False, name, part), *crossed)
+            friction = PluginFriction(BRANCH, branch, branch, False, 1.0, branch_numbers, elements, float(number))
+            plugin_frictions.append(friction)
+    for name, (law, explicit) in joints.items():
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
             stiffness, hardening = _bristles(law, loss)
@@ -77,9 +77,9 @@ def frictions(
                 hardening=hardening,
             )
             plugin_frictions.append(PluginFriction(PIN, name, name, True, 1.0, numbers))
-        elif named:
+        elif explicit:
             raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")
-    return _with_loss(model, plugin_frictions)
+    return _with_joint_loss(model, plugin_frictions)
 
 
 def add_branches(
@@ -92,36 +92,36 @@ def add_branches(
     """
     kinds, branches = mujoco.mjtWrap, dict[str, list[tuple[str, float]]]()
     for name in names:
-        branch, made = None, list[tuple[str, float]]()
+        branch, named_branches = None, list[tuple[str, float]]()
         for k in _pieces(model, model.tendon(name).id):
-            kind, at = model.wrap_type[k], int(model.wrap_objid[k])
+            kind, object_id = model.wrap_type[k], int(model.wrap_objid[k])
             if kind == kinds.mjWRAP_PULLEY:
-                made.append((f"{name}_branch_{len(made) + 1}", 1.0 / float(model.wrap_prm[k])))
-                branch = spec.add_tendon(name=made[-1][0], rgba=(0.0, 0.0, 0.0, 0.0))
+                named_branches.append((f"{name}_branch_{len(named_branches) + 1}", 1.0 / float(model.wrap_prm[k])))
+                branch = spec.add_tendon(name=named_branches[-1][0], rgba=(0.0, 0.0, 0.0, 0.0))
             elif branch is not None and kind == kinds.mjWRAP_SITE:
-                branch.wrap_site(model.site(at).name)
+                branch.wrap_site(model.site(object_id).name)
             elif branch is not None:
                 side = int(model.wrap_prm[k])
-                branch.wrap_geom(model.geom(at).name, model.site(side).name if side >= 0 else "")
-        if made:
-            branches[name] = made
+                branch.wrap_geom(model.geom(object_id).name, model.site(side).name if side >= 0 else "")
+        if named_branches:
+            branches[name] = named_branches
     return branches
 
 
-def _with_loss(model: mujoco.MjModel, plugin_frictions: list[PluginFriction]) -> list[PluginFriction]:
+def _with_joint_loss(model: mujoco.MjModel, plugin_frictions: list[PluginFriction]) -> list[PluginFriction]:
     """Return frictions, the constant one of a joint in whose row tendons act as the drag of the first of these."""
     rows = {friction.row for friction in plugin_frictions if friction.kind == PIN}
-    kept = []
+    frictions_with_loss = []
     for friction in plugin_frictions:
         if friction.row_of_joint and not friction.of_joint and friction.row not in rows:
             rows.add(friction.row)
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(friction.row).id]]) / abs(friction.ratio)
             friction = replace(friction, law=friction.law._replace(drag=friction.law.drag + loss))
-        kept.append(friction)
-    return kept
+        frictions_with_loss.append(friction)
+    return frictions_with_loss
 
 
-def pulled(model: mujoco.MjModel, names: Iterable[str]) -> list[str]:
+def pulled_tendons(model: mujoco.MjModel, names: Iterable[str]) -> list[str]:
     """Return the tendons among some that an actuator, a spring, a limit or an equality pulls."""
     return [name for name in names if _is_pulled(model, model.tendon(name).id)]
 
@@ -129,8 +129,8 @@ def pulled(model: mujoco.MjModel, names: Iterable[str]) -> list[str]:
 def _is_pulled(model: mujoco.MjModel, tendon: int) -> bool:
     """Return whether a tendon has an actuator, a spring, a limit or an equality of its own."""
     kinds = mujoco.mjtTrn
-    driven = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
-    return bool(driven.any() or model.tendon_stiffness[tendon] > 0.0 or _limited_or_coupled(model, tendon))
+    has_actuator = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
+    return bool(has_actuator.any() or model.tendon_stiffness[tendon] > 0.0 or _limited_or_coupled(model, tendon))
 
 
 def _limited_or_coupled(model: mujoco.MjModel, tendon: int) -> bool:
@@ -139,22 +139,22 @@ def _limited_or_coupled(model: mujoco.MjModel, tendon: int) -> bool:
     return bool(couplings.any() or model.tendon_limited[tendon])
 
 
-def _share(model: mujoco.MjModel, tendon: int, names: list[str]) -> float:
+def _link_share(model: mujoco.MjModel, tendon: int, names: list[str]) -> float:
     """Return the share of a fixed tendon in the drive of the only joint that it runs over; see `PluginFriction`.
 
     Zero of all others, and of those that have an actuator or a spring of their own.
     """
-    kinds, over = mujoco.mjtTrn, _coefficients(model, tendon)
-    driven = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
-    if np.count_nonzero(over) != 1 or driven.any() or model.tendon_stiffness[tendon] > 0.0:
+    kinds, coefficients = mujoco.mjtTrn, _coefficients(model, tendon)
+    has_actuator = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
+    if np.count_nonzero(coefficients) != 1 or has_actuator.any() or model.tendon_stiffness[tendon] > 0.0:
         return 0.0
-    joint = int(np.flatnonzero(over)[0])
+    joint = int(np.flatnonzero(coefficients)[0])
     on_joint = (model.actuator_trntype == kinds.mjTRN_JOINT) | (model.actuator_trntype == kinds.mjTRN_JOINTINPARENT)
     if not np.any(on_joint & (model.actuator_trnid[:, 0] == joint)):
         return 0.0
-    others = [_coefficients(model, model.tendon(name).id) for name in names]
-    arms = [each[joint] for each in others if np.count_nonzero(each) == 1 and each[joint]]
-    agreeing = sum(arm * over[joint] > 0.0 for arm in arms)
+    all_coefficients = [_coefficients(model, model.tendon(name).id) for name in names]
+    arms = [each[joint] for each in all_coefficients if np.count_nonzero(each) == 1 and each[joint]]
+    agreeing = sum(arm * coefficients[joint] > 0.0 for arm in arms)
     return float((1.0 if agreeing == len(arms) else -1.0) / agreeing)
 
 
@@ -171,18 +171,18 @@ def _pieces(model: mujoco.MjModel, tendon: int) -> range:
     return range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
 
 
-def _row(model: mujoco.MjModel, name: str, first: list[tuple[str, Array]]) -> tuple[str, bool, float]:
+def _row(model: mujoco.MjModel, name: str, earlier_rows: list[tuple[str, Array]]) -> tuple[str, bool, float]:
     """Return the row that a tendon acts in: its joint's, an earlier parallel one's, or its own."""
-    over = _coefficients(model, model.tendon(name).id)
-    joints = np.flatnonzero(over)
+    coefficients = _coefficients(model, model.tendon(name).id)
+    joints = np.flatnonzero(coefficients)
     if len(joints) == 1:
-        return model.joint(joints[0]).name, True, float(over[joints[0]])
-    for other, along in first if len(joints) else []:
-        ratio = float(over @ along / (along @ along))
-        if np.abs(over - ratio * along).max() <= _PARALLEL * np.abs(over).max():
+        return model.joint(joints[0]).name, True, float(coefficients[joints[0]])
+    for other, other_coefficients in earlier_rows if len(joints) else []:
+        ratio = float(coefficients @ other_coefficients / (other_coefficients @ other_coefficients))
+        if np.abs(coefficients - ratio * other_coefficients).max() <= _PARALLEL * np.abs(coefficients).max():
             return other, False, ratio
     if len(joints):
-        first.append((name, over))
+        earlier_rows.append((name, coefficients))
     return name, False, 1.0
 
 
@@ -208,16 +208,16 @@ def _bristles(law: JointFrictionSettings | TendonFrictionSettings, level: float)
 
 def _crossed(model: mujoco.MjModel, name: str, law: RoutedFriction) -> tuple[tuple[bool, str, float], ...]:
     """Return the joints that a tendon crosses before its first pulley, with 1 for those that bend a fixed one."""
-    tendon, movers = model.tendon(name).id, None
+    tendon, moving = model.tendon(name).id, None
     weights = dict.fromkeys(np.flatnonzero(_coefficients(model, tendon)), 1.0)
     for k in _pieces(model, tendon):
-        kind, at = model.wrap_type[k], model.wrap_objid[k]
+        kind, object_id = model.wrap_type[k], model.wrap_objid[k]
         if kind == mujoco.mjtWrap.mjWRAP_PULLEY:
             break
         if kind != mujoco.mjtWrap.mjWRAP_JOINT:
-            body = model.site_bodyid[at] if kind == mujoco.mjtWrap.mjWRAP_SITE else model.geom_bodyid[at]
-            before, movers = movers, _movers(model, int(body))
-            weights |= dict.fromkeys(sorted(movers ^ before) if before is not None else (), 0.0)
+            body = model.site_bodyid[object_id] if kind == mujoco.mjtWrap.mjWRAP_SITE else model.geom_bodyid[object_id]
+            previous, moving = moving, _moving_joints(model, int(body))
+            weights |= dict.fromkeys(sorted(moving ^ previous) if previous is not None else (), 0.0)
     names = {int(j): model.joint(int(j)).name for j in weights}
     bends = set(names.values()) if law.bends is None else set(law.bends)
     for joint in law.bends or ():
@@ -231,7 +231,7 @@ def _crossed(model: mujoco.MjModel, name: str, law: RoutedFriction) -> tuple[tup
     )
 
 
-def _movers(model: mujoco.MjModel, body: int) -> set[int]:
+def _moving_joints(model: mujoco.MjModel, body: int) -> set[int]:
     """Return the joints that move a body."""
     joints = set[int]()
     while body:

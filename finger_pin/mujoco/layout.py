@@ -61,25 +61,25 @@ Kinds = namedtuple(
 @cache
 def _structure(name: str) -> type[ctypes.Structure]:
     """Return a struct of MuJoCo as one of ctypes."""
-    return _made(name, structs.STRUCTS[name])
+    return _build_struct(name, structs.STRUCTS[name])
 
 
-def _made(name: str, declared: structs.StructDecl) -> type[ctypes.Structure]:
-    fields = [(each.name, _type(each.type)) for each in declared.fields]
+def _build_struct(name: str, declared: structs.StructDecl) -> type[ctypes.Structure]:
+    fields = [(each.name, _ctype(each.type)) for each in declared.fields]
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def _type(declared: Any) -> Any:
+def _ctype(declared: Any) -> Any:
     kind = type(declared).__name__
     if kind == "PointerType":
         return ctypes.c_void_p
     if kind == "ArrayType":
-        array_type = _type(declared.inner_type)
+        array_type = _ctype(declared.inner_type)
         for size in reversed(declared.extents):
             array_type *= int(size)
         return array_type
     if kind == "AnonymousStructDecl":
-        return _made("anonymous", declared)
+        return _build_struct("anonymous", declared)
     name = declared.name.removeprefix("struct ").rstrip("_")
     if name in _NUMBERS:
         return _NUMBERS[name]
@@ -87,9 +87,9 @@ def _type(declared: Any) -> Any:
     return _structure(name) if name in structs.STRUCTS else ctypes.c_int32
 
 
-def _offsets(owner: str, wanted: Any, **more: int) -> Any:
-    structure = _structure(owner)
-    return wanted(*(more[name] if name in more else getattr(structure, name).offset for name in wanted._fields))
+def _offsets(owner: str, fields: Any, **offsets: int) -> Any:
+    struct = _structure(owner)
+    return fields(*(offsets[name] if name in offsets else getattr(struct, name).offset for name in fields._fields))
 
 
 def layout() -> tuple[Model, Data, Contact, Kinds]:
@@ -139,29 +139,30 @@ _SAMPLE = """
 <custom><tuple name="t"><element objtype="tendon" objname="f" prm="1"/></tuple></custom></mujoco>"""
 
 
-def _disagreements(at: Model, of: Data, contact: Contact) -> list[str]:
+def _disagreements(model_layout: Model, data_layout: Data, contact: Contact) -> list[str]:
     """Return the fields whose addresses are not those of NumPy's views, on a model that has one of each."""
     model = mujoco.MjModel.from_xml_string(_SAMPLE)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    wrong = []
-    for owner, start, offsets in ((model, model._address, at), (data, data._address, of)):
+    differing = []
+    for owner, start, offsets in ((model, model._address, model_layout), (data, data._address, data_layout)):
         for name, offset in offsets._asdict().items():
             source = model.opt if name in ("timestep", "integrator", "jacobian", "solver") else owner
             value = None if name == "contact" else getattr(source, name, getattr(model.opt, name, None))
             if isinstance(value, np.ndarray) and value.size:
-                same = ctypes.c_size_t.from_address(start + offset).value == value.ctypes.data
+                agrees = ctypes.c_size_t.from_address(start + offset).value == value.ctypes.data
             elif isinstance(value, float):
-                same = ctypes.c_double.from_address(start + offset).value == value
+                agrees = ctypes.c_double.from_address(start + offset).value == value
             elif isinstance(value, int | np.integer):
                 kind = ctypes.c_int64 if name in ("nv", "ntendon", "nactuator", "ntuple") else ctypes.c_int32
-                same = kind.from_address(start + offset).value == int(value)
+                agrees = kind.from_address(start + offset).value == int(value)
             else:
                 continue
-            wrong += [] if same else [name]
-    first = ctypes.c_size_t.from_address(data._address + of.contact).value
+            differing += [] if agrees else [name]
+    first = ctypes.c_size_t.from_address(data._address + data_layout.contact).value
     contacts = data.contact
     for name in ("frame", "friction", "geom"):
-        wrong += [] if getattr(contacts, name).ctypes.data == first + getattr(contact, name) else [f"contact.{name}"]
-    wrong += [] if contacts.dim.strides[0] in (contact.size, 4) else ["contact"]
-    return wrong
+        agrees = getattr(contacts, name).ctypes.data == first + getattr(contact, name)
+        differing += [] if agrees else [f"contact.{name}"]
+    differing += [] if contacts.dim.strides[0] in (contact.size, 4) else ["contact"]
+    return differing

@@ -20,41 +20,45 @@ from finger_pin.mujoco.memory import (
 
 
 @njit_inline
-def driven(m: int, d: int, at: Model, of: Data, kinds: Kinds, along: Pointer, about: Pointer) -> None:
+def actuator_forces(
+    m: int, d: int, model: Model, data: Data, kinds: Kinds, along_tendons: Pointer, on_dofs: Pointer
+) -> None:
     """Add the actuators' forces along tendons, N, and on degrees of freedom, N m or N, within their limits.
 
     MuJoCo clamps forces after plugins have been asked, so that they are clamped here.
     """
-    kind, target, gear = integers(m, at.actuator_trntype), integers(m, at.actuator_trnid), numbers(m, at.actuator_gear)
-    limited, limits = flags(m, at.actuator_forcelimited), numbers(m, at.actuator_forcerange)
-    force, output, dof = numbers(d, of.actuator_force), integers(m, at.actuator_outadr), integers(m, at.jnt_dofadr)
-    for i in range(size(m, at.nactuator)):
+    kind, target = integers(m, model.actuator_trntype), integers(m, model.actuator_trnid)
+    gear = numbers(m, model.actuator_gear)
+    limited, limits = flags(m, model.actuator_forcelimited), numbers(m, model.actuator_forcerange)
+    force, output = numbers(d, data.actuator_force), integers(m, model.actuator_outadr)
+    dof = integers(m, model.jnt_dofadr)
+    for i in range(size(m, model.nactuator)):
         exerted = force[output[i]]
         if limited[i]:
             exerted = min(max(exerted, limits[2 * i]), limits[2 * i + 1])
         if kind[i] == kinds.tendon:
-            along[target[2 * i]] += gear[6 * i] * exerted
+            along_tendons[target[2 * i]] += gear[6 * i] * exerted
         elif kind[i] == kinds.joint or kind[i] == kinds.jointinparent:
-            about[dof[target[2 * i]]] += gear[6 * i] * exerted
-    limited, limits = flags(m, at.tendon_actfrclimited), numbers(m, at.tendon_actfrcrange)
-    for i in range(size(m, at.ntendon)):
+            on_dofs[dof[target[2 * i]]] += gear[6 * i] * exerted
+    limited, limits = flags(m, model.tendon_actfrclimited), numbers(m, model.tendon_actfrcrange)
+    for i in range(size(m, model.ntendon)):
         if limited[i]:
-            along[i] = min(max(along[i], limits[2 * i]), limits[2 * i + 1])
+            along_tendons[i] = min(max(along_tendons[i], limits[2 * i]), limits[2 * i + 1])
 
 
 @njit_inline
-def spring(m: int, d: int, at: Model, of: Data, tendon: int) -> float:
+def spring(m: int, d: int, model: Model, data: Data, tendon: int) -> float:
     """Return the force of a tendon's own spring and damper along it, N, negative in tension."""
-    stiffness, damping = number_in(m, at.tendon_stiffness, tendon), number_in(m, at.tendon_damping, tendon)
-    damped = -damping * number_in(d, of.ten_velocity, tendon) if damping != 0.0 else 0.0
+    stiffness, damping = number_in(m, model.tendon_stiffness, tendon), number_in(m, model.tendon_damping, tendon)
+    damped = -damping * number_in(d, data.ten_velocity, tendon) if damping != 0.0 else 0.0
     if stiffness == 0.0:
         return damped
-    length, rest = number_in(d, of.ten_length, tendon), numbers(m, at.tendon_lengthspring)
+    length, rest = number_in(d, data.ten_length, tendon), numbers(m, model.tendon_lengthspring)
     return damped + stiffness * (max(rest[2 * tendon] - length, 0.0) + min(rest[2 * tendon + 1] - length, 0.0))
 
 
 @njit_inline
-def between(points: Pointer, first: int, second: int) -> tuple[float, float, float]:
+def difference(points: Pointer, first: int, second: int) -> tuple[float, float, float]:
     """Return the vector from one point of MuJoCo's to another, m."""
     return (
         points[3 * second] - points[3 * first],
@@ -64,19 +68,19 @@ def between(points: Pointer, first: int, second: int) -> tuple[float, float, flo
 
 
 @njit_inline
-def turn_of_path(d: int, of: Data, tendon: int) -> float:
+def turn_of_path(d: int, data: Data, tendon: int) -> float:
     """Return the angle by which a spatial tendon's path turns up to its first pulley, rad.
 
     Each branch behind that is a tendon of its own. Of a wrap both tangent points are in the path. The chord between
     them makes half the arc's angle with either tangent.
     """
-    first, count = integer_in(d, of.ten_wrapadr, tendon), integer_in(d, of.ten_wrapnum, tendon)
-    point, of_wrap, turn = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
+    first, count = integer_in(d, data.ten_wrapadr, tendon), integer_in(d, data.ten_wrapnum, tendon)
+    point, of_wrap, turn = numbers(d, data.wrap_xpos), integers(d, data.wrap_obj), 0.0
     x0, y0, z0 = 0.0, 0.0, 0.0
     for k in range(first + 1, first + count):
         if of_wrap[k] == -2 or of_wrap[k - 1] == -2:
             break
-        x, y, z = between(point, k - 1, k)
+        x, y, z = difference(point, k - 1, k)
         if x * x + y * y + z * z < 1e-24:
             continue
         cx, cy, cz = y * z0 - z * y0, z * x0 - x * z0, x * y0 - y * x0
@@ -87,11 +91,11 @@ def turn_of_path(d: int, of: Data, tendon: int) -> float:
 
 
 @njit_inline
-def held_tensions(m: int, d: int, at: Model, of: Data, kinds: Kinds, tensions: Pointer) -> None:
+def constraint_tensions(m: int, d: int, model: Model, data: Data, kinds: Kinds, tensions: Pointer) -> None:
     """Add the forces of limits and equalities along tendons, N, by the solver's last forces."""
-    kind, which, force = integers(d, of.efc_type), integers(d, of.efc_id), numbers(d, of.efc_force)
-    couples, first, second = integers(m, at.eq_type), integers(m, at.eq_obj1id), integers(m, at.eq_obj2id)
-    for r in range(integer(d, of.nefc)):
+    kind, which, force = integers(d, data.efc_type), integers(d, data.efc_id), numbers(d, data.efc_force)
+    couples, first, second = integers(m, model.eq_type), integers(m, model.eq_obj1id), integers(m, model.eq_obj2id)
+    for r in range(integer(d, data.nefc)):
         if kind[r] == kinds.limit_tendon:
             tensions[which[r]] += abs(force[r])
         elif kind[r] == kinds.equality and couples[which[r]] == kinds.eq_tendon:
@@ -102,18 +106,18 @@ def held_tensions(m: int, d: int, at: Model, of: Data, kinds: Kinds, tensions: P
 
 @njit_inline
 def contact_loads(
-    m: int, d: int, at: Model, of: Data, contact: Contact, kinds: Kinds, place: Pointer, act: Pointer
+    m: int, d: int, model: Model, data: Data, contact: Contact, kinds: Kinds, place: Pointer, act: Pointer
 ) -> None:
     """Add the contact forces on bodies beyond joints, world frame, N: ``place`` is the index in act, or 0."""
-    first = size(d, of.contact)
-    parent, carrier = integers(m, at.body_parentid), integers(m, at.geom_bodyid)
-    joints, count = integers(m, at.body_jntadr), integers(m, at.body_jntnum)
-    for c in range(integer(d, of.ncon)):
-        one = first + c * contact.size
-        row, geoms = integers_at(one + contact.efc_address)[0], integers_at(one + contact.geom)
+    first = size(d, data.contact)
+    parent, carrier = integers(m, model.body_parentid), integers(m, model.geom_bodyid)
+    joints, count = integers(m, model.body_jntadr), integers(m, model.body_jntnum)
+    for c in range(integer(d, data.ncon)):
+        address = first + c * contact.size
+        row, geoms = integers_at(address + contact.efc_address)[0], integers_at(address + contact.geom)
         if row < 0:
             continue
-        x, y, z = _contact_force(d, of, contact, kinds, one, row)
+        x, y, z = _contact_force(d, data, contact, kinds, address, row)
         for side in range(2):
             sign, body = 2.0 * side - 1.0, carrier[geoms[side]] if geoms[side] >= 0 else 0
             while body > 0:
@@ -127,15 +131,17 @@ def contact_loads(
 
 
 @njit_inline
-def _contact_force(d: int, of: Data, contact: Contact, kinds: Kinds, one: int, row: int) -> tuple[float, float, float]:
+def _contact_force(
+    d: int, data: Data, contact: Contact, kinds: Kinds, address: int, row: int
+) -> tuple[float, float, float]:
     """Return the force of a contact on its second geom, world frame, N."""
-    exerted, frame = numbers(d, of.efc_force), numbers_at(one + contact.frame)
-    dim, kind = integers_at(one + contact.dim)[0], integer_in(d, of.efc_type, row)
+    exerted, frame = numbers(d, data.efc_force), numbers_at(address + contact.frame)
+    dim, kind = integers_at(address + contact.dim)[0], integer_in(d, data.efc_type, row)
     normal, across, along = exerted[row], 0.0, 0.0
     if kind == kinds.elliptic:
         across, along = exerted[row + 1], exerted[row + 2] if dim > 2 else 0.0
     elif kind == kinds.pyramidal:
-        friction = numbers_at(one + contact.friction)
+        friction = numbers_at(address + contact.friction)
         for k in range(1, 2 * (dim - 1)):
             normal += exerted[row + k]
         across = friction[0] * (exerted[row] - exerted[row + 1])

@@ -83,8 +83,8 @@ def integers_at(address: int) -> MutableSequence[int]:
 
 
 @njit_inline
-def zeros(room: int, count: int) -> int:
+def zeros(address: int, count: int) -> int:
     """Return the address of `scratch`, filled with zeros."""
     for k in range(count):
-        numbers_at(room)[k] = 0.0
-    return room
+        numbers_at(address)[k] = 0.0
+    return address

@@ -25,10 +25,7 @@ class RoutedFriction(TendonFrictionSettings):
     )
 
 
-TENDON_KEYS, JOINT = RoutedFriction, JointFrictionSettings
-
-
-def choose(
+def match_names(
     patterns: Mapping[str, Mapping[str, Any]] | None, names: list[str], entry: str, kind: type[Description]
 ) -> dict[str, tuple[Any, bool]]:
     """Return the checked keys of every name that matches, and whether it was written without stars.
@@ -37,7 +34,7 @@ def choose(
         InputError: If a name matches nothing, or a key or number is not allowed.
     """
     tables: dict[str, dict[str, Any]] = {}
-    named = set()
+    explicit = set()
     if not isinstance(patterns or {}, Mapping):
         raise InputError(entry, "must be a table of names, with keys for each", patterns)
     for pattern, keys in (patterns or {}).items():
@@ -59,11 +56,11 @@ def choose(
                 raise InputError(f"{entry}.{pattern}.{key}", "must be one number", list(value))
         for name in matching:
             tables[name] = tables.get(name, {}) | dict(keys)
-        named |= {pattern} & set(matching)
-    return {name: (validate(kind, keys, (entry, name)), name in named) for name, keys in tables.items()}
+        explicit |= {pattern} & set(matching)
+    return {name: (validate(kind, keys, (entry, name)), name in explicit) for name, keys in tables.items()}
 
 
-def keys_of(description: FingerDescription) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+def friction_keys(description: FingerDescription) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Return the keys with which the tendons and joints of a tree rub as the description says, by name.
 
     They are for the model that `to_mjcf` writes, which has viscous friction of joints and the loss of tendons already.
@@ -72,14 +69,14 @@ def keys_of(description: FingerDescription) -> tuple[dict[str, dict[str, Any]], 
         InputError: If tendons rub at several bends, a tendon turns by another angle than its joints, or joints rub by
             another law than (9).
     """
-    rubbing, turning = description.tendon_friction, description.joint_friction
-    check_friction(description, rubbing.place != "canal")
-    of_tendons = {name: each.along or name for name, each in description.tendons.items()}
-    of_tendons |= {name: name for name in description.canals}
+    tendon_settings, joint_settings = description.tendon_friction, description.joint_friction
+    check_friction(description, tendon_settings.place != "canal")
+    written_names = {name: each.along or name for name, each in description.tendons.items()}
+    written_names |= {name: name for name in description.canals}
     tendons = {}
-    for index, (name, written) in enumerate(of_tendons.items()):
+    for index, (name, written) in enumerate(written_names.items()):
         cord = description.cord(name)
-        keys = _at(rubbing, index, len(of_tendons)) | {"curvature_offset": cord.curvature_offset}
+        keys = _values_at(tendon_settings, index, len(written_names)) | {"curvature_offset": cord.curvature_offset}
         if not cord.through_space:
             turns = {element.name: element.turn for element in cord.elements if element.turn}
             if set(turns.values()) - {1.0}:
@@ -91,14 +88,14 @@ def keys_of(description: FingerDescription) -> tuple[dict[str, dict[str, Any]], 
         tendons[written] = keys | {"drag": max(keys["drag"] - loss, 0.0)}
     bearings = dict(zip(description.joints, description.bearings, strict=True))
     joints = {
-        name: _at(turning, index, len(bearings)) | {"viscous": 0.0}
+        name: _values_at(joint_settings, index, len(bearings)) | {"viscous": 0.0}
         for index, (name, rubs) in enumerate(bearings.items())
         if rubs
     }
     return tendons, joints
 
 
-def _at(settings: TendonFrictionSettings | JointFrictionSettings, index: int, count: int) -> dict[str, Any]:
+def _values_at(settings: TendonFrictionSettings | JointFrictionSettings, index: int, count: int) -> dict[str, Any]:
     """Return the numbers of one of several tendons or joints."""
     numbers = per_item(settings, count)
     return {key: float(values[index]) for key, values in numbers.items() if key != "reversal_speed"}

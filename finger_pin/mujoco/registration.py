@@ -34,26 +34,26 @@ class _Plugin(ctypes.Structure):
     )
 
 
-def _callbacks(at: Model, of: Data, contact: Contact, kinds: Kinds) -> dict[str, int]:
+def _callbacks(model: Model, data: Data, contact: Contact, kinds: Kinds) -> dict[str, int]:
     """Return the addresses of the callbacks, with offsets as constants."""
 
     def nstate(m: int, instance: int) -> int:
-        return kernel.signals(m, instance, at)
+        return kernel.signals(m, instance, model)
 
     def init(m: int, d: int, instance: int) -> int:
-        return kernel.init(m, d, instance, at, of, kinds)
+        return kernel.init(m, d, instance, model, data, kinds)
 
     def copy(to: int, m: int, d: int, instance: int) -> None:
-        kernel.copy(to, d, instance, of)
+        kernel.copy(to, d, instance, data)
 
     def reset(m: int, state: int, data: int, instance: int) -> None:
-        kernel.reset(m, state, instance, at)
+        kernel.reset(m, state, instance, model)
 
     def compute(m: int, d: int, instance: int, capability: int) -> None:
-        kernel.compute(m, d, instance, at, of, kinds)
+        kernel.compute(m, d, instance, model, data, kinds)
 
     def advance(m: int, d: int, instance: int) -> None:
-        kernel.advance(m, d, instance, at, of, contact, kinds)
+        kernel.advance(m, d, instance, model, data, contact, kinds)
 
     signatures: dict[Any, str] = {
         nstate: "int32(intp, int32)",

@@ -31,17 +31,16 @@ def try_self_test() -> None:
     except ValueError as error:
         message = " ".join(str(error).split())
         raise InputError(f"mujoco {mujoco.__version__}", f"friction needs MuJoCo 3.12 or later: {message}") from None
-    tension, borne = 10.0, 10.0 * (1.0 - math.exp(-0.3))
-    data, moved = mujoco.MjData(model), []
+    tension, friction_force = 10.0, 10.0 * (1.0 - math.exp(-0.3))
+    data, travel = mujoco.MjData(model), []
     for share in (0.8, 1.1):
-        data.ctrl[:] = -tension, tension - share * borne
-        before = data.qpos[0]
+        data.ctrl[:] = -tension, tension - share * friction_force
+        start = data.qpos[0]
         mujoco.mj_step(model, data, 100)
-        moved.append(before - data.qpos[0])
+        travel.append(start - data.qpos[0])
     # Bristles give way by less than 10 F / s0; what is left over pulls it for 0.2 s, 0.1 kg.
-    free = 0.5 * 0.1 * borne / 0.1 * 0.2**2
+    free_travel = 0.5 * 0.1 * friction_force / 0.1 * 0.2**2
     level = float(friction(model, data).level[0])
-    if not (
-        model.nu == 2 and moved[0] < 1e-3 and 0.9 * free < moved[1] < 1.1 * free and abs(level / borne - 1.0) < 1e-3
-    ):
+    released = 0.9 * free_travel < travel[1] < 1.1 * free_travel
+    if not (model.nu == 2 and travel[0] < 1e-3 and released and abs(level / friction_force - 1.0) < 1e-3):
         raise InputError(f"mujoco {mujoco.__version__}", "friction gives a wrong answer in it: use another version")

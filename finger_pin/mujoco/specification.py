@@ -9,22 +9,23 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from finger_pin.description.friction import JointFrictionSettings
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.exchange.mujoco_friction import COUNT, GROUP, LEAST_LOSS, NAME, NO_INPUT, PLUGIN, PluginFriction
 from finger_pin.mechanism.coerce import FingerLike, description_of
-from finger_pin.mujoco.frictions import add_branches, frictions, pulled
-from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose, keys_of
+from finger_pin.mujoco.frictions import add_branches, frictions, pulled_tendons
+from finger_pin.mujoco.name_matching import RoutedFriction, friction_keys, match_names
 from finger_pin.mujoco.registration import register
 
 Keys = Mapping[str, Mapping[str, Any]]
 
-# What an actuator may have of a model's default class.
-_OF_DEFAULTS = (
+# Attributes that an actuator inherits from a model's default class.
+_CLASS_ATTRIBUTES = (
     *("actearly", "actlimited", "actrange", "armature", "biasprm", "biastype", "ctrllimited", "ctrlrange", "damping"),
     *("delay", "dynprm", "dyntype", "forcelimited", "forcerange", "gainprm", "interp", "nsample"),
 )
-# From so many times the mass over the step on, dampers and servos let rows stop too little.
-_STIFF = 5.0
+# Damping times step over mass above which dampers and servos weaken the solver's rows.
+_STIFF_RATIO = 5.0
 
 
 class MujocoWarning(ScenarioWarning):
@@ -55,7 +56,7 @@ def add_friction(
             already, or is integrated by ``discrete``, which leaves no room for friction.
     """
     if of is not None:
-        tendons, joints = (_on_top(*each) for each in zip(_written(of), (tendons, joints), strict=True))
+        tendons, joints = (_merged(*each) for each in zip(_described_friction(of), (tendons, joints), strict=True))
     register()
     if not isinstance(spec, mujoco.MjSpec):
         raise InputError("spec", "must be a mujoco.MjSpec", type(spec).__name__)
@@ -70,27 +71,27 @@ def add_friction(
         model = spec.compile()
     except ValueError as error:
         raise InputError("spec", " ".join(str(error).split())) from None
-    rubbing = choose(tendons, [model.tendon(i).name for i in range(model.ntendon)], "tendons", TENDON_KEYS)
-    turning = choose(joints, [model.joint(i).name for i in range(model.njnt)], "joints", JOINT)
-    branches = add_branches(spec, model, pulled(model, rubbing))
+    tendon_laws = match_names(tendons, [model.tendon(i).name for i in range(model.ntendon)], "tendons", RoutedFriction)
+    joint_laws = match_names(joints, [model.joint(i).name for i in range(model.njnt)], "joints", JointFrictionSettings)
+    branches = add_branches(spec, model, pulled_tendons(model, tendon_laws))
     if branches:
         model = spec.compile()
-    plugin_frictions = frictions(model, rubbing, turning, branches)
+    plugin_frictions = frictions(model, tendon_laws, joint_laws, branches)
     if not plugin_frictions:
         raise InputError("spec", "nothing pulls the tendons, and no joints are named: there is no friction to add")
     warn_if_stiff(model, plugin_frictions, "spec.option.timestep")
     _write(spec, model, plugin_frictions)
 
 
-def _written(finger: FingerLike) -> tuple[Keys, Keys]:
+def _described_friction(finger: FingerLike) -> tuple[Keys, Keys]:
     description = description_of(finger)
     if not description.tree.bodies:
         raise InputError("of", "must have a tree of bodies; friction of others is written by to_mjcf(friction=True)")
-    return keys_of(description)
+    return friction_keys(description)
 
 
-def _on_top(keys: Keys, more: Keys | None) -> Keys:
-    return {**keys, **{name: {**keys.get(name, {}), **each} for name, each in (more or {}).items()}}
+def _merged(keys: Keys, overrides: Keys | None) -> Keys:
+    return {**keys, **{name: {**keys.get(name, {}), **each} for name, each in (overrides or {}).items()}}
 
 
 def warn_if_noslip(option: Any, entry: str) -> None:
@@ -102,7 +103,7 @@ def warn_if_noslip(option: Any, entry: str) -> None:
 
 def warn_if_stiff(model: mujoco.MjModel, plugin_frictions: list[PluginFriction], entry: str) -> None:
     """Warn where dampers or servos are stiff for the step."""
-    stiff = sorted({each.row for each in plugin_frictions if _damping(model, each) > _STIFF})
+    stiff = sorted({each.row for each in plugin_frictions if _damping(model, each) > _STIFF_RATIO})
     if stiff:
         reason = "a step is long for the dampers or servos there, and friction stops too little: take shorter steps"
         warnings.warn(MujocoWarning(f"{entry}: {', '.join(stiff)}: {reason}"), stacklevel=3)
@@ -119,23 +120,23 @@ def _damping_rate(model: mujoco.MjModel, of_joint: bool, name: str) -> float:
     kinds = mujoco.mjtTrn
     if of_joint:
         element = model.joint(name).id
-        at = int(model.jnt_dofadr[element])
-        gain, weight = model.dof_damping[at], model.dof_invweight0[at]
-        acting = (model.actuator_trntype == kinds.mjTRN_JOINT) | (model.actuator_trntype == kinds.mjTRN_JOINTINPARENT)
+        dof = int(model.jnt_dofadr[element])
+        gain, weight = model.dof_damping[dof], model.dof_invweight0[dof]
+        is_acting = np.isin(model.actuator_trntype, (int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT)))
     else:
         element = model.tendon(name).id
         gain, weight = model.tendon_damping[element], model.tendon_invweight0[element]
-        acting = model.actuator_trntype == kinds.mjTRN_TENDON
-    acting &= (model.actuator_trnid[:, 0] == element) & (model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE)
+        is_acting = model.actuator_trntype == kinds.mjTRN_TENDON
+    is_acting &= (model.actuator_trnid[:, 0] == element) & (model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE)
     if model.opt.integrator in (mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST):
-        gain = gain - np.sum(model.actuator_biasprm[acting, 2] * model.actuator_gear[acting, 0] ** 2)
+        gain = gain - np.sum(model.actuator_biasprm[is_acting, 2] * model.actuator_gear[is_acting, 0] ** 2)
     return float(gain * weight)
 
 
 def name_all(spec: mujoco.MjSpec) -> None:
     """Name unnamed elements for the table and branches."""
-    named = {"tendon": spec.tendons, "joint": spec.joints, "site": spec.sites, "geom": spec.geoms}
-    for what, elements in named.items():
+    elements_by_kind = {"tendon": spec.tendons, "joint": spec.joints, "site": spec.sites, "geom": spec.geoms}
+    for what, elements in elements_by_kind.items():
         for index, element in enumerate(elements):
             element.name = element.name or f"{what}_{index}"
 
@@ -154,11 +155,11 @@ def _write(spec: mujoco.MjSpec, model: mujoco.MjModel, plugin_frictions: list[Pl
     plugin = spec.add_plugin(name=NAME, plugin_name=PLUGIN, active=True)
     plugin.config = {COUNT: str(len(plugin_frictions))}
     # In a class of its own, so that XML keeps what makes it an actuator without an input; no default of the model acts.
-    default, plain = spec.add_default(NAME, spec.default), mujoco.MjSpec()
-    for field in _OF_DEFAULTS:
+    default, defaults = spec.add_default(NAME, spec.default), mujoco.MjSpec()
+    for field in _CLASS_ATTRIBUTES:
         # Older versions of MuJoCo have some of them.
-        if hasattr(plain.default.actuator, field):
-            setattr(default.actuator, field, getattr(plain.default.actuator, field))
+        if hasattr(defaults.default.actuator, field):
+            setattr(default.actuator, field, getattr(defaults.default.actuator, field))
     default.actuator.gaintype, default.actuator.ctrlspec = mujoco.mjtGain.mjGAIN_DCMOTOR, NO_INPUT
     target, kind = _target(spec, plugin_frictions)
     actuator = spec.add_actuator(default, name=NAME, trntype=kind, target=target, actdim=states)
@@ -167,7 +168,7 @@ def _write(spec: mujoco.MjSpec, model: mujoco.MjModel, plugin_frictions: list[Pl
     actuator.gear, actuator.group, actuator.plugin = np.zeros(6), GROUP, plugin
     for friction in plugin_frictions:
         row = spec.joint(friction.row) if friction.row_of_joint else spec.tendon(friction.row)
-        row.frictionloss = max(float(row.frictionloss), abs(friction.ratio) * friction.least, LEAST_LOSS)
+        row.frictionloss = max(float(row.frictionloss), abs(friction.ratio) * friction.least_level, LEAST_LOSS)
 
 
 def _target(spec: mujoco.MjSpec, plugin_frictions: list[PluginFriction]) -> tuple[str, mujoco.mjtTrn]:

@@ -103,7 +103,7 @@ def started(loop: ClosedLoop, initial: ArrayLike | xr.Dataset | None) -> ClosedL
     if initial is None:
         return loop
     packed = packed_state(initial, loop.finger)
-    return loop.started(packed, _last_samples(initial, loop.finger) if isinstance(initial, xr.Dataset) else None)
+    return loop.with_start(packed, _last_samples(initial, loop.finger) if isinstance(initial, xr.Dataset) else None)
 
 
 def _last_samples(initial: xr.Dataset, finger: Finger) -> LoopMemory | None:

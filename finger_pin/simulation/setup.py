@@ -10,7 +10,8 @@ import numpy as np
 from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled_control
 from finger_pin.control.interface import LoopController
-from finger_pin.control.position_drive import PositionDrives, voltage_signals, wound_spools
+from finger_pin.control.motor_signals import spool_windings, voltage_signals
+from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.collision.interpolants import meetings
 from finger_pin.core.inputs import InputTable
@@ -101,7 +102,7 @@ class Setup:
         sampled = None if sampling is None else SampledController(loop, sampling)
         if positioned:
             duration, start = scenario.simulation.duration, scenario.simulation.start_time
-            wound = wound_spools(scenario, loop.finger)
+            wound = spool_windings(scenario, loop.finger)
             voltages = voltage_signals(scenario, loop.finger, "motor_voltage")
             supplies = voltage_signals(scenario, loop.finger, "supply_voltage")
             planned = loop.finger, loop.controller, loop.reference, duration, start, wound, voltages, supplies

@@ -12,7 +12,7 @@ from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import Controller
 from finger_pin.control.sampling import sampling_settings
-from finger_pin.control.user_controllers import Columns, Samples, with_columns
+from finger_pin.control.user_controllers import Columns, Samples, with_named_samples
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.exceptions import ScenarioWarning
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
@@ -77,7 +77,7 @@ def simulate(
         AccuracyWarning: If a contact is stiffer than what the tolerances tell.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
-    scenario, controls = with_columns(load_scenario(scenario), controller)
+    scenario, controls = with_named_samples(load_scenario(scenario), controller)
     custom_finger = resolve_finger(finger, scenario)
     loop = ClosedLoop.from_scenario(scenario, controls, reference, fingertip_force, custom_finger)
     loop = started(loop, initial)

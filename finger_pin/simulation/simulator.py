@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.input_queue import InputQueue, input_delays
 from finger_pin.control.named_inputs import Inputs, inputs_by_name
-from finger_pin.control.palm import PalmPath, PrescribedPaths, at_start, with_paths
+from finger_pin.control.palm import PalmPath, PrescribedPaths, start_state, with_paths
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.inputs import held_control
@@ -100,7 +100,7 @@ class Simulator:
     def _at(self, position: Array) -> Array:
         """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
         finger = self.finger
-        x = at_start(finger, finger.rest_state(position), self._palm, self._guides)
+        x = start_state(finger, finger.rest_state(position), self._palm, self._guides)
         if finger.scene is not None:
             finger.scene.check(finger.layout.unpack(x))
         return x

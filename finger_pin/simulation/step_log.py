@@ -13,7 +13,7 @@ import xarray as xr
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.palm import PalmPath
-from finger_pin.control.position_drive import GivenVoltages
+from finger_pin.control.position_drive import PrescribedVoltages
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.integrator import integrate_compiled
@@ -102,7 +102,7 @@ class StepLog:
             varying_force=Signal.from_held_values(knots, force),
             dynamics=CompiledFinger(finger),
             palm=palm,
-            drives=GivenVoltages(channels, Signal.from_held_values(knots, inputs[:, channels]))
+            drives=PrescribedVoltages(channels, Signal.from_held_values(knots, inputs[:, channels]))
             if len(channels)
             else None,
         )

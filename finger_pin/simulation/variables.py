@@ -53,7 +53,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         ),
         SHORTFALL: Quantity(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
-    if isinstance(loop.guides, PrescribedJoints):
+    if isinstance(loop.prescribed_motion, PrescribedJoints):
         table["joint_effort"] = Quantity(_JOINT, _effort, "N m", "torque that the given motion of a joint takes", "18")
     if loop.finger.layout.names_of("joint_stiction"):
         table["joint_stiction"] = of_state("joint_stiction")
@@ -121,7 +121,7 @@ def _of_windings(loop: ClosedLoop) -> dict[str, Quantity]:
         lengths = np.zeros((len(of.times), len(routing.tendons)))
         winched = np.flatnonzero(routing.winched)
         lengths[:, winched] = of.control.tension[:, winched]
-        lengths[:, actuators.tendons] = of.loop.wound(angle(of))
+        lengths[:, actuators.tendons] = of.loop.wound_lengths(angle(of))
         return lengths
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
@@ -190,8 +190,8 @@ def _shortfall(of: SampledTrajectory) -> Array:
 def _effort(of: SampledTrajectory) -> Array:
     """Return M a + h less all that the finger exerts itself, shape (m, n)."""
     loop, state, mechanism = of.loop, of.state, of.finger.mechanism
-    assert loop.guides is not None
-    motion = zip(state.position, state.velocity, loop.guides.signal.derivative(of.times, 2), strict=True)
+    assert loop.prescribed_motion is not None
+    motion = zip(state.position, state.velocity, loop.prescribed_motion.signal.derivative(of.times, 2), strict=True)
     needed = np.array([loop.finger.rigid_body.inverse_dynamics(*each) for each in motion])
     return np.asarray(needed - (mechanism.torque + mechanism.external)[:, : needed.shape[1]])
 

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.files import write_text
-from finger_pin.identification.misfit import CHANCE
+from finger_pin.identification.misfit import SIGNIFICANCE
 from finger_pin.views.document import document, image
 from finger_pin.views.plots.identification import plot_identification, plot_predictions, plot_profiles, short_name
 
@@ -181,7 +181,7 @@ def _misses(result: xr.Dataset) -> list[str]:
         if math.isfinite(repeated):
             what = "Equal readings" if steady else "Repeated runs"
             words.append(f"{what} of {name} differ by {repeated:.3g} rms, all from the law by {noise:.3g}.")
-        if chance < CHANCE:
+        if chance < SIGNIFICANCE:
             words.append(
                 f"The model misses something of {name}: by chance alone it would miss as much with a probability of "
                 f"{chance:.2g}. The intervals count that as noise which repeats share; numbers that take the place of "

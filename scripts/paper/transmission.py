@@ -184,7 +184,7 @@ def transmission_in_motion(finger: FingerLike, result: xr.Dataset) -> Transmissi
         settled = sliding_tension(command, coefficient, speed, tendons.viscous, tendons.drag) / command
     slid = _since_reversal(result["time"].values, speed)
     level = np.maximum(normal * coefficient + tendons.drag, tendons.floor)
-    bristle = friction.bristle_give(level, tendons.stiffness, tendons.hardening)
+    bristle = friction.bristle_deflection(level, tendons.stiffness, tendons.hardening)
     sliding = (slid > _SETTLED * bristle) & np.isfinite(ratio)
     return TransmissionInMotion(curvature, ratio, settled, sliding, np.sign(speed))
 

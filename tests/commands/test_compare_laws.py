@@ -6,7 +6,7 @@ import compare_laws
 import numpy as np
 import pytest
 import xarray as xr
-from compare_laws import DESCRIBED, LAWS, Law, Row
+from compare_laws import LAWS, SCENARIO_LAW, Law, Row
 
 from finger_pin.description.loading import ParametrisedScenario, load_bench
 from finger_pin.exceptions import InputError
@@ -36,7 +36,7 @@ def regressions(pull, out):
         "none": (1.0, -1e-3, 1),
         "constant": (1.0, np.mean(out - pull), 1),
         "capstan without bristle": (pull @ out / (pull @ pull), 0.0, 1),
-        DESCRIBED: (slope, intercept, 2),
+        SCENARIO_LAW: (slope, intercept, 2),
     }
 
 
@@ -51,8 +51,8 @@ def test_laws_of_a_canal_are_regressions(rows, readings):
         assert row.signals[TENDON].fitted == pytest.approx(np.sqrt(squares[name] / len(pull)), rel=1e-4)
         missed = np.sqrt(np.mean((arrived - a * heavy - b) ** 2))
         assert row.signals[TENDON].held_out == pytest.approx(missed, rel=1e-4)
-        bic = len(pull) * np.log(squares[name] / squares[DESCRIBED]) + (count - 2) * np.log(len(pull))
-        described = rows[DESCRIBED]
+        bic = len(pull) * np.log(squares[name] / squares[SCENARIO_LAW]) + (count - 2) * np.log(len(pull))
+        described = rows[SCENARIO_LAW]
         # The least level of the law, 0.1 mN, is left where there is none.
         assert row.bic - described.bic == pytest.approx(bic, abs=0.01)
 
@@ -106,11 +106,11 @@ def test_the_figure_has_a_panel_for_each_bench_and_a_point_for_each_law(rows):
     figure = compare_laws.plot_laws({"transmission": rows})
     (axes,) = figure.axes
     names = [each.get_text() for each in axes.get_yticklabels()]
-    assert names == [*LAWS["transmission"], DESCRIBED]
+    assert names == [*LAWS["transmission"], SCENARIO_LAW]
     ratio, place = axes.lines[0].get_data()
     expected = {name: row.signals[TENDON].held_out for name, row in rows.items() if isinstance(row, Row)}
     drawn = {names[k]: value for k, value in zip(place, ratio, strict=True)}
-    assert drawn == pytest.approx({name: value / expected[DESCRIBED] for name, value in expected.items()})
+    assert drawn == pytest.approx({name: value / expected[SCENARIO_LAW] for name, value in expected.items()})
     assert [each.get_text().strip() for each in axes.texts] == ["as constant"] * 2
 
 

@@ -44,7 +44,9 @@ def test_what_pushes_back_as_hard_as_wanted_leaves_the_joints_of_a_frictionless_
 def test_the_wanted_force_follows_its_signal_and_the_scenario_s_clock():
     ramp = {"kind": "ramp", "time": 1.0, "duration": 1.0, "height": 2.0}
     late = loop({"controller.fingertip_force.z": ramp, "simulation.start_time": 1.0})
-    assert late.controller.fingertip.wanted.at(np.array([0.0, 1.0, 5.0]))[0][:, 2] == pytest.approx([0.0, 2.0, 2.0])
+    assert late.controller.fingertip.desired_force.at(np.array([0.0, 1.0, 5.0]))[0][:, 2] == pytest.approx(
+        [0.0, 2.0, 2.0]
+    )
     assert {0.0, 1.0} <= set(late.knots(1e-6).tolist())
 
 

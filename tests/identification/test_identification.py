@@ -7,7 +7,7 @@ from scipy.stats import t as student
 import finger_pin as fp
 from finger_pin.commands.application import run
 from finger_pin.description.recordings.columns import in_si
-from finger_pin.identification.checkpoint import NAME
+from finger_pin.identification.checkpoint import FILE_NAME
 from finger_pin.views.report import summarize_identification, write_report
 
 COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"
@@ -229,7 +229,7 @@ def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path)
         return len(asked) == len(before) - 4
 
     part = found(data, starts=3, output=tmp_path, stop=stop)
-    assert "unfinished" in part.attrs and (tmp_path / NAME).exists() and len(asked) == len(before) - 4
+    assert "unfinished" in part.attrs and (tmp_path / FILE_NAME).exists() and len(asked) == len(before) - 4
     assert "determine every parameter" not in summarize_identification(part)
     again = found(data, starts=3, output=tmp_path)
     assert "unfinished" not in again.attrs and again.attrs["evaluations"] < whole.attrs["evaluations"]

@@ -108,4 +108,4 @@ def test_values_that_do_not_go_together_are_brought_to_where_they_do_and_those_t
         ((9e-4, 5e-4), (True, False), (5e-4, 5e-4)),
         ((9e-4, 5e-4), (False, True), (9e-4, 9e-4)),
     ]:
-        np.testing.assert_allclose(limits.nearest(np.array(given), np.array(free)), nearest, atol=1e-11)
+        np.testing.assert_allclose(limits.nearest_allowed(np.array(given), np.array(free)), nearest, atol=1e-11)

@@ -234,7 +234,7 @@ def test_the_motion_that_tells_coulomb_from_drag_is_proposed():
         ("outputs", {"tendon_tension.T1": "small"}, "outputs.tendon_tension.T1"),
         ("parameters", {COULOMB: (0.2, 0.05)}, f"parameters.{COULOMB}"),
         ("parameters", {COULOMB: 0.2}, f"parameters.{COULOMB}"),
-        ("known", {DRAG: 0.1, "finger.mass": 1.0}, "known.finger.mass"),
+        ("prior", {DRAG: 0.1, "finger.mass": 1.0}, "prior.finger.mass"),
     ):
         with pytest.raises(fp.InputError, match=f"^{re.escape(named)}"):
             fp.propose("canal", candidates, **{**given, entry: value}, overrides=overrides)

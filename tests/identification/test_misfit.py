@@ -9,7 +9,7 @@ from intervals import COULOMB, MOTION, TURN, motion
 from scipy.signal import lfilter
 
 import finger_pin as fp
-from finger_pin.identification.misfit import repeats, sandwich
+from finger_pin.identification.misfit import repeats, sandwich_covariance
 from finger_pin.views.report import summarize_identification
 
 
@@ -47,7 +47,7 @@ def test_a_slope_that_swings_has_the_variance_of_the_noise_at_its_frequency(rho,
     weight = (1.0 - rho) / (1.0 + rho)
     problem, found, naive = stub(residual, slopes, weight=weight)
     density = (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(frequency) + rho**2)
-    assert sandwich(problem, found, naive)[0, 0] == pytest.approx(weight * density * naive[0, 0], rel=0.05)
+    assert sandwich_covariance(problem, found, naive)[0, 0] == pytest.approx(weight * density * naive[0, 0], rel=0.05)
 
 
 def test_readings_whose_law_misses_something_count_as_one_for_each_setting():
@@ -56,10 +56,10 @@ def test_readings_whose_law_misses_something_count_as_one_for_each_setting():
     residual = 0.3 * rng.normal(size=50)[replicate] + 0.1 * rng.normal(size=400)
     residual -= residual.mean()
     problem, found, naive = stub(residual, np.ones((400, 1)), ordered=False, replicate=replicate)
-    variance = sandwich(problem, found, naive)[0, 0]
+    variance = sandwich_covariance(problem, found, naive)[0, 0]
     means = residual.reshape(50, 8).mean(axis=1)
     assert variance == pytest.approx(means.var(ddof=1) / 50, rel=0.02)
-    assert repeats(problem, found.residuals)[0].chance < 1e-6
+    assert repeats(problem, found.residuals)[0].p_value < 1e-6
 
 
 def test_readings_whose_law_holds_are_said_to_miss_something_as_rarely_as_chance_has_it():
@@ -67,7 +67,7 @@ def test_readings_whose_law_holds_are_said_to_miss_something_as_rarely_as_chance
     chances = []
     for _ in range(400):
         problem, found, _ = stub(rng.normal(size=40), np.zeros((40, 0)), ordered=False, replicate=replicate)
-        chances.append(repeats(problem, found.residuals)[0].chance)
+        chances.append(repeats(problem, found.residuals)[0].p_value)
     # Uniform: the share below 0.2 is 0.2, with a standard deviation of 0.02.
     assert np.mean(np.array(chances) < 0.2) == pytest.approx(0.2, abs=0.06)
 

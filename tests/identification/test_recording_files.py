@@ -10,7 +10,7 @@ from finger_pin.description.recordings.csv_files import TableFormat, read_column
 from finger_pin.description.recordings.units import in_si
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
-from finger_pin.identification.recordings import comes_round, read_recording
+from finger_pin.identification.recordings import read_recording, wraparound_warning
 
 BENCH = """
 extends = "canal"
@@ -159,8 +159,8 @@ def test_ticks_that_come_round_are_unwrapped_and_told_without_a_period():
     known = np.where(np.isnan(ticks), np.nan, 2 * np.pi * np.round(4096 * turns) / 4096)
     np.testing.assert_allclose(one.outputs["motor_position.M1"], known, rtol=1e-12)
     # 0.9 + 0.064 turns are below one, a further step is not.
-    assert not comes_round(one)
-    assert "jumps by a turn after row 2:" in comes_round(recording(data, outputs={"motor_position.M1": column}))
+    assert not wraparound_warning(one)
+    assert "jumps by a turn after row 2:" in wraparound_warning(recording(data, outputs={"motor_position.M1": column}))
 
 
 REFUSED = [

@@ -36,7 +36,7 @@ class Ringing:
             np.stack([(one - other) / (2e-6 * size) for (one, other), size in zip(ends, sizes, strict=True)], axis=1)
         ]
 
-    def tune(self, factor):
+    def scale_tolerances(self, factor):
         pass
 
 

@@ -7,7 +7,7 @@ from scipy.integrate import quad
 import finger_pin as fp
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings, bristles
 from finger_pin.description.parameters import per_item
-from finger_pin.laws.bristle import bristle_energy, bristle_give, bristle_stiffness
+from finger_pin.laws.bristle import bristle_deflection, bristle_energy, bristle_stiffness
 
 GIVE = {TendonFrictionSettings: 20e-6, JointFrictionSettings: 1e-3}
 NO_PIN = {"finger.joint_friction.coulomb": 0.0, "finger.joint_friction.stiction": 0.0}
@@ -32,7 +32,7 @@ def test_energy_and_length_of_hardening_bristles_are_integrals_of_their_stiffnes
         softness = lambda f, s=stiffness, h=hardening: 1.0 / bristle_stiffness(f, s, h)  # noqa: E731
         energy = quad(lambda f, of=softness: f * of(f), 0.0, force)[0]
         assert bristle_energy(force, stiffness, hardening) == pytest.approx(energy, rel=1e-9)
-        assert bristle_give(force, stiffness, hardening) == pytest.approx(quad(softness, 0.0, force)[0], rel=1e-9)
+        assert bristle_deflection(force, stiffness, hardening) == pytest.approx(quad(softness, 0.0, force)[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("level", [1e-2, 0.5, 50.0])
@@ -43,7 +43,7 @@ def test_a_joint_under_four_fifths_of_its_level_creeps_by_less_than_1e_4_in_a_se
     A level that grows with the load slips all the way: x = integral of dF / (sigma_0 (F) (1 - 0.8)).
     """
     radius = 0.02
-    stays = 1e-3 if declared else 1.05 * bristle_give(0.8 * level, 5.0, 1e4) / 0.2
+    stays = 1e-3 if declared else 1.05 * bristle_deflection(0.8 * level, 5.0, 1e4) / 0.2
     friction = {"drag": level} if declared else {"coulomb": radius / 0.8, "stiction": radius / 0.8}
     keys = {
         "finger.tendon_friction.coulomb": 0.0,

@@ -133,7 +133,7 @@ def test_the_law_s_text_is_the_laws():
         expected = friction_level(
             pressing, friction_coefficient(speed, kinetic, 1.5 * kinetic, stribeck, exponent), floor, drag
         )
-        found = friction_step.level_of(False, surface, 1.5, stribeck, exponent, floor, drag, speed, pressing, turn)
+        found = friction_step.sliding_level(False, surface, 1.5, stribeck, exponent, floor, drag, speed, pressing, turn)
         assert found == pytest.approx(expected, rel=1e-14)
         # (9a) at this speed and level for a while, in closed form.
         force, level = random.normal(), expected

@@ -9,7 +9,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.position_drive import PositionDrives, loop_period, spool_goals, voltage_signals, wound_spools
+from finger_pin.control.motor_signals import spool_windings, voltage_signals
+from finger_pin.control.position_drive import PositionDrives, loop_period, spool_goals
 from finger_pin.description.loading import read_scenario, to_toml
 from finger_pin.description.tables import list_scenarios
 from finger_pin.exceptions import InputError
@@ -152,7 +153,7 @@ class Acts:
     def drives(self, scenario, loop):
         """Yield goals and voltages that are given at the instants, and the loops as they are compiled."""
         start, times = scenario.simulation.start_time, self.times
-        wound = wound_spools(scenario, loop.finger)
+        wound = spool_windings(scenario, loop.finger)
         given, supplies = (voltage_signals(scenario, loop.finger, f"{name}_voltage") for name in ("motor", "supply"))
         yield spool_goals(loop.finger, loop.controller, times, loop.reference.at(times), wound, start)
         yield from (signal.later(start).at(times)[0] for signal in given.values())

@@ -33,31 +33,32 @@ def try_self_test(device: str, attach: Callable[..., Any]) -> None:
     """
     entry = f"mujoco_warp {metadata.version('mujoco-warp')}"
     try:
-        right = _answers(device, attach)
+        passed = _holds_and_releases(device, attach)
     except (AttributeError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(entry, f"friction needs another version: {' '.join(str(error).split())}") from None
-    if not right:
+    if not passed:
         raise InputError(entry, "friction gives a wrong answer in it: use another version")
 
 
-def _answers(device: str, attach: Callable[..., Any]) -> bool:
-    tension, borne = 10.0, 10.0 * (1.0 - math.exp(-0.3))
+def _holds_and_releases(device: str, attach: Callable[..., Any]) -> bool:
+    tension, friction_force = 10.0, 10.0 * (1.0 - math.exp(-0.3))
     model = mujoco.MjModel.from_xml_string(SLIDER)
     with wp.ScopedDevice(device):
         m, d = mujoco_warp.put_model(model), mujoco_warp.make_data(model, nworld=2, njmax=2, nconmax=1)
         law = {"coulomb": 0.2, "curvature_offset": 1.5, "stiction_ratio": 1.0, "viscous": 0.0}
         friction = attach(m, d, model, {"rope": law}, None)
-        shares, moved, loads_match = (0.8, 1.1), [], True
+        shares, travel, loads_match = (0.8, 1.1), [], True
         for step in range(_STEPS):
             # The tension changes at every step, and the drive with it.
             pull = tension * (1.0 + 0.1 * (step % 3))
-            d.ctrl.assign([[-pull, pull * (1.0 - share * borne / tension)] for share in shares])
+            d.ctrl.assign([[-pull, pull * (1.0 - share * friction_force / tension)] for share in shares])
             mujoco_warp.step(m, d)
             loads, forces = friction.tension.numpy()[:, 0], friction.friction.numpy()[:, 0]
             loads_match = loads_match and max(abs(loads / pull - 1.0)) < 1e-4
-            moved = list(-d.qpos.numpy()[:, 0])
+            travel = list(-d.qpos.numpy()[:, 0])
     time = _STEPS * float(model.opt.timestep)
     # Bristles give way by less than 10 F / s0; what is left over pulls it, 0.1 kg, by 1.1 times the mean tension.
-    free = 0.5 * 0.1 * 1.1 * borne / 0.1 * time**2
-    at_rest = abs(forces[0] / (0.8 * borne * pull / tension)) - 1.0
-    return bool(loads_match and moved[0] < 1e-3 and 0.8 * free < moved[1] < 1.2 * free and abs(at_rest) < 0.05)
+    free_travel = 0.5 * 0.1 * 1.1 * friction_force / 0.1 * time**2
+    at_rest = abs(forces[0] / (0.8 * friction_force * pull / tension)) - 1.0
+    released = 0.8 * free_travel < travel[1] < 1.2 * free_travel
+    return bool(loads_match and travel[0] < 1e-3 and released and abs(at_rest) < 0.05)

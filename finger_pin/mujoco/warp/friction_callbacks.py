@@ -10,11 +10,12 @@ import mujoco
 import numpy as np
 import warp as wp
 
+from finger_pin.description.friction import JointFrictionSettings
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mujoco_friction import SIGNAL, Coefficients, PluginFriction
-from finger_pin.mujoco.friction_signals import place_of
-from finger_pin.mujoco.frictions import frictions, pulled
-from finger_pin.mujoco.name_matching import JOINT, TENDON_KEYS, choose
+from finger_pin.mujoco.friction_signals import friction_index
+from finger_pin.mujoco.frictions import frictions, pulled_tendons
+from finger_pin.mujoco.name_matching import RoutedFriction, match_names
 from finger_pin.mujoco.specification import Keys, warn_if_noslip, warn_if_stiff
 from finger_pin.mujoco.warp import kernels, row_kernels
 from finger_pin.mujoco.warp.callback_self_test import try_self_test
@@ -33,7 +34,7 @@ from finger_pin.mujoco.warp.structures import (
 
 _DISCRETE = int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1))
 #: Switches that must stay as they are, with what they are for.
-_NEEDED = {
+_REQUIRED_SWITCHES = {
     mujoco.mjtDisableBit.mjDSBL_CONSTRAINT: "the solver's rows are its force",
     mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS: "the solver's rows are its force",
     mujoco.mjtDisableBit.mjDSBL_ACTUATION: "it is computed after actuators",
@@ -77,7 +78,7 @@ class Friction:
             self._arrays = s = allocate(d.nworld, len(plugin_frictions), rows, d.ten_J.shape[1])
             law = np.array([each.law for each in plugin_frictions], np.float32).T[:, None]
             s.law.assign(np.broadcast_to(law, (LAWS, d.nworld, len(plugin_frictions))).copy())
-            self._every = wp.full((d.nworld,), True, dtype=bool)
+            self._all_worlds = wp.full((d.nworld,), True, dtype=bool)
         columns = Coefficients(*(s.law[k] for k in range(LAWS)))
         self.coulomb, self.stiction = columns.coulomb, columns.stiction
         self.stiffness, self.viscous = columns.stiffness, columns.viscous
@@ -87,7 +88,7 @@ class Friction:
         self.level, self.friction = s.signals[SIGNAL.level], s.signals[SIGNAL.force]
         self.tension, self.turn = s.signals[SIGNAL.load], s.signals[SIGNAL.turn]
         self._inputs: dict[Any, tuple[list[Any], Any]] = {}
-        self._before, self._sensors = m.callback.act_bias, m.callback.sensor
+        self._previous_act_bias, self._previous_sensor = m.callback.act_bias, m.callback.sensor
         m.callback.act_bias, m.callback.sensor = self._act_bias, self._sensor
 
     def index(self, name: str) -> int:
@@ -96,7 +97,7 @@ class Friction:
         Raises:
             InputError: If it has no friction.
         """
-        return place_of(name, self.names)
+        return friction_index(name, self.names)
 
     @property
     def state(self) -> Any:
@@ -124,23 +125,23 @@ class Friction:
         """
         worlds, count = self.level.shape
         if mask is None:
-            mask = self._every
+            mask = self._all_worlds
         elif not isinstance(mask, wp.array):
             mask = wp.array(np.asarray(mask, bool), dtype=bool, device=self._device)
         if mask.shape != (worlds,) or mask.dtype is not wp.bool:
             raise InputError("mask", f"must be of shape ({worlds},) and of bool", mask.shape)
-        wp.launch(kernels.forget, (worlds, count), inputs=[self._arrays, mask], device=self._device)
+        wp.launch(kernels.reset_worlds, (worlds, count), inputs=[self._arrays, mask], device=self._device)
 
     def _finish(self) -> None:
         """Finish the last step, up to the present time, and start the clock there."""
         m, d = self._model, self._data
-        self._launch(kernels.finish, self.level.shape[1], TendonInputs, m.opt, m, d)
+        self._launch(kernels.finish_step, self.level.shape[1], TendonInputs, m.opt, m, d)
         wp.copy(self._arrays.clock, d.time)
 
     def _act_bias(self, m: Any, d: Any) -> None:
         """Write this step's rows: the callback that MuJoCo Warp calls once forces of actuators are known."""
-        if self._before:
-            self._before(m, d)
+        if self._previous_act_bias:
+            self._previous_act_bias(m, d)
         self._check(m, d)
         self._finish()
         t = self._table
@@ -153,9 +154,9 @@ class Friction:
         if not count:
             return
         values = [next(getattr(owner, name) for owner in owners if hasattr(owner, name)) for name in kind.vars]
-        known, inputs = self._inputs.get(kind, ((), None))
+        previous, inputs = self._inputs.get(kind, ((), None))
         # Filling a struct takes longer than a launch, and arrays are seldom others.
-        if len(known) != len(values) or not all(map(operator.is_, known, values)):
+        if len(previous) != len(values) or not all(map(operator.is_, previous, values)):
             inputs = kind()
             for name, value in zip(kind.vars, values, strict=True):
                 setattr(inputs, name, value)
@@ -165,8 +166,8 @@ class Friction:
 
     def _sensor(self, m: Any, d: Any, stage: Any) -> None:
         """Record the solver's forces: the callback that MuJoCo Warp calls while its rows are still this step's."""
-        if self._sensors:
-            self._sensors(m, d, stage)
+        if self._previous_sensor:
+            self._previous_sensor(m, d, stage)
         if int(stage) != int(mujoco.mjtStage.mjSTAGE_ACC):
             return
         if m.callback.act_bias != self._act_bias:
@@ -190,7 +191,7 @@ def check_options(option: Any, entry: str) -> None:
     """
     if int(option.integrator) == _DISCRETE:
         raise InputError(f"{entry}.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
-    for bit, purpose in _NEEDED.items():
+    for bit, purpose in _REQUIRED_SWITCHES.items():
         if int(option.disableflags) & int(bit):
             name = bit.name.removeprefix("mjDSBL_").lower()
             raise InputError(f"{entry}.disableflags", f"friction needs what it disables: {purpose}", name)
@@ -239,9 +240,9 @@ def attach_friction(m: Any, d: Any, mjm: mujoco.MjModel, tendons: Keys | None, j
         )
     warn_if_noslip(m.opt, "m.opt")
     model = NamedModel(mjm)
-    rubbing = choose(tendons, model.tendons, "tendons", TENDON_KEYS)
-    turning = choose(joints, model.joints, "joints", JOINT)
-    plugin_frictions = frictions(model, rubbing, turning, branches_of(model, pulled(model, rubbing)))
+    tendon_laws = match_names(tendons, model.tendons, "tendons", RoutedFriction)
+    joint_laws = match_names(joints, model.joints, "joints", JointFrictionSettings)
+    plugin_frictions = frictions(model, tendon_laws, joint_laws, branches_of(model, pulled_tendons(model, tendon_laws)))
     if not plugin_frictions:
         raise InputError("mjm", "nothing pulls the tendons, and no joints are named: there is no friction to add")
     warn_if_stiff(model, plugin_frictions, "mjm.opt.timestep")

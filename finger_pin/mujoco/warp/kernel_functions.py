@@ -12,28 +12,29 @@ from finger_pin.mujoco.warp.structures import ForceInputs, PinInputs, TendonInpu
 wp.set_module_options({"enable_backward": False})
 
 
-def _compiled(function: Callable[..., Any], world: dict[str, Any]) -> Any:
+def _compiled(function: Callable[..., Any], callees: dict[str, Any]) -> Any:
     """Return a plain function as one of Warp's, in which those of the text that it calls are Warp's too."""
     assert isinstance(function, FunctionType)
-    twin = FunctionType(function.__code__, {**function.__globals__, **world}, function.__name__)
-    twin.__annotations__, twin.__module__ = function.__annotations__, __name__
-    return wp.func(twin)
+    copied = FunctionType(function.__code__, {**function.__globals__, **callees}, function.__name__)
+    copied.__annotations__, copied.__module__ = function.__annotations__, __name__
+    return wp.func(copied)
 
 
-coefficient, relaxed, delivered = (
-    _compiled(each, {}) for each in (friction_step.coefficient, friction_step.relaxed, friction_step.delivered)
+coefficient, one_minus_exp, delivered = (
+    _compiled(each, {}) for each in (friction_step.coefficient, friction_step.one_minus_exp, friction_step.delivered)
 )
-capstan, slide = (_compiled(each, {"relaxed": relaxed}) for each in (friction_step.capstan, friction_step.slide))
-level_of = _compiled(friction_step.level_of, {"coefficient": coefficient, "capstan": capstan})
-exerted = _compiled(friction_step.exerted, {"slide": slide})
+capstan = _compiled(friction_step.capstan, {"one_minus_exp": one_minus_exp})
+slide = _compiled(friction_step.slide, {"one_minus_exp": one_minus_exp})
+sliding_level = _compiled(friction_step.sliding_level, {"coefficient": coefficient, "capstan": capstan})
+row_terms = _compiled(friction_step.row_terms, {"slide": slide})
 
 
 @wp.func
 def spring(w: int, tendon: int, x: TendonInputs) -> float:
     """Return the force of a tendon's own spring and damper along it, N, negative in tension."""
-    reach = x.tendon_lengthspring[w % x.tendon_lengthspring.shape[0], tendon]
-    there = x.ten_length[w, tendon]
-    stretch = wp.max(reach[0] - there, 0.0) + wp.min(reach[1] - there, 0.0)
+    rest_range = x.tendon_lengthspring[w % x.tendon_lengthspring.shape[0], tendon]
+    length = x.ten_length[w, tendon]
+    stretch = wp.max(rest_range[0] - length, 0.0) + wp.min(rest_range[1] - length, 0.0)
     return (
         x.tendon_stiffness[w % x.tendon_stiffness.shape[0], tendon] * stretch
         - x.tendon_damping[w % x.tendon_damping.shape[0], tendon] * x.ten_velocity[w, tendon]
@@ -52,16 +53,16 @@ def turn_of_path(w: int, tendon: int, x: TendonInputs) -> float:
     """Return the angle by which a path turns up to its first pulley, rad, as `loads.turn_of_path` does."""
     first = x.ten_wrapadr[w, tendon]
     turn = float(0.0)
-    along = wp.vec3(0.0, 0.0, 0.0)
-    going = bool(True)
+    previous = wp.vec3(0.0, 0.0, 0.0)
+    before_pulley = bool(True)
     for k in range(first + 1, first + x.ten_wrapnum[w, tendon]):
         if x.wrap_obj[w, k // 2][k % 2] == -2 or x.wrap_obj[w, (k - 1) // 2][(k - 1) % 2] == -2:
-            going = False
-        way = path_point(w, k, x) - path_point(w, k - 1, x)
+            before_pulley = False
+        segment = path_point(w, k, x) - path_point(w, k - 1, x)
         # Nearer points are one point, to the digits that positions have.
-        if going and wp.length_sq(way) >= 1e-12:
-            turn += wp.atan2(wp.length(wp.cross(way, along)), wp.dot(way, along))
-            along = way
+        if before_pulley and wp.length_sq(segment) >= 1e-12:
+            turn += wp.atan2(wp.length(wp.cross(segment, previous)), wp.dot(segment, previous))
+            previous = segment
     return turn
 
 
@@ -73,9 +74,9 @@ def proximal(w: int, joint: int, x: PinInputs) -> wp.vec3:
     body = int(carrier)
     while body > 0:
         if x.body_jntnum[body] > 0:
-            way = x.xanchor[w, joint] - x.xanchor[w, x.body_jntadr[body] + x.body_jntnum[body] - 1]
-            if wp.length(way) > 1e-6:
-                direction = wp.normalize(way)
+            offset = x.xanchor[w, joint] - x.xanchor[w, x.body_jntadr[body] + x.body_jntnum[body] - 1]
+            if wp.length(offset) > 1e-6:
+                direction = wp.normalize(offset)
                 body = 0
         body = x.body_parentid[body]
     return direction

@@ -28,12 +28,12 @@ wp.set_module_options({"enable_backward": False})
 _PIN, _LINK, _BRANCH = (wp.constant(each) for each in (table.PIN, table.LINK, table.BRANCH))
 _SIGNALS, _MEMORIES = wp.constant(table.SIGNALS), wp.constant(MEMORIES)
 _NEVER, _NUMERICAL = wp.constant(NEVER), wp.constant(NUMERICAL_FLOOR)
-# As large as no friction, N.
-_MOST = wp.constant(1e30)
+# Limit of an unlimited friction, N.
+_UNLIMITED = wp.constant(1e30)
 
 
 @wp.kernel
-def finish(t: Table, s: State, x: TendonInputs) -> None:
+def finish_step(t: Table, s: State, x: TendonInputs) -> None:
     """Finish the last step where time has gone on: bristles by (9a), and loads; forget all where it has gone back."""
     w, f = wp.tid()
     s.address[w, t.row_of[t.row[f]]] = -1
@@ -63,7 +63,7 @@ def finish(t: Table, s: State, x: TendonInputs) -> None:
 
 
 @wp.kernel
-def forget(s: State, mask: wp.array[bool]) -> None:
+def reset_worlds(s: State, mask: wp.array[bool]) -> None:
     """Put the friction of some worlds at rest."""
     w, f = wp.tid()
     if not mask[w]:
@@ -76,10 +76,10 @@ def forget(s: State, mask: wp.array[bool]) -> None:
 
 
 @wp.func
-def _write_terms(t: Table, s: State, w: int, f: int, inputs: wp.vec4, most: float, turn: float, dt: float) -> None:
+def _write_terms(t: Table, s: State, w: int, f: int, inputs: wp.vec4, largest: float, turn: float, dt: float) -> None:
     """Write level, load and turn, and a friction's part of its row; inputs are speed, load, normal force, bristles."""
     law = s.law
-    level = kernel_functions.level_of(
+    level = kernel_functions.sliding_level(
         t.kind[f] == _PIN,
         law[LAW.coulomb, w, f],
         law[LAW.stiction, w, f],
@@ -92,14 +92,14 @@ def _write_terms(t: Table, s: State, w: int, f: int, inputs: wp.vec4, most: floa
         turn,
     )
     stiffness = law[LAW.stiffness, w, f] + law[LAW.hardening, w, f] * wp.abs(inputs[3])
-    pull, damp, limit = kernel_functions.exerted(
+    pull, damp, limit = kernel_functions.row_terms(
         level,
         stiffness,
         law[LAW.viscous, w, f],
         law[LAW.micro_damping, w, f],
         inputs[0],
         inputs[1],
-        most,
+        largest,
         inputs[3],
         dt,
     )
@@ -113,14 +113,14 @@ def _write_terms(t: Table, s: State, w: int, f: int, inputs: wp.vec4, most: floa
 
 
 @wp.func
-def _drawn(t: Table, w: int, f: int, x: TendonInputs) -> float:
+def _actuator_force(t: Table, w: int, f: int, x: TendonInputs) -> float:
     """Return what actuators exert along a tendon, or of a link on its joint, within their limits."""
     force = float(0.0)
     for k in range(t.actuators_first[f], t.actuators_first[f + 1]):
         a = t.actuators[k]
-        exerted, within = float(x.actuator_force[w, a]), x.actuator_forcerange[w % x.actuator_forcerange.shape[0], a]
+        exerted, limits = float(x.actuator_force[w, a]), x.actuator_forcerange[w % x.actuator_forcerange.shape[0], a]
         if x.actuator_forcelimited[a]:
-            exerted = wp.clamp(exerted, within[0], within[1])
+            exerted = wp.clamp(exerted, limits[0], limits[1])
         force += x.actuator_gear[w % x.actuator_gear.shape[0], a][0] * exerted
     return force
 
@@ -132,36 +132,36 @@ def tendons(t: Table, s: State, x: TendonInputs) -> None:
     f = t.tendons[i]
     tendon, kind, trunk = t.element[f], t.kind[f], t.trunk[f]
     puller = t.element[trunk]
-    pull = _drawn(t, w, f, x)
+    pull = _actuator_force(t, w, f, x)
     bristle, speed = s.memory[w, f, MEMORY.bristle], x.ten_velocity[w, tendon]
     constraint_tension = float(s.memory[w, f, MEMORY.constraint_tension])
     if kind == _LINK:
         drive = pull * wp.abs(t.share[f]) * wp.sign(t.ratio[f])
         pull = wp.where(t.share[f] > 0.0, drive, wp.min(drive, 0.0))
     elif x.tendon_actfrclimited[puller]:
-        within = x.tendon_actfrcrange[w % x.tendon_actfrcrange.shape[0], puller]
-        pull = wp.clamp(pull, within[0], within[1])
+        limits = x.tendon_actfrcrange[w % x.tendon_actfrcrange.shape[0], puller]
+        pull = wp.clamp(pull, limits[0], limits[1])
     pull += kernel_functions.spring(w, puller, x)
     if kind == _BRANCH:
         # A part of what its tendon's friction has left.
-        _lost, left = kernel_functions.delivered(
+        _lost, remaining = kernel_functions.delivered(
             pull, wp.abs(pull), s.memory[w, trunk, MEMORY.bristle], s.law[LAW.viscous, w, f], x.ten_velocity[w, puller]
         )
-        pull, constraint_tension = wp.where(pull > 0.0, t.share[f], -t.share[f]) * left, float(0.0)
+        pull, constraint_tension = wp.where(pull > 0.0, t.share[f], -t.share[f]) * remaining, float(0.0)
     tension = wp.abs(pull) + constraint_tension
-    loss, left = kernel_functions.delivered(pull, tension, bristle, s.law[LAW.viscous, w, f], speed)
-    s.delivered[w, f] = left
+    loss, remaining = kernel_functions.delivered(pull, tension, bristle, s.law[LAW.viscous, w, f], speed)
+    s.delivered[w, f] = remaining
     turn = float(s.law[LAW.curvature_offset, w, f])
-    if tension + left > 0.0:
+    if tension + remaining > 0.0:
         if x.ten_wrapnum[w, tendon] > 0:
             turn += kernel_functions.turn_of_path(w, tendon, x)
         else:
             for k in range(t.bends_first[f], t.bends_first[f + 1]):
                 turn += t.weights[k] * wp.abs(x.qpos[w, x.jnt_qposadr[t.bends[k]]])
     # What holds the tendon back takes no more than there is.
-    most = wp.where(loss > 0.0, tension + s.law[LAW.drag, w, f] + s.law[LAW.floor, w, f], _MOST)
-    inputs = wp.vec4(speed, tension, tension + left, bristle)
-    _write_terms(t, s, w, f, inputs, most, turn, x.timestep[w % x.timestep.shape[0]])
+    largest = wp.where(loss > 0.0, tension + s.law[LAW.drag, w, f] + s.law[LAW.floor, w, f], _UNLIMITED)
+    inputs = wp.vec4(speed, tension, tension + remaining, bristle)
+    _write_terms(t, s, w, f, inputs, largest, turn, x.timestep[w % x.timestep.shape[0]])
     if t.row[f] >= x.nv:
         first = x.ten_J_rowadr[t.row[f] - x.nv]
         for k in range(first, first + x.ten_J_rownnz[t.row[f] - x.nv]):
@@ -176,11 +176,11 @@ def pins(t: Table, s: State, x: PinInputs) -> None:
     load = float(0.0)
     for k in range(t.loads_first[f], t.loads_first[f + 1]):
         load += s.delivered[w, t.loads[k]]
-    outside = wp.vec3(
+    contact = wp.vec3(
         s.memory[w, f, MEMORY.contact_x], s.memory[w, f, MEMORY.contact_y], s.memory[w, f, MEMORY.contact_z]
     )
-    if wp.length_sq(outside) > 0.0:
-        way = kernel_functions.proximal(w, t.element[f], x)
-        load = wp.length(outside - load * way)
+    if wp.length_sq(contact) > 0.0:
+        axis = kernel_functions.proximal(w, t.element[f], x)
+        load = wp.length(contact - load * axis)
     inputs = wp.vec4(x.qvel[w, t.row[f]], load, load, s.memory[w, f, MEMORY.bristle])
-    _write_terms(t, s, w, f, inputs, _MOST, 0.0, x.timestep[w % x.timestep.shape[0]])
+    _write_terms(t, s, w, f, inputs, _UNLIMITED, 0.0, x.timestep[w % x.timestep.shape[0]])

@@ -10,7 +10,7 @@ import numpy as np
 
 from finger_pin.exceptions import InputError
 from finger_pin.mujoco.frictions import add_branches as add_branches_of
-from finger_pin.mujoco.frictions import pulled
+from finger_pin.mujoco.frictions import pulled_tendons
 from finger_pin.mujoco.specification import name_all
 
 
@@ -54,7 +54,7 @@ def add_branches(spec: mujoco.MjSpec) -> None:
         model = spec.compile()
     except ValueError as error:
         raise InputError("spec", " ".join(str(error).split())) from None
-    names = pulled(model, [model.tendon(i).name for i in range(model.ntendon)])
+    names = pulled_tendons(model, [model.tendon(i).name for i in range(model.ntendon)])
     add_branches_of(spec, model, [name for name in names if f"{name}_branch_1" not in [t.name for t in spec.tendons]])
 
 
@@ -67,13 +67,12 @@ def branches_of(model: NamedModel, names: list[str]) -> dict[str, list[tuple[str
     branches: dict[str, list[tuple[str, float]]] = {}
     for name in names:
         first, count = (int(each[model.tendon(name).id]) for each in (model.tendon_adr, model.tendon_num))
-        divisors = model.wrap_prm[first : first + count][
-            model.wrap_type[first : first + count] == mujoco.mjtWrap.mjWRAP_PULLEY
-        ]
-        made = [(f"{name}_branch_{k}", 1.0 / float(each)) for k, each in enumerate(np.asarray(divisors), start=1)]
-        if any(branch not in model.tendons for branch, _ in made):
+        pieces = slice(first, first + count)
+        divisors = np.asarray(model.wrap_prm[pieces][model.wrap_type[pieces] == mujoco.mjtWrap.mjWRAP_PULLEY])
+        named_branches = [(f"{name}_branch_{k}", 1.0 / float(each)) for k, each in enumerate(divisors, start=1)]
+        if any(branch not in model.tendons for branch, _ in named_branches):
             reason = "has a pulley, behind which each branch rubs: fp.mujoco.warp.add_branches(spec) before compiling"
             raise InputError(f"tendons.{name}", reason)
-        if made:
-            branches[name] = made
+        if named_branches:
+            branches[name] = named_branches
     return branches

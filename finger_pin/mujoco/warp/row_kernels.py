@@ -28,15 +28,15 @@ def write_rows(t: Table, s: State, x: RowInputs) -> None:
     r = x.ne[w] + i
     if i >= x.nf[w] or r >= x.njmax:
         return
-    place, speed = int(x.id[w, r]), float(0.0)
+    element, speed = int(x.id[w, r]), float(0.0)
     if x.type[w, r] == _FRICTION_DOF:
-        speed = x.qvel[w, place]
+        speed = x.qvel[w, element]
     elif x.type[w, r] == _FRICTION_TENDON:
-        speed = x.ten_velocity[w, place]
-        place += x.nv
+        speed = x.ten_velocity[w, element]
+        element += x.nv
     else:
         return
-    row = t.row_of[place]
+    row = t.row_of[element]
     if row < 0:
         return
     pull, damp, limit = float(0.0), float(0.0), float(0.0)

@@ -18,12 +18,12 @@ class MemoryColumns(NamedTuple):
     contact_z: int
 
 
-def _places(columns: Any) -> Any:
+def _field_indices(columns: Any) -> Any:
     """Return the place of each field of a NamedTuple, as constants of a class, which Warp reads as they are."""
     return type(columns.__name__, (), {name: place for place, name in enumerate(columns._fields)})
 
 
-LAW, SIGNAL, MEMORY, TERM = map(_places, (Coefficients, SignalPlaces, MemoryColumns, RowTerms))
+LAW, SIGNAL, MEMORY, TERM = map(_field_indices, (Coefficients, SignalPlaces, MemoryColumns, RowTerms))
 LAWS, MEMORIES = len(Coefficients._fields), len(MemoryColumns._fields)
 _Vector5 = wp.types.vector(length=5, dtype=float)
 #: The clock of a world whose last step is not to be finished, s.

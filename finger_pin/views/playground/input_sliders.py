@@ -10,8 +10,9 @@ import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.input_ranges import input_ranges, spool_ranges
+from finger_pin.control.motor_signals import spool_windings, voltage_signals
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.position_drive import SteppedDrives, spool_goals, voltage_signals, wound_spools
+from finger_pin.control.position_drive import SteppedDrives, spool_goals
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
@@ -83,10 +84,10 @@ class Inputs:
         """Go on with other numbers of the same scenario."""
         if isinstance(loop.controller, OpenLoopTensions):
             # The simulator delays what it is given.
-            loop = replace(loop, controller=loop.controller.as_commanded(scenario.finger))
+            loop = replace(loop, controller=loop.controller.without_delays(scenario.finger))
         self._scenario, self._loop = scenario, loop
         self._coupling = scenario.coupling(loop.finger.routing)
-        self._wound = wound_spools(scenario, loop.finger)
+        self._wound = spool_windings(scenario, loop.finger)
         self._voltages = voltage_signals(scenario, loop.finger, "motor_voltage")
         self._supplies = voltage_signals(scenario, loop.finger, "supply_voltage")
         parts = scenario.parts().values()
