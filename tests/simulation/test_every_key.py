@@ -18,8 +18,7 @@ from finger_pin.exceptions import InputError
 # States at which x' is compared; with many objects the first ones alone, which take long there.
 INSTANTS, FEW, MANY = 8, 2, 100
 # Imported below from MuJoCo, with what shipped scenarios have not.
-HAND = """
-<mujoco>
+HAND = """<mujoco>
   <option gravity="0 0 -9.81"/>
   <worldbody>
     <site name="s0" pos="-0.02 0 0.01"/>
