@@ -15,8 +15,8 @@ from typing import Annotated, Any
 import typer
 
 from finger_pin.commands.application import run_function
-from finger_pin.commands.console import noted, print_text
-from finger_pin.commands.options import Output, wrong
+from finger_pin.commands.console import error_note, print_text
+from finger_pin.commands.options import Output, invalid
 from finger_pin.files import write_text
 
 PACKAGES = ("finger-pin", "numpy", "scipy", "numba", "pin", "mujoco", "mujoco-warp", "scikit-sundae")
@@ -54,7 +54,7 @@ def benchmark(
     from benchmarks.store import Store, say
 
     output.mkdir(parents=True, exist_ok=True)
-    with noted(f"what was measured is in {output}"):
+    with error_note(f"what was measured is in {output}"):
         store = Store(output, quick, fresh)
         around = machine()
         stages = {}
@@ -80,7 +80,7 @@ def chosen(names: str) -> tuple[str, ...]:
     wanted = [name.strip() for name in names.split(",")]
     for name in wanted:
         if name not in STAGES:
-            raise wrong("--only", f"{name}: no such stage; there are {', '.join(STAGES)}")
+            raise invalid("--only", f"{name}: no such stage; there are {', '.join(STAGES)}")
     return tuple(name for name in STAGES if name in wanted)
 
 

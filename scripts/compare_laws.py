@@ -23,7 +23,7 @@ from finger_pin.identification.estimate import fit
 from finger_pin.identification.models import build_problem
 from finger_pin.identification.recordings import read_recording
 from finger_pin.views.plots import save_figure
-from finger_pin.views.plots.panels import grid, plain, title
+from finger_pin.views.plots.panels import grid, plain_ticks, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, colour, styled, thin
 from finger_pin.views.shown_units import shown_unit
 
@@ -208,7 +208,7 @@ def plot_laws(table: Mapping[str, Mapping[str, Row | str]]) -> Figure:
                 axes.text(1.0, place, f"  as {rows[law]}", va="center", color=colour(GREY))
         axes.axvline(1.0, color=colour(GREY), linewidth=thin(), zorder=0)
         axes.set_xscale("log")
-        plain(axes.xaxis)
+        plain_ticks(axes.xaxis)
         first = axes.get_subplotspec().is_first_col()
         axes.set_yticks(range(len(laws)), laws if first else [""] * len(laws))
         axes.set(xlabel="held-out rms over that as described", ylim=(len(laws) - 0.5, -0.5))

@@ -13,7 +13,7 @@ import typer
 
 from finger_pin.commands.application import run_function
 from finger_pin.commands.console import print_text
-from finger_pin.commands.options import Output, Restart, wrong
+from finger_pin.commands.options import Output, Restart, invalid
 
 # Proximal policy optimisation: small batches learn more of a step than it costs to take another.
 SETTINGS = {"batch_size": 160, "n_epochs": 10, "gae_lambda": 0.9}
@@ -88,11 +88,11 @@ def train(
     Ctrl-C keeps the policy so far, and the same command goes on with it.
     """
     if task not in GOALS:
-        raise wrong("TASK", f"{task}: must be Reach, Press or Grasp")
+        raise invalid("TASK", f"{task}: must be Reach, Press or Grasp")
     training = TRAININGS[task] if steps is None else TRAININGS[task]._replace(steps=steps)
     for name, value in (("--steps", training.steps), ("--worlds", worlds)):
         if value < 1:
-            raise wrong(name, "must be above 0")
+            raise invalid(name, "must be above 0")
     folder = output / task.lower()
     policy = Policy.trained(folder, task, training, worlds, seed, restart=restart)
     found, goal = policy.evaluate(task, episodes=100), GOALS[task]
@@ -208,7 +208,7 @@ def build_worlds(task: str, count: int, **fields: Any) -> Any:
     try:
         from finger_pin.learning.stable_baselines import StableBaselinesEnvironment
     except ModuleNotFoundError as error:
-        raise wrong("train", f"needs {error.name}: python -m pip install stable-baselines3") from None
+        raise invalid("train", f"needs {error.name}: python -m pip install stable-baselines3") from None
     from finger_pin.learning.tasks import make_vector
 
     return StableBaselinesEnvironment(make_vector(f"{task}-v0", count, **fields))

@@ -16,7 +16,7 @@ from train import TRAININGS, Policy, Training
 
 from finger_pin.commands.application import run_function
 from finger_pin.commands.console import print_text
-from finger_pin.commands.options import Output, Restart, wrong
+from finger_pin.commands.options import Output, Restart, invalid
 
 # No friction at all has no bristles to speak of; a thousandth has none that matter.
 _LEAST = 1e-3
@@ -106,7 +106,7 @@ def studies() -> dict[str, Study]:
     """Return the studies by how the finger is driven."""
     from finger_pin.description.loading import load_scenario
     from finger_pin.learning import Sensor, Uniform
-    from finger_pin.learning.tasks import COARSE, TASKS
+    from finger_pin.learning.tasks import COARSE_TOLERANCES, TASKS
 
     own = TASKS["Reach-v0"]()
     told: dict[str, Any] = {}
@@ -115,7 +115,7 @@ def studies() -> dict[str, Study]:
         told[f"finger.actuators.{motor}.position_loop.period"] = _SAMPLING
     low, high = np.array([-0.175, 0.0, 0.0]), np.array([0.175, 1.571, 1.571])
     servos = {
-        "scenario": load_scenario("servo_position", {**COARSE, **told}),
+        "scenario": load_scenario("servo_position", {**COARSE_TOLERANCES, **told}),
         "action": "joint_position",
         "limits": (low - np.array(_BEYOND), high + np.array(_BEYOND)),
         # Servos take 0.3 s to a goal; how far they have wound says what was asked before.
@@ -192,10 +192,10 @@ def transfer(
     The same command goes on where it was interrupted.
     """
     if driven not in ("tensions", "servos", "both"):
-        raise wrong("--driven", f"{driven}: must be tensions, servos or both")
+        raise invalid("--driven", f"{driven}: must be tensions, servos or both")
     for name, value in (("--steps", steps or 1), ("--seeds", seeds), ("--episodes", episodes)):
         if value < 1:
-            raise wrong(name, "must be above 0")
+            raise invalid(name, "must be above 0")
     chosen = {name: study for name, study in studies().items() if driven in (name, "both")}
     output.mkdir(parents=True, exist_ok=True)
     path, trials = output / "transfer.csv", dict[tuple[Any, ...], Trial]()

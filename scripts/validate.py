@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from finger_pin.commands.application import run_function
-from finger_pin.commands.console import bar, noted, print_text, talks
-from finger_pin.commands.options import Output, wrong
+from finger_pin.commands.console import bar, error_note, print_text, shows_progress
+from finger_pin.commands.options import Output, invalid
 
 if TYPE_CHECKING:
     from validation.report import Family
@@ -47,12 +47,12 @@ def validate(
     installed; 1 some failed, or the report cannot be written; 2 wrong options; 130 interrupted, nothing written.
     """
     names = chosen(only)
-    talks(quiet=False)
+    shows_progress(quiet=False)
     from validation import report
     from validation.check import Verdict
 
     output.mkdir(parents=True, exist_ok=True)
-    with noted("nothing was written"):
+    with error_note("nothing was written"):
         whole = report.Report.now(measured(names))
     report.write(whole, output)
     print_text(f"{report.text(whole)}\n\nThe report is {output / report.PAGE}")
@@ -66,7 +66,7 @@ def chosen(names: str) -> tuple[str, ...]:
         if name not in FAMILIES:
             near = get_close_matches(name, FAMILIES, n=1)
             hint = f"; did you mean {near[0]}?" if near else ""
-            raise wrong("--only", f"{name}: no such family; there are {', '.join(FAMILIES)}{hint}")
+            raise invalid("--only", f"{name}: no such family; there are {', '.join(FAMILIES)}{hint}")
     return tuple(name for name in FAMILIES if name in wanted)
 
 

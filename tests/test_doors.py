@@ -5,7 +5,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.mechanism.coerce import as_finger, description_of
-from finger_pin.simulation.energy import entries
+from finger_pin.simulation.energy import account_entries
 
 SHORT = {"simulation.duration": 0.005}
 COULOMB = "finger.tendon_friction.coulomb"
@@ -17,7 +17,7 @@ def swept(given, **more):
 
 
 def optimised(given, **more):
-    effort = fp.studies.optimising.Effort(4, 1)
+    effort = fp.studies.optimisation.Effort(4, 1)
     found = fp.optimise(given, ["controller.gain=1:1.1"], constraints=[], effort=effort, **more)
     return float(found.tension_peak[0])
 
@@ -231,7 +231,7 @@ def test_a_sweep_over_keys_of_a_finger_changes_one_of_ones_own(tmp_path, heavy):
 
     scenario = fp.load_scenario("reversals", SHORT)
     own, expected = swept(heavy, tmp_path), fp.simulate(scenario, finger=heavy)
-    assert float(own[1]) == sum(float(each[-1]) for each in entries(expected, "lost").values())
+    assert float(own[1]) == sum(float(each[-1]) for each in account_entries(expected, "lost").values())
     assert float(own[0]) not in (float(own[1]), float(swept(None, None)[0]))
     np.testing.assert_array_equal(swept(None, tmp_path), swept(None, None))
 

@@ -16,28 +16,37 @@ from typing import Any
 import typer
 
 from finger_pin.cancellation import signals_interrupt
-from finger_pin.commands import export, force_capability, identify, optimise, play, self_locking, simulate, sweep
-from finger_pin.commands.console import Unsuccessful, complain, print_text
+from finger_pin.commands import (
+    export,
+    force_capability,
+    identify_command,
+    optimise,
+    play,
+    self_locking,
+    simulate_command,
+    sweep,
+)
+from finger_pin.commands.console import Unsuccessful, print_error, print_text
 from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, StudyError
 from finger_pin.version import __version__
 
 DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 COMMANDS = (
-    simulate.simulate,
+    simulate_command.simulate,
     play.play,
     sweep.sweep,
     optimise.optimise,
-    identify.identify,
+    identify_command.identify,
     self_locking.self_locking,
     force_capability.force_capability,
     export.export,
 )
 _ENVIRONMENT = {
-    # Matrices are small here: threads of their own take longer to start, and to wait for, than they save.
+    # Matrices are small here: BLAS threads take longer to start, and to wait for, than they save.
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
-    # To look for plugins of pydantic takes reading the metadata of every package that is installed.
+    # The search for pydantic's plugins reads the metadata of every installed package.
     "PYDANTIC_DISABLE_PLUGINS": "__all__",
 }
 
@@ -49,7 +58,7 @@ def run(name: str | None = None, arguments: Sequence[str] | None = None) -> int:
 
     Args:
         name: The command that the arguments are for, as in ``scripts/``; without it they begin with its name.
-        arguments: Default those of this process.
+        arguments: Arguments; by default those of this process.
     """
     return run_function(None if name is None else next(each for each in COMMANDS if each.__name__ == name), arguments)
 
@@ -70,7 +79,7 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
             command_line if command_line or function else ["--help"], prog_name=program, standalone_mode=False
         )
     except typer.TyperException as error:
-        complain(program, _usage(error, command_line))
+        print_error(program, _usage_message(error, command_line))
         return WRONG_INPUT
     return int(code or DONE)
 
@@ -78,10 +87,10 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
 @cache
 def _set_up_process() -> None:
     """Set up environment variables before libraries are imported; those already set stay."""
-    # Imports make many objects that stay, and commands few cycles: garbage is looked for rarely, which saves a fifth of
+    # Imports create many lasting objects, and commands few cycles: rare garbage collections save a fifth of
     # a short command's time.
     gc.set_threshold(2_000_000)
-    # What is left when a process ends is not worth a search for garbage, which takes half a second.
+    # A collection at the end of the process would take half a second.
     atexit.register(gc.freeze)
     for name, value in _ENVIRONMENT.items():
         os.environ.setdefault(name, value)
@@ -91,43 +100,45 @@ def _with_exit_code(command: Callable[..., Any], program: str) -> Callable[..., 
     """Return a command that prints an exception in one line, with all notes, and returns an exit code."""
 
     @wraps(command)
-    def coded(*arguments: Any, **options: Any) -> int:
+    def command_with_exit_code(*arguments: Any, **options: Any) -> int:
         try:
             with signals_interrupt(), warnings.catch_warnings():
-                warnings.showwarning = lambda message, *_: complain(program, f"warning: {message}")
+                warnings.showwarning = lambda message, *_: print_error(program, f"warning: {message}")
                 return int(command(*arguments, **options) or DONE)
         except KeyboardInterrupt as error:
             problem: BaseException = error
             code, text = INTERRUPTED, str(error) or "interrupted"
         except FingerPinError as error:
-            kinds = {InputError: WRONG_INPUT, IntegrationError: FAILED, StudyError: FAILED, Unsuccessful: FAILED}
-            code = next((kinds[kind] for kind in type(error).__mro__ if kind in kinds), NOT_WRITTEN)
+            codes = {InputError: WRONG_INPUT, IntegrationError: FAILED, StudyError: FAILED, Unsuccessful: FAILED}
+            code = next((codes[error_type] for error_type in type(error).__mro__ if error_type in codes), NOT_WRITTEN)
             problem, text = error, str(error)
         except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
+            path_prefix = f"{error.filename}: " if error.filename else ""
             problem, code = error, NOT_WRITTEN
-            text = f"the results cannot be written: {where}{error.strerror or error}"
-        complain(program, "; ".join([text, *getattr(problem, "__notes__", ())]))
+            text = f"the results cannot be written: {path_prefix}{error.strerror or error}"
+        print_error(program, "; ".join([text, *getattr(problem, "__notes__", ())]))
         return code
 
-    return coded
+    return command_with_exit_code
 
 
-def _usage(error: typer.TyperException, command_line: Sequence[str]) -> str:
+def _usage_message(error: typer.TyperException, command_line: Sequence[str]) -> str:
     """Return the message about a wrong command line: the option, its value and the allowed ones, or all options."""
     option, context = getattr(error, "option_name", None), getattr(error, "ctx", None)
     text = str(error.format_message()) if hasattr(error, "format_message") else str(error)
     if isinstance(error, typer.BadParameter) and error.param is not None:
         names = error.param.opts
-        values = [after for name, after in pairwise(command_line) if name in names]
+        values = [argument for name, argument in pairwise(command_line) if name in names]
         values += [
             value for name, equals, value in (each.partition("=") for each in command_line) if equals and name in names
         ]
         return f"{names[0]} = {', '.join(values)}: {error.message.removeprefix('Value error, ').rstrip('.')}"
     if context is None or not text.startswith("No such option"):
         return text
-    there = [name for each in context.command.params for name in (*each.opts, *each.secondary_opts) if name[:1] == "-"]
-    there += ["--version"] if hasattr(context.command, "commands") else []
-    there = [*there, "--help"]
-    near = "".join(f"; did you mean {each}?" for each in get_close_matches(str(option), there, n=1))
-    return f"{option}: no such option; there are {', '.join(there)}{near}"
+    options = [
+        name for each in context.command.params for name in (*each.opts, *each.secondary_opts) if name[:1] == "-"
+    ]
+    options += ["--version"] if hasattr(context.command, "commands") else []
+    options = [*options, "--help"]
+    hint = "".join(f"; did you mean {each}?" for each in get_close_matches(str(option), options, n=1))
+    return f"{option}: no such option; there are {', '.join(options)}{hint}"

@@ -1,4 +1,4 @@
-"""A simulation at a terminal: a progress bar, and output to a pipe that may be closed."""
+"""Terminal output: progress bars, errors, and text to a pipe that may be closed."""
 
 from __future__ import annotations
 
@@ -14,60 +14,60 @@ from finger_pin.exceptions import FingerPinError, InputError
 
 
 class Unsuccessful(FingerPinError):
-    """No run of a study is usable."""
+    """Raised when no run of a study is usable."""
 
 
 @contextmanager
-def bar(shown: bool, unit: str, total: float | None = None) -> Iterator[Callable[..., None]]:
+def bar(visible: bool, unit: str, total: float | None = None) -> Iterator[Callable[..., None]]:
     """Show a progress bar on standard error if asked, and give the function that moves it (`ProgressBar`)."""
-    if not shown:
+    if not visible:
         yield lambda *numbers, **texts: None
         return
     from finger_pin.simulation.progress import ProgressBar
 
-    with closing(ProgressBar(unit, total)) as show:
-        yield show
+    with closing(ProgressBar(unit, total)) as update:
+        yield update
 
 
 @contextmanager
-def progress_bar(shown: bool, duration: float) -> Iterator[Callable[[float], None] | None]:
+def progress_bar(visible: bool, duration: float) -> Iterator[Callable[[float], None] | None]:
     """Show a bar if asked, and give a function that takes the simulated time, s, out of a duration, s, or None."""
-    with bar(shown, "s", duration) as show:
-        yield show if shown else None
+    with bar(visible, "s", duration) as update:
+        yield update if visible else None
 
 
 @contextmanager
-def count_bar(shown: bool, total: int) -> Iterator[Callable[[int], None]]:
+def count_bar(visible: bool, total: int) -> Iterator[Callable[[int], None]]:
     """Show a bar if asked, and give a function that takes the number of further runs that are finished."""
-    done = 0
-    with bar(shown, "runs", total) as show:
+    finished = 0
+    with bar(visible, "runs", total) as update:
 
-        def advance(further: int) -> None:
-            nonlocal done
-            done += further
-            show(done)
+        def advance(new_runs: int) -> None:
+            nonlocal finished
+            finished += new_runs
+            update(finished)
 
         yield advance
 
 
 @contextmanager
-def runs_bar(shown: bool, what: str) -> Iterator[Callable[[int, int, int], None] | None]:
+def runs_bar(visible: bool, label: str) -> Iterator[Callable[[int, int, int], None] | None]:
     """Show a bar if asked, and give a function that takes the numbers of finished, failed and all runs, or None."""
-    with bar(shown, "runs") as show:
+    with bar(visible, "runs") as update:
 
         def count(finished: int, failed: int, total: int) -> None:
-            show(finished, total, text=what, note=f"{failed} failed" if failed else "")
+            update(finished, total, text=label, note=f"{failed} failed" if failed else "")
 
-        yield count if shown else None
+        yield count if visible else None
 
 
-def complain(program: str, message: str) -> None:
+def print_error(program: str, message: str) -> None:
     """Print one line on standard error."""
     print(f"{program}:", "".join(c if c.isprintable() else repr(c)[1:-1] for c in message), file=sys.stderr)
 
 
 @contextmanager
-def noted(note: str) -> Iterator[None]:
+def error_note(note: str) -> Iterator[None]:
     """Add a note to any exception raised meanwhile, such as the folder of finished work."""
     try:
         yield
@@ -77,12 +77,12 @@ def noted(note: str) -> Iterator[None]:
         raise
 
 
-def talks(quiet: bool) -> bool:
+def shows_progress(quiet: bool) -> bool:
     """Return whether to show progress; without it the package's log is kept silent up to errors."""
-    shown = sys.stderr.isatty() and not quiet
-    if not shown:
+    visible = sys.stderr.isatty() and not quiet
+    if not visible:
         logging.getLogger("finger_pin").setLevel(logging.ERROR)
-    return shown
+    return visible
 
 
 def print_text(text: str) -> None:
@@ -91,7 +91,7 @@ def print_text(text: str) -> None:
     try:
         print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)
     except OSError as error:
-        # Python flushes standard output once more at its end.
+        # Python flushes standard output again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not isinstance(error, BrokenPipeError):
             print(f"standard output cannot be written: {error.strerror}", file=sys.stderr)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from finger_pin.commands.console import print_text
-from finger_pin.commands.options import Settings, overrides, wrong
+from finger_pin.commands.options import Settings, invalid, overrides
 
 if TYPE_CHECKING:
     from finger_pin.description.finger import FingerDescription
@@ -35,39 +35,39 @@ def export(
     from finger_pin.description.tables import is_path
     from finger_pin.files import write_text
 
-    results = Path(source).is_dir() or source.endswith(".nc")
+    is_result = Path(source).is_dir() or source.endswith(".nc")
     if target is None:
-        target = Path(f"{Path(source).stem}{'.csv' if results else '.urdf'}")
+        target = Path(f"{Path(source).stem}{'.csv' if is_result else '.urdf'}")
     if target.suffix not in ENDINGS:
-        raise wrong("FILE", f"{target}: must end with {', '.join(ENDINGS)}")
-    if results != (target.suffix == ".csv"):
-        if results:
-            what = "signals are written as .csv"
+        raise invalid("FILE", f"{target}: must end with {', '.join(ENDINGS)}")
+    if is_result != (target.suffix == ".csv"):
+        if is_result:
+            problem = "signals are written as .csv"
         elif is_path(source) and not Path(source).exists():
-            what = "there is no such file or folder"
+            problem = "there is no such file or folder"
         else:
-            what = "has no signals; simulate it, and give the folder of its results"
-        raise wrong("SOURCE", f"{source}: {what}")
-    if results:
+            problem = "has no signals; simulate it, and give the folder of its results"
+        raise invalid("SOURCE", f"{source}: {problem}")
+    if is_result:
         if settings:
-            raise wrong("--set", "is for fingers, hands and scenarios; signals are as they were computed")
+            raise invalid("--set", "is for fingers, hands and scenarios; signals are as they were computed")
         from finger_pin.simulation.netcdf import load, save
 
         try:
             result = load(source)
         except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
-            raise wrong("SOURCE", f"{source}: cannot be read: {where}{error.strerror or error}") from None
+            path_prefix = f"{error.filename}: " if error.filename else ""
+            raise invalid("SOURCE", f"{source}: cannot be read: {path_prefix}{error.strerror or error}") from None
         target.parent.mkdir(parents=True, exist_ok=True)
         save(result, target)
     else:
-        text = written(described(source, settings), target.suffix)
+        text = description_text(load_description(source, settings), target.suffix)
         target.parent.mkdir(parents=True, exist_ok=True)
         write_text(target, text)
     print_text(f"wrote {target}")
 
 
-def described(source: str, settings: list[str]) -> FingerDescription | Scenario:
+def load_description(source: str, settings: list[str]) -> FingerDescription | Scenario:
     """Return the finger, hand or scenario of a name or a file."""
     from finger_pin.description.loading import load_finger, load_hand, load_scenario
     from finger_pin.description.resolution import kind_of
@@ -79,12 +79,12 @@ def described(source: str, settings: list[str]) -> FingerDescription | Scenario:
         names = [*shipped("fingers"), *shipped("hands"), *list_scenarios(), *list_benches()]
         if not is_path(source) and source not in names:
             allowed = f"no such finger, hand or scenario; there are {', '.join(names)}, or the path of a .toml file"
-            raise wrong("SOURCE", f"{source}: {allowed}{suggestion(source, names)}")
+            raise invalid("SOURCE", f"{source}: {allowed}{suggestion(source, names)}")
         return load_scenario(source, changed)
     return (load_hand if kind == "hand" else load_finger)(source, changed)
 
 
-def written(described: FingerDescription | Scenario, ending: str) -> str:
+def description_text(description: FingerDescription | Scenario, ending: str) -> str:
     """Return a description as the text of a file."""
     from finger_pin.description.loading import to_toml
     from finger_pin.description.scenario import Scenario
@@ -93,10 +93,10 @@ def written(described: FingerDescription | Scenario, ending: str) -> str:
     from finger_pin.mechanism.urdf import to_urdf
 
     if ending == ".toml":
-        return to_toml(described)
-    if isinstance(described, Scenario):
-        described = described.finger
+        return to_toml(description)
+    if isinstance(description, Scenario):
+        description = description.finger
     if ending == ".xml":
-        return to_mjcf(described)
-    one_finger(described)
-    return to_urdf(described)
+        return to_mjcf(description)
+    one_finger(description)
+    return to_urdf(description)

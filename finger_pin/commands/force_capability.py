@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from finger_pin.commands.console import print_text, talks
+from finger_pin.commands.console import print_text, shows_progress
 from finger_pin.commands.options import Format, Output, number, numbers
 
 # Of degrees, rad.
@@ -31,10 +31,10 @@ def force_capability(
     view: Annotated[bool, typer.Option("--view", help="Show the forces at the fingertip in the viewer.")] = False,
 ) -> None:
     """Report and draw the forces that a fingertip can exert at a posture, and the tension that one force needs."""
-    talks(quiet=False)
+    shows_progress(quiet=False)
     degrees = None if posture is None else numbers("--posture", posture)
-    wish = numbers("--force", force)
-    most: float | tuple[float, ...] = () if limit == "servos" else number("--limit", limit, positive=True)
+    target_force = numbers("--force", force)
+    limits: float | tuple[float, ...] = () if limit == "servos" else number("--limit", limit, positive=True)
     import numpy as np
 
     import finger_pin as fp
@@ -44,14 +44,14 @@ def force_capability(
     from finger_pin.mechanism.coerce import at_tip, one_finger
     from finger_pin.views.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
 
-    finite_vector("--force", wish, 3)
-    one_finger(described := describe(finger))
-    built = at_tip(fp.Finger(described), tip)
+    finite_vector("--force", target_force, 3)
+    one_finger(description := describe(finger))
+    model = at_tip(fp.Finger(description), tip)
     if limit == "servos":
-        most = tension_limits(built)
-        if not np.isfinite(most).all():
+        limits = tension_limits(model)
+        if not np.isfinite(limits).all():
             raise fp.InputError("--limit", "every tendon needs an actuator, or give a number", limit)
-    limiter, joints = built.stroke_limiter, built.routing.joints
+    limiter, joints = model.stroke_limiter, model.routing.joints
     angles = limiter.lower + (limiter.upper - limiter.lower) / 3.0 if degrees is None else np.deg2rad(degrees)
     if len(angles) != len(joints):
         allowed = f"must be {len(joints)} angles with commas between, one per joint ({', '.join(joints)})"
@@ -60,21 +60,24 @@ def force_capability(
         if not low - _ROUNDING <= angle <= high + _ROUNDING:
             allowed = f"{joint} must be from {np.rad2deg(low):.4g} to {np.rad2deg(high):.4g} deg, the joint's range"
             raise fp.InputError("--posture", allowed, degrees)
-    needed = {each: tension_for_force(built, angles, wish, friction=each) for each in Friction}
-    polytope = force_polytope(built, angles, most)
+    tensions = {friction: tension_for_force(model, angles, target_force, friction=friction) for friction in Friction}
+    polytope = force_polytope(model, angles, limits)
     figures = {
-        "forces": plot_force_polytope(built, angles, most),
-        "sensitivity": plot_radius_sensitivity(built, angles, wish),
+        "forces": plot_force_polytope(model, angles, limits),
+        "sensitivity": plot_radius_sensitivity(model, angles, target_force),
     }
     for name, figure in figures.items():
         save_figure(figure, output / name, format)
-    lines = [f"Largest tension for a force of {np.linalg.norm(wish):g} N, N"]
-    lines += [f"  friction {friction.value:10} {required.largest:8.3f}" for friction, required in needed.items()]
+    lines = [f"Largest tension for a force of {np.linalg.norm(target_force):g} N, N"]
+    lines += [f"  friction {friction.value:10} {tension.largest:8.3f}" for friction, tension in tensions.items()]
     if limit == "servos":
-        pulled = zip(built.routing.tendons, tension_limits(built), strict=False)
-        lines += ["Greatest tension that motors can pull, N", *(f"  {name:19} {each:8.3f}" for name, each in pulled)]
+        motor_limits = zip(model.routing.tendons, tension_limits(model), strict=False)
+        lines += [
+            "Greatest tension that motors can pull, N",
+            *(f"  {name:19} {tension:8.3f}" for name, tension in motor_limits),
+        ]
     print_text("\n".join([*lines, f"Figures are in {output}"]))
     if view:
         from finger_pin.views.viewer import view_forces
 
-        view_forces(built.description, polytope, tension=needed[Friction.NONE].strands, block=True)
+        view_forces(model.description, polytope, tension=tensions[Friction.NONE].strands, block=True)

@@ -18,12 +18,12 @@ from finger_pin.commands.options import (
     Settings,
     Workers,
     folder_name,
+    invalid,
+    open_pool,
     overrides,
-    pool,
     refuse_format,
-    wrong,
 )
-from finger_pin.commands.study import conduct
+from finger_pin.commands.study import run_study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,20 +83,22 @@ def optimise(
     simulate results/optimise-reversals/front/01.toml
     """
     if no_constraints and constraint:
-        raise wrong("--no-constraints", "contradicts --constraint")
+        raise invalid("--no-constraints", "contradicts --constraint")
     refuse_format(figures, format)
     search_options = {"population": population, "generations": generations, "seed": seed}
     effort = {name: value for name, value in search_options.items() if value is not None}
-    changed, crew = overrides(settings), pool(workers, scheduler)
+    changes, executor_context = overrides(settings), open_pool(workers, scheduler)
     from finger_pin.studies import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
     from finger_pin.studies.keys import BaseScenario
 
-    goals = [*over, *minimise, *(f"max.{each}" for each in maximise), *constraint, *["no-constraints"] * no_constraints]
-    study = f"optimise-{BaseScenario.from_scenario(scenario, changed).scenario.name}"
-    folder = output or Path("results", folder_name(study, *settings, *goals, *(f"{k}={v}" for k, v in effort.items())))
+    goals = [*over, *minimise, *(f"max.{name}" for name in maximise), *constraint, *["no-constraints"] * no_constraints]
+    study = f"optimise-{BaseScenario.from_scenario(scenario, changes).scenario.name}"
+    folder = output or Path(
+        "results", folder_name(study, *settings, *goals, *(f"{key}={effort[key]}" for key in effort))
+    )
 
     def run(progress: Progress | None, stop: Stop) -> xr.Dataset:
-        with crew as executor:
+        with executor_context as executor:
             return optimise(
                 scenario,
                 over or None,
@@ -104,7 +106,7 @@ def optimise(
                 maximise=maximise,
                 constraints=constraint or (() if no_constraints else DEFAULT_CONSTRAINTS),
                 effort=Effort(**effort),
-                overrides=changed,
+                overrides=changes,
                 output=folder,
                 executor=executor,
                 restart=restart,
@@ -112,11 +114,7 @@ def optimise(
                 stop=stop,
             )
 
-    _require_feasible(conduct("search", run, summary, "pareto", folder, figures=figures, format=format, quiet=quiet))
-
-
-def _require_feasible(result: xr.Dataset) -> None:
-    """Raise unless a design keeps all constraints."""
+    result = run_study("search", run, summary, "pareto", folder, figures=figures, format=format, quiet=quiet)
     if not result["feasible"].any():
         raise Unsuccessful("no design keeps all constraints")
 
@@ -127,7 +125,7 @@ def summary(result: xr.Dataset) -> str:
     keys = [str(key) for key in result.coords]
     status, feasible = result["status"].values, result["feasible"].values
     count = int(result["front"].max())
-    head = f"{status.size} designs: {feasible.sum()} keep all bounds, {count} on the front"
+    header = f"{status.size} designs: {feasible.sum()} keep all bounds, {count} on the front"
     failed = int((status == "failed").sum())
     note = (
         f"; {failed} cannot be run (tendons that cannot be kept taut, or a run that failed: see optimise.nc)"
@@ -135,15 +133,15 @@ def summary(result: xr.Dataset) -> str:
         else ""
     )
     columns = {name: [f"{value:.4g}" for value in result[name].values] for name in (*metrics, *keys)}
-    shown = [("start", 0), *((f"{n:02d}", int((result["front"].values == n).argmax())) for n in range(1, count + 1))]
+    designs = [("start", 0), *((f"{n:02d}", int((result["front"].values == n).argmax())) for n in range(1, count + 1))]
     width = max(len(label(result, name)) for name in columns)
-    lines = [f"{head}{note}", "", f"  {'design'.ljust(width)}" + "".join(mark.rjust(11) for mark, _ in shown[:8])]
+    lines = [f"{header}{note}", "", f"  {'design'.ljust(width)}" + "".join(title.rjust(11) for title, _ in designs[:8])]
     lines += [
-        f"  {label(result, name).ljust(width)}" + "".join(values[row].rjust(11) for _, row in shown[:8])
+        f"  {label(result, name).ljust(width)}" + "".join(values[row].rjust(11) for _, row in designs[:8])
         for name, values in columns.items()
     ]
-    if len(shown) > 8:
-        lines.append(f"  and {len(shown) - 8} more designs on the front: see front.csv")
+    if len(designs) > 8:
+        lines.append(f"  and {len(designs) - 8} more designs on the front: see front.csv")
     return "\n".join(lines)
 
 

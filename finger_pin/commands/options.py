@@ -1,4 +1,4 @@
-"""Arguments and options of several commands, and the readers of their text."""
+"""Arguments and options of several commands, and parsers of their texts."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from finger_pin.version import installing
 _BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
 
 # Tables that the name of a folder leaves out: what stands in them has other names than what stands elsewhere.
-_OUTER = re.compile(r"^(?:controller|finger|simulation)\.")
-_LONGEST = 60
+_OMITTED_TABLES = re.compile(r"^(?:controller|finger|simulation)\.")
+_MAX_NAME_LENGTH = 60
 # How long a scheduler is tried to be reached, s.
-_PATIENCE = 10.0
+_CONNECTION_TIMEOUT = 10.0
 
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, or path of a .toml file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="Override an entry; repeatable.")]
@@ -41,7 +41,7 @@ Scheduler = Annotated[
 Restart = Annotated[bool, typer.Option("--restart", help="Drop the records of a study in the folder, and begin anew.")]
 
 
-def wrong(option: str, allowed: str) -> typer.TyperException:
+def invalid(option: str, allowed: str) -> typer.TyperException:
     """Return the error of an option."""
     return typer.TyperException(f"{option}: {allowed}")
 
@@ -49,34 +49,34 @@ def wrong(option: str, allowed: str) -> typer.TyperException:
 def refuse_format(figures: bool, format: str | None) -> None:
     """Refuse a format of figures that are not drawn."""
     if format is not None and not figures:
-        raise wrong("--format", "has no effect with --no-figures")
+        raise invalid("--format", "has no effect with --no-figures")
 
 
-def overrides(settings: list[str], **short: str | None) -> dict[str, Any]:
+def overrides(settings: list[str], **short_options: str | None) -> dict[str, Any]:
     """Return overrides of `load_scenario` from texts KEY=VALUE, the value in TOML or a string without quotes.
 
     Args:
-        settings: Of ``--set``.
-        short: By the name of a short option for an entry of ``simulation``, its text.
+        settings: Texts of ``--set``.
+        short_options: Texts of short options for entries of ``simulation``, by name.
 
     Raises:
-        TyperException: If a text is none, or an entry is set twice.
+        TyperException: If a text is wrong, or an entry is set twice.
     """
     entries = {}
     for text in settings:
         key, equals, value = text.partition("=")
         if not equals or not key.strip():
-            raise wrong("--set", f"{text}: must be KEY=VALUE, such as controller.gain=2")
+            raise invalid("--set", f"{text}: must be KEY=VALUE, such as controller.gain=2")
         if key.strip() in entries:
-            raise wrong("--set", f"{text}: an earlier one sets the same entry")
-        entries[key.strip()] = _value(key.strip(), value)
-    short_entries = {f"simulation.{name}": text for name, text in short.items() if text is not None}
-    if twice := [key for key in short_entries if key in entries]:
-        raise wrong("--set", f"{twice[0]}: --{twice[0].rpartition('.')[2]} sets the same entry")
-    return entries | {key: _value(key, text) for key, text in short_entries.items()}
+            raise invalid("--set", f"{text}: an earlier one sets the same entry")
+        entries[key.strip()] = _parse_value(key.strip(), value)
+    short_entries = {f"simulation.{name}": text for name, text in short_options.items() if text is not None}
+    if repeated := [key for key in short_entries if key in entries]:
+        raise invalid("--set", f"{repeated[0]}: --{repeated[0].rpartition('.')[2]} sets the same entry")
+    return entries | {key: _parse_value(key, text) for key, text in short_entries.items()}
 
 
-def _value(key: str, text: str) -> Any:
+def _parse_value(key: str, text: str) -> Any:
     text = text.strip()
     try:
         table = tomllib.loads(f"value = {text}")
@@ -85,10 +85,10 @@ def _value(key: str, text: str) -> Any:
     except (ValueError, RecursionError):
         if _BARE_STRING.fullmatch(text):
             return text
-    raise wrong(key, f"{text[:80]}: must be TOML, such as 2.0, true, [1, 2] or a name")
+    raise invalid(key, f"{text[:80]}: must be TOML, such as 2.0, true, [1, 2] or a name")
 
 
-def pool(workers: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:
+def open_pool(workers: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:
     """Return the executor of a study's runs, open while entered: threads, or the workers of a Dask scheduler.
 
     Raises:
@@ -96,12 +96,12 @@ def pool(workers: int | None, scheduler: str | None) -> AbstractContextManager[E
     """
     if scheduler is not None:
         if workers is not None:
-            raise wrong("--workers", "are local; those of a scheduler are its own")
+            raise invalid("--workers", "are local; those of a scheduler are its own")
         return _dask(scheduler)
     from finger_pin.core.threads import usable_cores
 
     if workers is not None and workers < 1:
-        raise wrong("--workers", f"must be at least 1, not {workers}")
+        raise invalid("--workers", f"must be at least 1, not {workers}")
     return ThreadPoolExecutor(workers or usable_cores())
 
 
@@ -110,21 +110,21 @@ def _dask(address: str) -> Iterator[Executor]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError:
-        raise wrong("--scheduler", f"needs Dask: {installing('dask')}") from None
-    # An error says what the client would log about a lost scheduler.
+        raise invalid("--scheduler", f"needs Dask: {installing('dask')}") from None
+    # The error reports what the client would log about a lost scheduler.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
-        client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
+        client = distributed.Client(address, timeout=_CONNECTION_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        what = f"{address}: cannot be reached: {str(error) or type(error).__name__}"
-        raise wrong("--scheduler", what) from None
+        problem = f"{address}: cannot be reached: {str(error) or type(error).__name__}"
+        raise invalid("--scheduler", problem) from None
     with client:
         yield client.get_executor(pure=False)
 
 
 def numbers(option: str, text: str) -> list[float]:
     """Return the finite numbers of a text with commas between."""
-    return [number(option, each) for each in text.split(",")]
+    return [number(option, part) for part in text.split(",")]
 
 
 def number(option: str, text: str | float, *, positive: bool = False) -> float:
@@ -134,9 +134,9 @@ def number(option: str, text: str | float, *, positive: bool = False) -> float:
     except ValueError:
         value = float("nan")
     if not abs(value) < float("inf"):
-        raise wrong(option, f"{text}: must be a finite number")
+        raise invalid(option, f"{text}: must be a finite number")
     if positive and not value > 0.0:
-        raise wrong(option, f"{text}: must be above 0")
+        raise invalid(option, f"{text}: must be above 0")
     return value
 
 
@@ -144,14 +144,15 @@ def folder_name(name: str, *variants: str) -> str:
     """Return the name of a folder for a scenario and its changes.
 
     Args:
-        name: Of the scenario, or of a study on it.
-        variants: Such as ``controller.gain=2``. What a shell would want to have quoted is replaced; what is
-            too long, or lost that way, is told apart by a digest.
+        name: Name of the scenario, or of a study on it.
+        variants: Changes such as ``controller.gain=2``. Characters that a shell would need quoted are replaced; names
+            that are too long, or changed that way, end with a digest.
     """
     unquoted = [re.sub(r"[\s\[\]{}\"']", "", each) for each in variants]
-    words = [_OUTER.sub("", each).replace("=", "-").replace(":", "to").replace(",", "_") for each in unquoted]
+    words = [_OMITTED_TABLES.sub("", each).replace("=", "-").replace(":", "to").replace(",", "_") for each in unquoted]
     text = "-".join([name, *words])
-    plain = re.sub(r"[^\w.+-]+", "_", text, flags=re.ASCII)
-    if plain == text and len(text) <= _LONGEST:
+    ascii_text = re.sub(r"[^\w.+-]+", "_", text, flags=re.ASCII)
+    if ascii_text == text and len(text) <= _MAX_NAME_LENGTH:
         return text
-    return f"{plain[:_LONGEST]}-{hashlib.sha256(','.join(unquoted).encode(errors='surrogateescape')).hexdigest()[:6]}"
+    digest = hashlib.sha256(",".join(unquoted).encode(errors="surrogateescape")).hexdigest()[:6]
+    return f"{ascii_text[:_MAX_NAME_LENGTH]}-{digest}"

@@ -1,4 +1,4 @@
-"""The command self-locking: the joint friction at which a finger grips itself."""
+"""The command self-locking: the joint friction at which a finger locks itself."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from finger_pin.commands.console import print_text, talks
-from finger_pin.commands.options import Format, ScenarioName, wrong
+from finger_pin.commands.console import print_text, shows_progress
+from finger_pin.commands.options import Format, ScenarioName, invalid
 
 if TYPE_CHECKING:
     from finger_pin.description.scenario import Scenario
 
-SHARES = (0.5, 0.8, 0.9, 1.1, 1.4)
+FRICTION_FACTORS = (0.5, 0.8, 0.9, 1.1, 1.4)
 
 
 def self_locking(
@@ -28,7 +28,7 @@ def self_locking(
 
     Of a finger that springs return it reports the tensions between which the cord holds it, and whether it comes back.
     """
-    talks(quiet=False)
+    shows_progress(quiet=False)
     import numpy as np
 
     import finger_pin as fp
@@ -38,10 +38,10 @@ def self_locking(
 
     loaded = fp.load_scenario(scenario)
     finger = loaded.finger
-    sprung = finger.hand is None and any(joint.spring for joint in finger.joints.values())
-    if sprung and not fp.Finger(finger).routing.force_closure().holds:
-        if unused := [name for name, each in (("--output", output), ("--format", format)) if each is not None]:
-            raise wrong(unused[0], "has no effect: of a finger that springs return nothing is drawn")
+    has_springs = finger.hand is None and any(joint.spring for joint in finger.joints.values())
+    if has_springs and not fp.Finger(finger).routing.force_closure().holds:
+        if unused := [name for name, value in (("--output", output), ("--format", format)) if value is not None]:
+            raise invalid(unused[0], "has no effect: of a finger that springs return nothing is drawn")
         print_text(summarize_return(fp.analysis.spring_return(finger)))
         return
     output = output or Path("results/self_locking")
@@ -52,11 +52,11 @@ def self_locking(
     figures = {"critical_friction": plot_critical_friction(finger), "map": plot_self_locking_map(locking_map)}
     if np.isfinite(margin.margin):
         with warnings.catch_warnings():
-            # Runs on both sides are the point.
+            # Runs on both sides of locking are intended, so their warnings are not news.
             warnings.simplefilter("ignore", fp.exceptions.ScenarioWarning)
             runs = {
-                f"{share:g} of critical": fp.simulate(scaled(scenario, loaded, share * margin.margin))
-                for share in SHARES
+                f"{factor:g} of critical": fp.simulate(with_scaled_friction(scenario, loaded, factor * margin.margin))
+                for factor in FRICTION_FACTORS
             }
         figures["runs"] = plot_runaway(runs)
     for title, figure in figures.items():
@@ -64,13 +64,13 @@ def self_locking(
     print_text(f"{text}\n\nFigures are in {output}")
 
 
-def scaled(name: str, scenario: Scenario, factor: float) -> Scenario:
+def with_scaled_friction(name: str, scenario: Scenario, factor: float) -> Scenario:
     """Return the scenario with M^c of the joints multiplied by a factor, and M^d equal to M^c."""
     import numpy as np
 
     from finger_pin.description.loading import load_scenario
 
     friction = scenario.finger.joint_friction
-    static = (factor * np.asarray(friction.break_away)).tolist()
+    friction_values = (factor * np.asarray(friction.break_away)).tolist()
     keys = ("coulomb",) if friction.law in ("dahl", "coulomb") else ("coulomb", "stiction")
-    return load_scenario(name, {f"finger.joint_friction.{key}": static for key in keys})
+    return load_scenario(name, {f"finger.joint_friction.{key}": friction_values for key in keys})

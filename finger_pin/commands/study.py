@@ -1,4 +1,4 @@
-"""The frame of commands that make a study of many runs: a bar, Ctrl-C, a figure, a summary."""
+"""Common part of commands that run a study: a progress bar, Ctrl-C, a figure, a summary."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger_pin.cancellation import CancelToken, Stop
-from finger_pin.commands.console import noted, print_text, runs_bar, talks
+from finger_pin.commands.console import error_note, print_text, runs_bar, shows_progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from finger_pin.studies.records import Progress
 
 
-def conduct(
-    what: str,
+def run_study(
+    label: str,
     run: Callable[[Progress | None, Stop], xr.Dataset],
     summary: Callable[[xr.Dataset], str],
     figure: str,
@@ -27,26 +27,26 @@ def conduct(
     quiet: bool,
     unfinished: Callable[[xr.Dataset], bool] = lambda result: True,
 ) -> xr.Dataset:
-    """Make a study, draw it and print its summary; return its result.
+    """Run a study, draw it and print its summary; return its result.
 
     Args:
-        what: Word before the progress bar.
-        run: Makes it, with what takes its progress and what says that it is to stop.
-        summary: Of its result.
-        figure: Name of the file, and after ``plot_`` of what draws it.
+        label: Word before the progress bar.
+        run: Function of the progress callback and the stop check that returns the result of the study.
+        summary: Function that returns the summary of the result.
+        figure: Name of the file, and after ``plot_`` of the function that draws it.
         output: Folder of the study.
         figures: Whether to draw.
         format: Of the figure.
         quiet: Whether to print nothing.
-        unfinished: Whether a result that was interrupted lacks something.
+        unfinished: Function that returns whether an interrupted result lacks runs.
 
     Raises:
         KeyboardInterrupt: After all that, if it was interrupted.
     """
-    shown = talks(quiet)
+    visible = shows_progress(quiet)
     token = CancelToken()
-    with noted("the same command continues from what is recorded"):
-        with runs_bar(shown, what) as progress, token:
+    with error_note("the same command continues from what is recorded"):
+        with runs_bar(visible, label) as progress, token:
             result = run(progress, token)
         if figures and not token.cancelled:
             from finger_pin.views import plots

@@ -18,12 +18,12 @@ from finger_pin.commands.options import (
     Settings,
     Workers,
     folder_name,
+    invalid,
+    open_pool,
     overrides,
-    pool,
     refuse_format,
-    wrong,
 )
-from finger_pin.commands.study import conduct
+from finger_pin.commands.study import run_study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,28 +77,28 @@ def sweep(
     """
     if listed:
         return print_text(listing())
-    _check(design, over, samples, seed)
+    _check_options(design, over, samples, seed)
     refuse_format(figures, format)
     if restart and retry_failed:
-        raise wrong("--retry-failed", "has no effect with --restart, which repeats all runs")
-    changed, crew = overrides(settings), pool(workers, scheduler)
+        raise invalid("--retry-failed", "has no effect with --restart, which repeats all runs")
+    changes, executor_context = overrides(settings), open_pool(workers, scheduler)
     from finger_pin.exceptions import StudyError
     from finger_pin.studies import sweep
     from finger_pin.studies.keys import BaseScenario
 
     points = build_design(design, over, samples, seed or 0)
-    name = BaseScenario.from_scenario(scenario, changed).scenario.name
-    chosen = [*over, *metric, *([] if design == "grid" else [design, f"{samples}", f"{seed or 0}"])]
-    folder = output or Path("results", folder_name(f"sweep-{name}", *settings, *chosen))
+    name = BaseScenario.from_scenario(scenario, changes).scenario.name
+    name_parts = [*over, *metric, *([] if design == "grid" else [design, f"{samples}", f"{seed or 0}"])]
+    folder = output or Path("results", folder_name(f"sweep-{name}", *settings, *name_parts))
 
     def run(progress: Progress | None, stop: Stop) -> xr.Dataset:
-        with crew as executor:
+        with executor_context as executor:
             try:
                 return sweep(
                     scenario,
                     points,
                     metrics=metric or None,
-                    overrides=changed,
+                    overrides=changes,
                     output=folder,
                     executor=executor,
                     restart=restart,
@@ -109,28 +109,24 @@ def sweep(
             except StudyError as error:
                 return error.result  # the summary says why runs failed
 
-    _require_done(
-        conduct("sweep", run, summary, "sweep", folder, figures=figures, format=format, quiet=quiet, unfinished=misses)
+    result = run_study(
+        "sweep", run, summary, "sweep", folder, figures=figures, format=format, quiet=quiet, unfinished=is_partial
     )
-
-
-def _require_done(result: xr.Dataset) -> None:
-    """Raise if every run failed."""
     if (result["status"] == "failed").all():
         raise Unsuccessful(f"every run failed; the first one: {result['reason'].values.flat[0]}")
 
 
-def _check(design: str, over: list[str], samples: int | None, seed: int | None) -> None:
+def _check_options(design: str, over: list[str], samples: int | None, seed: int | None) -> None:
     """Refuse options that do not go together."""
     if not over:
-        raise wrong("--over", "at least one key is needed, such as --over controller.gain=0.5:2:7")
+        raise invalid("--over", "at least one key is needed, such as --over controller.gain=0.5:2:7")
     if (samples is None) == (design == "latin"):
-        raise wrong("--samples", "is needed by --design latin, and by no other")
+        raise invalid("--samples", "is needed by --design latin, and by no other")
     if seed is not None and design != "latin":
-        raise wrong("--seed", "is for --design latin")
+        raise invalid("--seed", "is for --design latin")
 
 
-def misses(result: xr.Dataset) -> bool:
+def is_partial(result: xr.Dataset) -> bool:
     """Return true if some runs were not made."""
     return bool((result["status"] == "missing").any())
 
@@ -139,12 +135,12 @@ def build_design(kind: str, over: list[str], samples: int | None, seed: int) -> 
     """Return the design that the options describe."""
     from finger_pin.exceptions import InputError
     from finger_pin.studies import Grid, LatinHypercube, PointList
-    from finger_pin.studies.parsing import parse_range, parse_values
+    from finger_pin.studies.parsers import parse_range, parse_values
 
-    parse_one: Any = parse_range if kind == "latin" else parse_values
+    parse: Any = parse_range if kind == "latin" else parse_values
     axes: dict[str, Any] = {}
     for text in over:
-        key, values = parse_one(text)
+        key, values = parse(text)
         if key in axes:
             raise InputError("over", "a key must not come twice", text)
         axes[key] = values
@@ -165,10 +161,13 @@ def summary(result: xr.Dataset) -> str:
             rows.append((str(name), *ends, result[name].attrs["units"]))
     width = max(len(row[0]) for row in rows)
     lines = [f"{status.size} runs: {', '.join(counts)}", ""]
-    lines += [f"  {a.ljust(width)}{b.rjust(12)}{c.rjust(12)}  {d}".rstrip() for a, b, c, d in rows]
+    lines += [
+        f"  {name.ljust(width)}{least.rjust(12)}{greatest.rjust(12)}  {unit}".rstrip()
+        for name, least, greatest, unit in rows
+    ]
     reasons = sorted(set(result["reason"].values.ravel()) - {""})
     if reasons:
-        lines += ["", "Why runs failed"] + [f"  {each}" for each in reasons[:5]]
+        lines += ["", "Why runs failed"] + [f"  {reason}" for reason in reasons[:5]]
         lines += [f"  and {len(reasons) - 5} more: see sweep.nc"] if len(reasons) > 5 else []
     return "\n".join(lines)
 

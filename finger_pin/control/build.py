@@ -156,7 +156,7 @@ def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:
         return None
     settings = [signals.get(axis, ForceSignal()) for signals in tips for axis in AXES]
     force = Signal.from_settings(settings, scenario.simulation.rtol)
-    return FingertipForce(force.later(scenario.simulation.start_time), finger.rigid_body.jacobian)
+    return FingertipForce(force.starting_at(scenario.simulation.start_time), finger.rigid_body.jacobian)
 
 
 def _believed(setting: Numbers | None, actual: Array) -> Array:

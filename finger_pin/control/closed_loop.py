@@ -117,11 +117,13 @@ class ClosedLoop:
         if fingertip_force is not None:
             columns = AXES if single else [f"{name}.{axis}" for name in environments for axis in AXES]
             force = Signal.from_samples("fingertip_force", fingertip_force, columns, scenario.simulation.rtol)
-            loop = replace(loop, fingertip_force=np.zeros_like(loop.fingertip_force), varying_force=force.later(start))
+            loop = replace(
+                loop, fingertip_force=np.zeros_like(loop.fingertip_force), varying_force=force.starting_at(start)
+            )
         elif any(signals):
             settings = [each.get(axis, _NO_FORCE) for each in signals for axis in AXES]
             force = Signal.from_settings(settings, scenario.simulation.rtol)
-            loop = replace(loop, varying_force=force.later(start))
+            loop = replace(loop, varying_force=force.starting_at(start))
         initial, keyframe = scenario.simulation.initial, scenario.keyframe
         if initial is not None or keyframe is not None:
             angles = (keyframe.position if keyframe else {}) | (initial.position if initial else {})
@@ -180,7 +182,7 @@ class ClosedLoop:
         path_signals = [each and each.signal for each in (self.palm, self.prescribed_motion)]
         signals_beside = [each for each in (self.varying_force, *path_signals) if each]
         signals = (*self.reference.signals(), *self.controller.signals(), *signals_beside)
-        return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
+        return np.unique(np.concatenate([np.zeros(0), *(each.step_ends(tolerance) for each in signals)]))
 
     def spool_goals(self, time: Array) -> Array | None:
         """Return theta_m^d of the motors in position drive at times (m,), shape (m, k), rad; None without loops."""

@@ -43,5 +43,5 @@ def sampled_voltages(signals: Mapping[int, Signal], times: Array, start_time: fl
     """Return voltages of motors at times of a motion, shape (k, m), V; without a signal the others, shape (m,)."""
     values: Array = np.tile(default, (len(times), 1))
     for motor, signal in signals.items():
-        values[:, motor] = signal.later(start_time).at(times)[0][:, 0]
+        values[:, motor] = signal.starting_at(start_time).at(times)[0][:, 0]
     return values

@@ -83,7 +83,7 @@ class OpenLoopTensions(LoopController):
     def _from_signal(cls, signal: Signal, scenario: Scenario, routing: Routing) -> OpenLoopTensions:
         """Return the signals after the delays of a tree's actuators, their time counted from that of the start."""
         delays = input_delays(scenario.finger, routing)
-        return cls(signal.delayed(delays).later(scenario.simulation.start_time), routing)
+        return cls(signal.delayed(delays).starting_at(scenario.simulation.start_time), routing)
 
     def without_delays(self, finger: FingerDescription) -> OpenLoopTensions:
         """Return the inputs as they are commanded, before the delays of a tree's actuators."""

@@ -46,7 +46,9 @@ class PalmPath:
             return None
         settings = [hand.palm.on_path(name) for name in PATH]
         has_world_objects = finger is not None and bool(finger.layout.names_of("world_position"))
-        return cls(Signal.from_settings(settings, tolerance).later(start), np.array(hand.gravity), has_world_objects)
+        return cls(
+            Signal.from_settings(settings, tolerance).starting_at(start), np.array(hand.gravity), has_world_objects
+        )
 
     def place(self, time: Array | float) -> tuple[Array, Array]:
         """Return the palm's place, shape (..., 3), m, and rotation to the world, (..., 3, 3), at times (...)."""
@@ -149,7 +151,7 @@ class PrescribedPaths:
             np.array([names.index(name) for name in selected], dtype=np.int64)
             for names, selected in ((list(finger.routing.joints), on_paths), (list(moving), paths))
         )
-        signal = Signal.from_settings([*on_paths.values(), *settings], tolerance).later(start)
+        signal = Signal.from_settings([*on_paths.values(), *settings], tolerance).starting_at(start)
         return cls(signal, joints, objects, np.array(finger.rigid_body.model.gravity.linear))
 
     def place(self, finger: Finger, x: Array) -> Array:

@@ -186,7 +186,7 @@ def spool_goals(
     excursion = finger.excursion(desired.position)
     goals = actuators.angle(desired.position, planned[:, : finger.routing.actuated], excursion)
     for motor, (signal, radius) in windings.items():
-        goals[:, motor] = signal.later(start_time).at(times)[0][:, 0] / radius
+        goals[:, motor] = signal.starting_at(start_time).at(times)[0][:, 0] / radius
     return goals
 
 

@@ -22,9 +22,9 @@ from finger_pin.identification.scenario_parameters import NuisanceParameter, nui
 from finger_pin.identification.starts import check_reachable, far_start_warning, recorded_starts, start_parameters
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.recording import RunArrays, recorded
+from finger_pin.simulation.recording import RunArrays, record_arrays
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
-from finger_pin.simulation.sensitivity import changed, nearby, with_exact_encoders
+from finger_pin.simulation.sensitivity import make_variations, repeat_steps, with_exact_encoders
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates
 from finger_pin.typing import Array
@@ -128,7 +128,9 @@ class RecordedMotion:
         base_outputs, motion = self._run(*current, factor)
         if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
-        changed_points, changes = changed(values.tolist(), sizes.tolist(), lambda point: scenario_map(np.array(point)))
+        changed_points, changes = make_variations(
+            values.tolist(), sizes.tolist(), lambda point: scenario_map(np.array(point))
+        )
         affected = [
             k
             for k, (scenario, nuisance) in enumerate(changed_points)
@@ -138,7 +140,7 @@ class RecordedMotion:
         setups = {k: self._setup(*changed_points[k]) for k in affected}
         # Repeat the unchanged run too, so that outputs that a parameter does not affect differ by exactly zero.
         base_setup = self._setup(*current)
-        base_run, *neighbours = nearby(motion[1], [base_setup, *setups.values()])
+        base_run, *neighbours = repeat_steps(motion[1], [base_setup, *setups.values()])
         runs = dict(zip(affected, neighbours, strict=True))
         computed = base_outputs if base_run.failure else self._outputs(base_setup, base_run, current[1])
         ranges = [float(np.ptp(each)) for each in base_outputs]
@@ -182,8 +184,8 @@ class RecordedMotion:
         assert initial is not None
         if starts.items() <= initial.position.items() and speeds.items() <= initial.velocity.items():
             return scenario
-        changed = {"position": {**initial.position, **starts}, "velocity": {**initial.velocity, **speeds}}
-        return scenario.updated(simulation={"initial": changed})
+        initial_state = {"position": {**initial.position, **starts}, "velocity": {**initial.velocity, **speeds}}
+        return scenario.updated(simulation={"initial": initial_state})
 
     def _setup(self, scenario: Scenario, nuisance: Mapping[str, float]) -> Setup:
         corrected = self._with_nuisance(scenario, nuisance)
@@ -230,7 +232,7 @@ class RecordedMotion:
         names = dict.fromkeys(key.partition(".")[0] for key, lag in delays.items() if lag == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
         motions = SampledTrajectory(setup.loop, trajectory, times, tuple(names))
-        arrays = recorded(motions, tuple(names), f"{self._entry}.outputs")
+        arrays = record_arrays(motions, tuple(names), f"{self._entry}.outputs")
         return RunArrays(arrays, coordinates(setup.scenario, setup.loop, times), {})
 
     def _column(self, arrays: RunArrays, name: str) -> Array:

@@ -1,4 +1,4 @@
-"""Actions of a policy: tensions that are held, lengths that winches wind, or goals of motors in position drive."""
+"""Actions of a policy: constant tensions, lengths that winches wind, or goals of motors in position drive."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from finger_pin.references.reference import ReferenceSignals
 from finger_pin.typing import Array
 
 # Of the tensions that goals of joints stretch tendons by, which turn no joint, the largest, N.
-_CLOSING = 5.0
+_CLOSING_TENSION = 5.0
 # What loops remember of their samples.
-_MEMORY = ("sample_count", "integral", "last", "voltages", "errors", "integrals")
+_DRIVE_STATE = ("sample_count", "integral", "last", "voltages", "errors", "integrals")
 
 
 class Action(LoopController):
@@ -34,10 +34,10 @@ class Action(LoopController):
     Attributes:
         low: Least action, shape (k,).
         high: Largest action, shape (k,).
-        given: The last action, shape (k,).
-        held: BatchedSnapshot inputs, shape (u,), N; zero before the first action, and for motors in position drive.
+        last_action: The last action, shape (k,).
+        inputs: Present inputs, shape (u,); zero before the first action, and for motors in position drive.
         channels: Inputs that are voltages of motors in position drive.
-        names: Of the numbers of an action.
+        names: Names of the components of an action.
     """
 
     def __init__(self, kind: str, finger: Finger, duration: float, nominal: Finger, coupling: PassiveCoupling) -> None:
@@ -58,17 +58,17 @@ class Action(LoopController):
         self._drives: Drives | None = None
         if kind == "tension":
             if holds.any():
-                names = [name for name, holding in zip(finger.actuators.names, holds, strict=True) if holding]
+                names = [name for name, positioned in zip(finger.actuators.names, holds, strict=True) if positioned]
                 raise InputError("action", f'"tension" is not for motors in position drive: {", ".join(names)}')
             if finger.routing.winched.any():
                 raise InputError("action", '"tension" is not for winches; "tendon_winding" is')
             self.low, self.high = input_ranges(finger)
             self.names = finger.input_names
-            self._goals: Callable[[Array], Array] = np.array
+            self._to_goals: Callable[[Array], Array] = np.array
         elif kind == "tendon_winding" and finger.routing.winched.all() and finger.routing.actuated:
             self.low, self.high = input_ranges(finger)
             self.names = finger.input_names
-            self._goals = np.array
+            self._to_goals = np.array
         else:
             if len(finger.actuators.positioned) != finger.mechanism.channels:
                 winches = ", or winches" if kind == "tendon_winding" else ""
@@ -76,14 +76,14 @@ class Action(LoopController):
             radius = finger.actuators.radius
             if kind == "joint_position":
                 free = np.delete(np.arange(len(finger.routing.joints)), coupling.followers)
-                limiter, self._goals = nominal.stroke_limiter, partial(_spools, nominal, coupling, free)
+                limiter, self._to_goals = nominal.stroke_limiter, partial(_spool_angles, nominal, coupling, free)
                 self.low, self.high = limiter.lower[free], limiter.upper[free]
                 self.names = tuple(finger.routing.joints[k] for k in free)
             else:
                 self.names = finger.actuators.names
                 scale = radius if kind == "tendon_winding" else np.ones(len(radius))
-                self._goals = partial(_over, scale)
-                self.low, self.high = (each * scale for each in spool_ranges(finger))
+                self._to_goals = partial(_divide, scale)
+                self.low, self.high = (limit * scale for limit in spool_ranges(finger))
             rows = math.ceil(duration / loop_period(finger)) + 1
             self._drives = build_drives(finger, np.zeros((rows, len(radius))))
         self.reset(0.0)
@@ -97,83 +97,83 @@ class Action(LoopController):
         """Reset for an episode with an action delay, s."""
         self._delay, self.last_action = delay, self.low.copy()
         self.inputs = np.zeros(self._finger.mechanism.channels)
-        self._begins: list[float] = []
-        self._values: list[Array] = []
-        self._value = self.inputs
+        self._starts: list[float] = []
+        self._inputs: list[Array] = []
+        self._input = self.inputs
         self._queue = InputQueue(input_delays(self._finger.description, self._finger.routing))
-        self._waiting: deque[tuple[float, Array]] = deque()
+        self._pending: deque[tuple[float, Array]] = deque()
         if self._drives is not None:
-            for name in _MEMORY:
+            for name in _DRIVE_STATE:
                 getattr(self._drives, name)[:] = 0
 
-    def take(self, action: Array, time: float) -> None:
+    def apply(self, action: Array, time: float) -> None:
         """Apply an action at a time, s; the first one has no delay."""
         self.last_action = action
-        arrival = time + self._delay if self._begins or self._waiting else time
-        self._waiting.append((arrival, self._goals(action)))
+        arrival_time = time + self._delay if self._starts or self._pending else time
+        self._pending.append((arrival_time, self._to_goals(action)))
 
-    def next_piece(self, stepper: Stepper, begin: float, end: float) -> float:
-        """Hold the inputs that have arrived; return the time until which they act, s, at most the end.
+    def next_piece(self, stepper: Stepper, start: float, end: float) -> float:
+        """Apply the inputs that have arrived; return the time until which they act, s, at most the end.
 
         Args:
-            stepper: Stepper that holds it.
-            begin: Now, s.
-            end: Of the control period, s.
+            stepper: Stepper that gets the inputs.
+            start: Now, s.
+            end: End of the control period, s.
         """
-        while self._waiting and self._waiting[0][0] <= begin:
-            self._value = self._waiting.popleft()[1]
+        while self._pending and self._pending[0][0] <= start:
+            self._input = self._pending.popleft()[1]
             if self._drives is not None:
                 # A sample at this instant has been taken already, but not before the first action.
-                self._drives.goals[int(self._drives.latest(begin)) + 1 if self._begins else 0 :] = self._value
+                self._drives.goals[int(self._drives.latest(start)) + 1 if self._starts else 0 :] = self._input
             else:
-                self._queue.add(begin, self._value)
+                self._queue.add(start, self._input)
         if self._drives is None:
-            self.inputs = self._value = self._queue.at(begin)
-            stepper.hold(self._value)
-            end = self._queue.next_arrival(begin, end)
-        self._begins.append(begin)
-        self._values.append(self._value)
-        return min(self._waiting[0][0], end) if self._waiting else end
+            self.inputs = self._input = self._queue.at(start)
+            stepper.hold(self._input)
+            end = self._queue.next_arrival(start, end)
+        self._starts.append(start)
+        self._inputs.append(self._input)
+        return min(self._pending[0][0], end) if self._pending else end
 
-    def again(self) -> Drives:
+    def restarted_drives(self) -> Drives:
         """Return the loops of an episode with the same goals, to run once more from its start."""
         drives = self._drives
         assert drives is not None
-        return drives._replace(**{name: np.zeros_like(getattr(drives, name)) for name in _MEMORY})
+        return drives._replace(**{name: np.zeros_like(getattr(drives, name)) for name in _DRIVE_STATE})
 
-    def replayed(self) -> Replayed:
-        """Return a controller that holds the same inputs once more, and ends steps where the episode did."""
+    def recorded_inputs(self) -> RecordedInputs:
+        """Return a controller that repeats the inputs, and ends steps where the episode did."""
         if self._drives is None:
-            return Replayed(self._begins, self._values)
+            return RecordedInputs(self._starts, self._inputs)
         # The loops set all inputs.
-        return Replayed(self._begins, [np.zeros_like(self.inputs)] * len(self._begins))
+        return RecordedInputs(self._starts, [np.zeros_like(self.inputs)] * len(self._starts))
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
-        """Return the inputs held at the present or an earlier time, or at times (m,); zero before the first action."""
+        """Return the inputs at the present or an earlier time, or at times (m,); zero before the first action."""
         routing = self._finger.routing
-        lead = np.shape(time)
-        tension, inputs = np.zeros((*lead, len(routing.tendons))), None
-        if self._drives is None and self._begins:
-            held_inputs = np.array(self._values)[self._places(time)]
-            tension[..., : routing.actuated] = held_inputs[..., : routing.actuated]
-            inputs = held_inputs[..., routing.actuated :] if held_inputs.shape[-1] > routing.actuated else None
-        return ControlSignals(np.zeros((*lead, len(routing.joints))), tension, inputs=inputs)
+        shape = np.shape(time)
+        tension, inputs = np.zeros((*shape, len(routing.tendons))), None
+        if self._drives is None and self._starts:
+            inputs_at_time = np.array(self._inputs)[self._indices(time)]
+            tension[..., : routing.actuated] = inputs_at_time[..., : routing.actuated]
+            inputs = inputs_at_time[..., routing.actuated :] if inputs_at_time.shape[-1] > routing.actuated else None
+        return ControlSignals(np.zeros((*shape, len(routing.joints))), tension, inputs=inputs)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return the commands as they are: nothing is planned for motors in position drive."""
         return control
 
     def voltages(self, time: Array | float) -> Array:
-        """Return the voltages held at one time, or at times (m,), by motor, V."""
+        """Return the voltages at one time, or at times (m,), by motor, V."""
         assert self._drives is not None
         return self._drives.zero_order_hold(self._drives.voltages, time)
 
-    def _places(self, time: Array | float) -> Array:
-        return np.maximum(np.searchsorted(self._begins, np.asarray(time) * (1.0 + 1e-12), side="right") - 1, 0)
+    def _indices(self, time: Array | float) -> Array:
+        return np.maximum(np.searchsorted(self._starts, np.asarray(time) * (1.0 + 1e-12), side="right") - 1, 0)
 
-    def limited(self, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Array, Array]:
+    def action_range(self, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Array, Array]:
         """Return least and largest action, shape (k,) each.
 
         Raises:
@@ -182,43 +182,43 @@ class Action(LoopController):
         if limits is None:
             return self.low, self.high
         try:
-            low, high = (np.broadcast_to(np.asarray(each, dtype=float), self.low.shape) for each in limits)
+            low, high = (np.broadcast_to(np.asarray(limit, dtype=float), self.low.shape) for limit in limits)
         except (TypeError, ValueError):
             raise InputError("limits", f"must be a pair of numbers, or of {len(self.low)} each", limits) from None
         if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
             raise InputError("limits", "must be finite, the least below the largest", [low.tolist(), high.tolist()])
-        pulling = np.flatnonzero(~self._finger.routing.winched)
-        if self._drives is None and (low[pulling] < 0.0).any():
+        tension_channels = np.flatnonzero(~self._finger.routing.winched)
+        if self._drives is None and (low[tension_channels] < 0.0).any():
             raise InputError("limits", "tensions must not be negative: a tendon cannot push", low.tolist())
         return low, high
 
 
-def _over(scale: Array, action: Array) -> Array:
+def _divide(scale: Array, action: Array) -> Array:
     return np.asarray(action / scale)
 
 
-def _spools(finger: Finger, coupling: PassiveCoupling, free: NDArray[np.int64], goal: Array) -> Array:
+def _spool_angles(finger: Finger, coupling: PassiveCoupling, free_joints: NDArray[np.int64], goal: Array) -> Array:
     """Return the spool angles that goals of the free joints need, shape (m,), rad, with all tendons taut in balance."""
-    base = np.zeros(len(finger.routing.joints))
-    base[free] = goal
-    position, closure = coupling.matrix @ base + coupling.offset, finger.routing.force_closure()
-    tension = _CLOSING * closure.tension[: finger.routing.actuated]
+    free_position = np.zeros(len(finger.routing.joints))
+    free_position[free_joints] = goal
+    position, closure = coupling.matrix @ free_position + coupling.offset, finger.routing.force_closure()
+    tension = _CLOSING_TENSION * closure.tension[: finger.routing.actuated]
     return finger.actuators.angle(position, tension, finger.excursion(position))
 
 
-class Replayed:
-    """Inputs of an episode, held again from the same times on, at each of which a step ends."""
+class RecordedInputs:
+    """Controller that repeats the inputs of an episode from the same times on, at each of which a step ends."""
 
-    def __init__(self, begins: Sequence[float], values: Sequence[Array]) -> None:
-        """Take times, s, and the inputs held from each on."""
-        self._begins, self._values, self._next = begins, values, 0
+    def __init__(self, starts: Sequence[float], values: Sequence[Array]) -> None:
+        """Store start times, s, and the inputs from each on."""
+        self._starts, self._inputs, self._next = starts, values, 0
 
     @property
     def instant(self) -> float:
         """Time at which the next inputs begin, s."""
-        return self._begins[self._next] if self._next < len(self._begins) else math.inf
+        return self._starts[self._next] if self._next < len(self._starts) else math.inf
 
     def act(self, x: Array) -> Array:
         """Return the next inputs, shape (u,)."""
         self._next += 1
-        return self._values[self._next - 1]
+        return self._inputs[self._next - 1]

@@ -101,8 +101,8 @@ def is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
-def _check_bounds(owner: Uniform | LogUniform) -> None:
-    numbers = is_number(owner.low) and is_number(owner.high)
-    if not (numbers and math.isfinite(owner.low) and math.isfinite(owner.high) and owner.low <= owner.high):
+def _check_bounds(bounds: Uniform | LogUniform) -> None:
+    numbers = is_number(bounds.low) and is_number(bounds.high)
+    if not (numbers and math.isfinite(bounds.low) and math.isfinite(bounds.high) and bounds.low <= bounds.high):
         allowed = "low and high must be finite, and low not above high"
-        raise InputError(type(owner).__name__, allowed, [owner.low, owner.high])
+        raise InputError(type(bounds).__name__, allowed, [bounds.low, bounds.high])

@@ -18,17 +18,17 @@ from finger_pin.mechanism.coerce import FingerLike
 if TYPE_CHECKING:
     import xarray as xr
 
-_ALONE = np.zeros(1, dtype=np.int64)
+_FIRST_WORLD = np.zeros(1, dtype=np.int64)
 
 
 class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
-    """A scenario as an environment of Gymnasium: a policy pulls, once per control period.
+    """A scenario as an environment of Gymnasium: a policy acts once per control period.
 
         environment = fp.learning.Environment("fig6", reward=lambda signals: -abs(signals["joint_velocity"]).sum(-1))
         observation, _ = environment.reset(seed=1)
         observation, reward, terminated, truncated, info = environment.step(environment.action_space.sample())
 
-    What `reset` draws is in its ``info["drawn"]``, the privileged variables of a step in ``info["privileged"]``; a
+    The draws of `reset` are in its ``info["drawn"]``, the privileged variables of a step in ``info["privileged"]``; a
     motion that cannot go on truncates the episode, and ``info["reason"]`` says why. Observations are 32-bit floats in
     the units of the result's variables; actions are in N, rad or m.
     """
@@ -45,7 +45,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 and reference do not act; the reference's start is where episodes begin. Its tolerances are those of
                 the motion.
             finger: Replaces the finger that the scenario describes, as for `fp.simulate`, and its objects where it is
-                built already; what is drawn changes both.
+                built already; draws change both.
             render_mode: ``"rgb_array"`` for pictures, or None.
             task: The fields of `Task`:
 
@@ -65,10 +65,10 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 privileged: Variables that the policy does not see, for rewards, critics and logs.
                 done: A function of the signals: whether the task has ended (terminated).
                 period: Of control, s.
-                delay: From an action to when it arrives at the finger, s.
+                delay: Time from an action to its arrival at the finger, s.
                 duration: Of an episode, s, after which it is truncated.
-                draw: A function of a generator, of what holds for an episode, such as a goal: arrays by name, which are
-                    observed after the variables.
+                draw: A function of a generator that returns values of an episode, such as a goal, as arrays by name;
+                    they are observed after the variables.
                 start: ``"reference"``, ``"random"`` within the joints' ranges, or a function of a generator that
                     returns theta, shape (n,), rad.
                 randomise: Distributions by dotted key of the scenario, drawn at every reset; also ``action.delay``, s,
@@ -82,16 +82,16 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self._worlds = Worlds(scenario, self.task, 1, finger)
         self.observation_space, actions = self._worlds.spaces()
         self.action_space, self._limits = actions, (actions.low.astype(float), actions.high.astype(float))
-        self._begun = False
+        self._has_episode = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
         """Reset with sampled parameters, start and goal; the seed determines them."""
         super().reset(seed=seed)
-        self._begun = True
+        self._has_episode = True
         self._worlds.reset((0,), [self.np_random])
-        observations, _ = self._worlds.observe(_ALONE, judged=False)
+        observations, _ = self._worlds.observe(_FIRST_WORLD, for_reward=False)
         return observations[0], {"drawn": dict(self._worlds.worlds[0].sampled)}
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
@@ -101,11 +101,11 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             InputError: If the action has another shape or is not finite, or the reward is wrong.
             gymnasium.error.ResetNeeded: Before the first `reset`.
         """
-        if not self._begun:
+        if not self._has_episode:
             raise ResetNeeded("there is no episode yet: call reset before step")
         worlds, world = self._worlds, self._worlds.worlds[0]
         worlds.act(read_actions(action, *self._limits)[None], (0,))
-        observations, signals = worlds.observe(_ALONE)
+        observations, signals = worlds.observe(_FIRST_WORLD)
         reward, done = self.task.judge(signals, 1)
         info: dict[str, Any] = {"reason": world.reason} if world.reason else {}
         if self.task.privileged:

@@ -1,4 +1,4 @@
-"""Draws at a reset, by key: numbers of the scenario, of sensors, and the delay of the action."""
+"""Draws at a reset, by key: parameters of the scenario and of sensors, and the delay of the action."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Task
 
 #: The delay of the action, s.
-DELAY = "action.delay"
-_SENSOR = "observation."
-_OF_SENSOR = ("noise", "quantisation", "offset")
+DELAY_KEY = "action.delay"
+_SENSOR_PREFIX = "observation."
+_SENSOR_FIELDS = ("noise", "quantisation", "offset")
 # Of a scenario, what acts on an episode: its controller and its duration do not.
-_ACTING = ("finger.", "hand.", "environment.", "reference.", "simulation.initial.")
+_KEY_PREFIXES = ("finger.", "hand.", "environment.", "reference.", "simulation.initial.")
 
 
 class Randomisation:
@@ -34,7 +34,7 @@ class Randomisation:
         """Read a task.
 
         Raises:
-            InputError: If a key of a sensor or of the action is none.
+            InputError: If a key of a sensor or of the action does not exist.
         """
         source = task.randomise
         distributions = read_identified(source) if isinstance(source, str | os.PathLike) else source
@@ -47,85 +47,84 @@ class Randomisation:
             if not callable(getattr(distribution, "draw", None)):
                 allowed = "must be Uniform, LogUniform, Normal, Choice, or have draw(random)"
                 raise InputError(f"randomise.{key}", allowed)
-            if key.startswith("action.") and key != DELAY:
-                raise InputError("randomise", f"of the action only {DELAY} can be drawn", key)
-            if key.startswith(_SENSOR):
+            if key.startswith("action.") and key != DELAY_KEY:
+                raise InputError("randomise", f"of the action only {DELAY_KEY} can be drawn", key)
+            if key.startswith(_SENSOR_PREFIX):
                 self._check_sensor(key, task)
-                for end in _ends(distribution):
-                    Sensor(**{key.rpartition(".")[2]: end})
-            elif key == DELAY:
-                for end in _ends(distribution):
-                    self.delay({DELAY: end}, 0.0)
-            elif not key.startswith(_ACTING):
-                known = ", ".join([*_ACTING, _SENSOR, DELAY])
-                raise InputError("randomise", f"does not act on an episode; keys that do begin with {known}", key)
-        other = (DELAY,)
-        self.keys = tuple(key for key in self._distributions if key not in other and not key.startswith(_SENSOR))
+                for value in _end_values(distribution):
+                    Sensor(**{key.rpartition(".")[2]: value})
+            elif key == DELAY_KEY:
+                for value in _end_values(distribution):
+                    self.delay({DELAY_KEY: value}, 0.0)
+            elif not key.startswith(_KEY_PREFIXES):
+                prefixes = ", ".join([*_KEY_PREFIXES, _SENSOR_PREFIX, DELAY_KEY])
+                raise InputError("randomise", f"does not act on an episode; keys that do begin with {prefixes}", key)
+        self.keys = tuple(key for key in self._distributions if key != DELAY_KEY and not key.startswith(_SENSOR_PREFIX))
 
     @staticmethod
     def _check_sensor(key: str, task: Task) -> None:
-        name, _, number = key.removeprefix(_SENSOR).rpartition(".")
-        if name not in task.sensors or number not in _OF_SENSOR:
-            known = ", ".join(f"{_SENSOR}{each}.{{{','.join(_OF_SENSOR)}}}" for each in task.sensors)
-            raise InputError("randomise", f"no such number of a sensor; there are {known}", key)
+        name, _, field_name = key.removeprefix(_SENSOR_PREFIX).rpartition(".")
+        if name not in task.sensors or field_name not in _SENSOR_FIELDS:
+            keys = ", ".join(f"{_SENSOR_PREFIX}{sensor}.{{{','.join(_SENSOR_FIELDS)}}}" for sensor in task.sensors)
+            raise InputError("randomise", f"no such number of a sensor; there are {keys}", key)
 
     def sample_context(self, random: np.random.Generator) -> dict[str, Any]:
         """Return a value for every key."""
-        return {key: each.draw(random) for key, each in self._distributions.items()}
+        return {key: distribution.draw(random) for key, distribution in self._distributions.items()}
 
-    def ends(self) -> Iterator[list[Any]]:
-        """Yield the values at the keys with every distribution at an end: all least ones, all largest ones.
+    def corner_values(self) -> Iterator[list[Any]]:
+        """Yield the values at the keys with every distribution at an end: all lowest ones, all highest ones.
 
-        Of a `Choice` all values follow each other; what another distribution may draw is not known.
+        All values of a `Choice` follow each other; the ends of other distributions are unknown.
         """
-        ends = [_ends(self._distributions[key]) for key in self.keys]
-        if all(len(each) for each in ends):
-            for row in range(max(map(len, ends), default=0)):
-                yield [each[min(row, len(each) - 1)] for each in ends]
+        corner_values = [_end_values(self._distributions[key]) for key in self.keys]
+        if all(len(values) for values in corner_values):
+            for row in range(max(map(len, corner_values), default=0)):
+                yield [values[min(row, len(values) - 1)] for values in corner_values]
 
-    def sensor(self, name: str, sensor: Sensor, drawn: Mapping[str, Any]) -> Sensor:
-        """Return a sensor with the numbers that were drawn for it."""
-        keys = {number: f"{_SENSOR}{name}.{number}" for number in _OF_SENSOR}
-        drawn_entries = {number: drawn[key] for number, key in keys.items() if key in drawn}
-        return replace(sensor, **drawn_entries) if drawn_entries else sensor
+    def sensor(self, name: str, sensor: Sensor, draws: Mapping[str, Any]) -> Sensor:
+        """Return a sensor with the drawn parameters."""
+        keys = {field_name: f"{_SENSOR_PREFIX}{name}.{field_name}" for field_name in _SENSOR_FIELDS}
+        fields = {field_name: draws[key] for field_name, key in keys.items() if key in draws}
+        return replace(sensor, **fields) if fields else sensor
 
-    def delay(self, drawn: Mapping[str, Any], delay: float) -> float:
-        """Return the delay of the action that was drawn, s; that of the task if none was.
+    def delay(self, draws: Mapping[str, Any], delay: float) -> float:
+        """Return the drawn delay of the action, s; that of the task if none was drawn.
 
         Raises:
             InputError: If it is negative.
         """
-        drawn_delay = drawn.get(DELAY, delay)
-        if not is_number(drawn_delay) or not 0.0 <= drawn_delay < np.inf:
-            raise InputError(DELAY, "must be a finite number of seconds, not negative", drawn_delay)
-        return float(drawn_delay)
+        delay_draw = draws.get(DELAY_KEY, delay)
+        if not is_number(delay_draw) or not 0.0 <= delay_draw < np.inf:
+            raise InputError(DELAY_KEY, "must be a finite number of seconds, not negative", delay_draw)
+        return float(delay_draw)
 
 
-def _ends(distribution: Distribution) -> Sequence[Any]:
+def _end_values(distribution: Distribution) -> Sequence[Any]:
     """Return the least and the largest value that a distribution draws; of a normal one three deviations away."""
     if isinstance(distribution, Choice):
         return distribution.values
     if isinstance(distribution, Normal):
-        mean, far = distribution.mean, 3.0 * distribution.deviation
-        return max(mean - far, distribution.low), min(mean + far, distribution.high)
+        mean, distance = distribution.mean, 3.0 * distribution.deviation
+        return max(mean - distance, distribution.low), min(mean + distance, distribution.high)
     return (distribution.low, distribution.high) if isinstance(distribution, Uniform | LogUniform) else ()
 
 
 def read_identified(path: str | os.PathLike[str]) -> dict[str, Distribution]:
-    """Return the parameters of an identified scenario, each even over its 95 % interval.
+    """Return uniform distributions of the parameters of an identified scenario over their 95 % intervals.
 
     Args:
-        path: Of ``identified.toml``, beside which ``identification.nc`` stands.
+        path: Path of ``identified.toml``; ``identification.nc`` is in the same folder.
 
     Raises:
         InputError: If there is none, or a parameter is open at one side: it has no interval to draw from.
     """
     import xarray as xr
 
-    results = Path(path).with_name("identification.nc")
-    if not results.is_file():
-        raise InputError("randomise", f"has no {results.name} beside it, where the intervals stand", str(path))
-    with xr.open_dataset(results) as identified:
+    result_path = Path(path).with_name("identification.nc")
+    if not result_path.is_file():
+        raise InputError("randomise", f"has no {result_path.name} beside it, where the intervals stand", str(path))
+    with xr.open_dataset(result_path) as identified:
         keys, low, high = (identified[name].values for name in ("parameter", "lower", "upper"))
     distributions: dict[str, Distribution] = {}
     for key, least, most in zip(keys.tolist(), low.tolist(), high.tolist(), strict=True):

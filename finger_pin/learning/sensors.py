@@ -18,7 +18,7 @@ class Sensor:
     """A sensor of one variable, in the variable's unit.
 
     Attributes:
-        noise: Standard deviation of what is added to every sample.
+        noise: Standard deviation of the noise added to every sample.
         quantisation: Step to which samples are rounded; 0 for none.
         offset: Added to all samples, such as that of an encoder that was mounted turned.
         delay: Age of a sample when it is observed, s; a whole number of control periods.
@@ -54,45 +54,45 @@ class Measurement:
     def __init__(self, worlds: int, periods: int) -> None:
         """Create perfect sensors with a delay in control periods."""
         self._noise, self._quantisation, self._offset = np.zeros((3, worlds))
-        self._perfect = True
-        self._periods, self._kept = periods, np.zeros((periods + 1, worlds))
-        # How many samples a world has taken in its episode.
+        self._is_perfect = True
+        self._periods, self._history = periods, np.zeros((periods + 1, worlds))
+        # Number of samples in the present episode of each world.
         self._count = np.zeros(worlds, dtype=np.int64)
 
     def reset(self, world: int, sensor: Sensor) -> None:
         """Reset the sensor of a world, without samples."""
         numbers = sensor.noise, sensor.quantisation, sensor.offset
         self._noise[world], self._quantisation[world], self._offset[world] = numbers
-        self._perfect = not (self._noise.any() or self._quantisation.any() or self._offset.any())
+        self._is_perfect = not (self._noise.any() or self._quantisation.any() or self._offset.any())
         self._count[world] = 0
 
-    def sample(self, truth: Array, worlds: NDArray[np.int64], randoms: Sequence[np.random.Generator]) -> Array:
-        """Return the observation in some worlds; an episode's first sample stands for those before it.
+    def sample(self, values: Array, worlds: NDArray[np.int64], randoms: Sequence[np.random.Generator]) -> Array:
+        """Return the observation in some worlds; before a delay has passed it is the episode's first sample.
 
         Args:
-            truth: In these worlds, shape (k, ...).
-            worlds: Their numbers, shape (k,).
-            randoms: Of all worlds.
+            values: True values in these worlds, shape (k, ...).
+            worlds: Their indices, shape (k,).
+            randoms: Generators of all worlds.
         """
-        reading = truth if self._perfect else self._spoilt(truth, worlds, randoms)
+        reading = values if self._is_perfect else self._disturb(values, worlds, randoms)
         if not self._periods:
             return reading
-        if self._kept.shape[2:] != reading.shape[1:]:
-            self._kept = np.zeros((*self._kept.shape[:2], *reading.shape[1:]))
-        first, rows = self._count[worlds] == 0, len(self._kept)
-        self._kept[:, worlds[first]] = reading[first]
-        self._kept[self._count[worlds] % rows, worlds] = reading
+        if self._history.shape[2:] != reading.shape[1:]:
+            self._history = np.zeros((*self._history.shape[:2], *reading.shape[1:]))
+        is_first, rows = self._count[worlds] == 0, len(self._history)
+        self._history[:, worlds[is_first]] = reading[is_first]
+        self._history[self._count[worlds] % rows, worlds] = reading
         self._count[worlds] += 1
-        # One row further is the oldest.
-        return self._kept[self._count[worlds] % rows, worlds]
+        # The next row holds the oldest sample.
+        return self._history[self._count[worlds] % rows, worlds]
 
-    def _spoilt(self, truth: Array, worlds: NDArray[np.int64], randoms: Sequence[np.random.Generator]) -> Array:
-        wide = (-1, *(1 for _ in truth.shape[1:]))
-        reading = truth + self._offset[worlds].reshape(wide)
+    def _disturb(self, values: Array, worlds: NDArray[np.int64], randoms: Sequence[np.random.Generator]) -> Array:
+        column_shape = (-1, *(1 for _ in values.shape[1:]))
+        reading = values + self._offset[worlds].reshape(column_shape)
         for row, world in enumerate(worlds.tolist()):
             if self._noise[world]:
                 reading[row] += randoms[world].normal(0.0, self._noise[world], reading.shape[1:])
-        step = self._quantisation[worlds].reshape(wide)
+        step = self._quantisation[worlds].reshape(column_shape)
         return np.where(step > 0.0, step * np.round(reading / np.where(step > 0.0, step, 1.0)), reading)
 
 

@@ -1,4 +1,4 @@
-"""Variables of a result at one instant of worlds that go on, with worlds in place of instants."""
+"""Variables of a result at the present instant of several worlds, one row per world."""
 
 from __future__ import annotations
 
@@ -24,46 +24,46 @@ from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory
 from finger_pin.simulation.variables import variables
 from finger_pin.typing import Array
 
-_NOTHING, _EVER = Statistics(0, 0, 0, 0, 0.0), np.array([np.inf])
+_NO_STATISTICS, _ENDLESS = Statistics(0, 0, 0, 0, 0.0), np.array([np.inf])
 # Of a reference and a controller, which do not act.
-_OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
+_CONTROLLER_VARIABLES = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
 
 
 def snapshot(loop: ClosedLoop, time: float, x: Array) -> SampledTrajectory:
     """Return the signals of a state, shape (size,), at a time, s."""
-    return SampledTrajectory(loop, Trajectory(_EVER, lambda _: x[None], _NOTHING), np.array([time]))
+    return SampledTrajectory(loop, Trajectory(_ENDLESS, lambda _: x[None], _NO_STATISTICS), np.array([time]))
 
 
 # What a step changes in place, and views of it.
-_STAYING = {"loop", "times", "packed", "state", "_outputs"}
+_PERSISTENT = {"loop", "times", "packed", "state", "_outputs"}
 
 
 class BatchedSnapshot(SampledTrajectory):
     """Worlds at their present states, with signals that are computed on first use."""
 
     def __init__(self, loop: BatchedLoop) -> None:
-        """Make room for the present times, shape (w,), s, and packed states, shape (w, size)."""
+        """Allocate the present times, shape (w,), s, and packed states, shape (w, size)."""
         self.loop, count = loop, len(loop.loops)
         self._outputs = "all" if loop.accelerated else "no_acceleration"
         self.times, self.packed = np.zeros(count), np.zeros((count, loop.finger.layout.size))
 
-    def forget(self) -> None:
-        """Forget results of earlier states; views of the states remain."""
-        for name in vars(self).keys() - _STAYING:
+    def clear_signals(self) -> None:
+        """Delete the signals of earlier states; views of the states remain."""
+        for name in vars(self).keys() - _PERSISTENT:
             delattr(self, name)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all attributes but views, which a copy makes anew."""
-        return {name: value for name, value in vars(self).items() if name in _STAYING and name != "state"}
+        """Return all attributes but views, which a copy recreates."""
+        return {name: value for name, value in vars(self).items() if name in _PERSISTENT and name != "state"}
 
 
-def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
-    """Return the variables that are known at an instant, by name."""
+def instant_variables(loop: ClosedLoop) -> dict[str, Quantity]:
+    """Return the variables that are defined at an instant, by name."""
     return {
-        name: each
-        for name, each in variables(loop).items()
+        name: quantity
+        for name, quantity in variables(loop).items()
         # The account is of a whole run.
-        if each.energy_term is None and name not in (*_OF_CONTROLLERS, *LOOP_VARIABLES, RESIDUAL)
+        if quantity.energy_term is None and name not in (*_CONTROLLER_VARIABLES, *LOOP_VARIABLES, RESIDUAL)
     }
 
 
@@ -72,7 +72,7 @@ class BatchedLoop(ClosedLoop):
     """Batched loop of worlds, each at its own time.
 
     Attributes:
-        loops: Of the worlds.
+        loops: Loops of the worlds.
         actions: Actions on them.
         accelerated: Whether accelerations are wanted.
     """
@@ -83,35 +83,35 @@ class BatchedLoop(ClosedLoop):
 
     @classmethod
     def from_loops(
-        cls, loops: list[ClosedLoop], actions: list[Action], names: Sequence[str], *, apart: bool
+        cls, loops: list[ClosedLoop], actions: list[Action], names: Sequence[str], *, separate: bool
     ) -> BatchedLoop:
-        """Put worlds side by side.
+        """Combine the loops of worlds.
 
         Args:
-            loops: Of the worlds; of all the same where they have the same numbers.
+            loops: Loops of the worlds; one and the same where they share all parameters.
             actions: Actions on them.
-            names: Of the variables that will be asked for.
-            apart: Whether every world has numbers of its own.
+            names: Names of the variables that will be used.
+            separate: Whether the worlds differ in parameters.
         """
-        first, accelerated = loops[0], "joint_acceleration" in names
-        parts = {each.name: getattr(first, each.name) for each in fields(ClosedLoop)}
-        parts["drives"] = None if actions[0].compiled is None else actions[0]
-        if apart:
-            parts["dynamics"] = CompiledFingers([_compiled(each) for each in loops], accelerated=accelerated)
-            parts["palm"] = first.palm and replace(first.palm, signal=cast(Signal, _PalmSignals(loops)))
-        return cls(**parts, loops=loops, actions=actions, accelerated=accelerated)
+        template, accelerated = loops[0], "joint_acceleration" in names
+        attributes = {each.name: getattr(template, each.name) for each in fields(ClosedLoop)}
+        attributes["drives"] = None if actions[0].compiled is None else actions[0]
+        if separate:
+            attributes["dynamics"] = CompiledFingers([_dynamics(each) for each in loops], accelerated=accelerated)
+            attributes["palm"] = template.palm and replace(template.palm, signal=cast(Signal, _PalmSignals(loops)))
+        return cls(**attributes, loops=loops, actions=actions, accelerated=accelerated)
 
     def replace_world(self, index: int, loop: ClosedLoop, action: Action) -> None:
         """Replace a world; all have separate loops afterwards."""
         self.loops[index], self.actions[index] = loop, action
         assert isinstance(self.dynamics, CompiledFingers)
-        self.dynamics.replace(index, _compiled(loop))
+        self.dynamics.replace(index, _dynamics(loop))
 
     def spool_goals(self, time: Array) -> Array | None:
         """Return the goals of the worlds' motors, each at its own time, shape (w, k), rad."""
         drives = [action.compiled for action in self.actions]
         goals = [
-            each.zero_order_hold(each.goals, at) for each, at in zip(drives, time, strict=True) if each is not None
+            loop.zero_order_hold(loop.goals, at) for loop, at in zip(drives, time, strict=True) if loop is not None
         ]
         return np.array(goals) if goals else None
 
@@ -121,14 +121,14 @@ class BatchedLoop(ClosedLoop):
 
     @property
     def shared(self) -> bool:
-        """Whether all worlds have the same numbers."""
+        """True if all worlds have the same parameters."""
         return not isinstance(self.dynamics, CompiledFingers)
 
     def force(self, time: Array | float) -> Array:
         """Return F in all worlds, shape (3,) or (w, 3), of several fingers (f, 3) or (w, f, 3), N."""
         if self.shared:
             return super().force(time)
-        return np.array([loop.force(each) for loop, each in zip(self.loops, np.asarray(time), strict=True)])
+        return np.array([loop.force(instant) for loop, instant in zip(self.loops, np.asarray(time), strict=True)])
 
     def evaluate(self, time: Array | float, x: Array, outputs: Outputs = "all") -> LoopSignals:
         """Return all signals at times (w,) and states (w, size); the base's motion counts for accelerations alone."""
@@ -139,14 +139,14 @@ class BatchedLoop(ClosedLoop):
         inputs = command[:, routing.actuated :]
         control = ControlSignals(np.zeros((len(times), len(routing.joints))), tension, inputs=inputs)
         if self.drives is not None:
-            voltages = [action.voltages(each) for action, each in zip(self.actions, times, strict=True)]
+            voltages = [action.voltages(instant) for action, instant in zip(self.actions, times, strict=True)]
             command[:, self.drives.channels] = voltages
         base = None
         if outputs == "all" and (self.palm or self.prescribed_motion):
-            base = np.array([loop.base(each) for loop, each in zip(self.loops, times, strict=True)])
-        nothing = np.zeros((len(times), len(routing.joints)))
+            base = np.array([loop.base(instant) for loop, instant in zip(self.loops, times, strict=True)])
+        zeros = np.zeros((len(times), len(routing.joints)))
         finger = self.dynamics.evaluate(x, command, self.force(time), base, outputs)
-        return LoopSignals(ReferenceSignals(nothing, nothing), control, finger)
+        return LoopSignals(ReferenceSignals(zeros, zeros), control, finger)
 
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips, base frame, at times (w,) and states; energies are those of a palm at rest."""
@@ -161,9 +161,9 @@ class _PalmSignals:
 
     def at(self, time: Array) -> tuple[Array, Array]:
         """Return values and rates at times (w,), shape (w, 6) each."""
-        samples = [loop.palm.signal.at(each) for loop, each in zip(self._loops, time, strict=True) if loop.palm]
+        samples = [loop.palm.signal.at(instant) for loop, instant in zip(self._loops, time, strict=True) if loop.palm]
         return np.array([value for value, _ in samples]), np.array([rate for _, rate in samples])
 
 
-def _compiled(loop: ClosedLoop) -> CompiledFinger:
+def _dynamics(loop: ClosedLoop) -> CompiledFinger:
     return cast(CompiledFinger, loop.dynamics)

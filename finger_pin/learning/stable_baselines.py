@@ -17,11 +17,11 @@ class StableBaselinesEnvironment(VecEnv):
     """`VectorEnvironment` as stable-baselines3 takes it: actions from -1 to 1, automatic resets."""
 
     def __init__(self, worlds: VectorEnvironment) -> None:
-        """Take worlds."""
+        """Wrap a vector environment."""
         space = worlds.single_action_space
         assert isinstance(space, Box)
         shape = space.shape
-        # Asked for its attributes at once.
+        # The base class reads its attributes.
         self.worlds = worlds
         super().__init__(worlds.num_envs, worlds.single_observation_space, Box(-1.0, 1.0, shape, np.float32))
         self._middle, self._half = 0.5 * (space.high + space.low), 0.5 * (space.high - space.low)
@@ -34,21 +34,21 @@ class StableBaselinesEnvironment(VecEnv):
         return observations
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep actions for `step_wait`."""
+        """Store actions for `step_wait`."""
         self._actions = self._middle + self._half * actions
 
     def step_wait(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], list[dict[str, Any]]]:
-        """Return observations, rewards, whether episodes are over, and their last observations beside."""
-        observations, rewards, ended, over, gathered = self.worlds.step(self._actions)
-        dones = ended | over
+        """Return observations, rewards, the ends of episodes, and infos with their last observations."""
+        observations, rewards, terminated, truncated, vector_info = self.worlds.step(self._actions)
+        dones = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for i, reason in enumerate(gathered.get("reason", [])):
+        for world, reason in enumerate(vector_info.get("reason", [])):
             if reason:
-                infos[i]["reason"] = reason
+                infos[world]["reason"] = reason
         if dones.any():
-            for i in np.flatnonzero(dones).tolist():
-                cut = bool(over[i] and not ended[i])
-                infos[i] |= {"terminal_observation": observations[i], "TimeLimit.truncated": cut}
+            for world in np.flatnonzero(dones).tolist():
+                time_limit = bool(truncated[world] and not terminated[world])
+                infos[world] |= {"terminal_observation": observations[world], "TimeLimit.truncated": time_limit}
             observations, _ = self.worlds.reset(options={"reset_mask": dones})
         return observations, rewards.astype(np.float32), dones, infos
 

@@ -24,7 +24,7 @@ Signals = Mapping[str, Array]
 Function = Callable[[Signals], ArrayLike]
 #: Ways in which a policy acts.
 ACTIONS = ("tension", "spool_angle", "tendon_winding", "joint_position")
-_BEFORE = {"motor_position": "spool_angle", "tendon_length": "tendon_winding"}
+_FORMER_ACTIONS = {"motor_position": "spool_angle", "tendon_length": "tendon_winding"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,18 +51,18 @@ class Task:
         Raises:
             InputError: If there is no such entry, the reward is missing, or an entry is wrong.
         """
-        names = [each.name for each in fields(cls)]
+        names = [task_field.name for task_field in fields(cls)]
         for name in entries:
             if name not in names:
-                known = ", ".join(["finger", "render_mode", *names])
-                raise InputError(name, f"no such argument; there are {known}{suggestion(name, names)}")
+                arguments = ", ".join(["finger", "render_mode", *names])
+                raise InputError(name, f"no such argument; there are {arguments}{suggestion(name, names)}")
         if "reward" not in entries:
             raise InputError("reward", "is missing: a function of the signals")
         return cls(**entries)
 
     def __post_init__(self) -> None:
         """Check the entries that do not depend on the scenario."""
-        object.__setattr__(self, "action", _BEFORE.get(self.action, self.action))
+        object.__setattr__(self, "action", _FORMER_ACTIONS.get(self.action, self.action))
         if self.action not in ACTIONS:
             raise InputError("action", f"must be one of {', '.join(ACTIONS)}", self.action)
         for name in ("reward", "done", "draw"):
@@ -81,7 +81,7 @@ class Task:
                 raise InputError(name, "must be a list of names of variables", value)
         if not (self.observation or self.draw):
             raise InputError("observation", "must name at least one variable", [])
-        for name, source in self._observed.items():
+        for name, source in self._observations.items():
             if not (isinstance(source, Sensor) or callable(source)):
                 raise InputError(f"observation.{name}", "must be a Sensor or a function of what is observed", source)
         if isinstance(self.start, str) and self.start not in ("reference", "random"):
@@ -93,42 +93,42 @@ class Task:
         return max(round(self.duration / self.period), 1)
 
     @cached_property
-    def _observed(self) -> Mapping[str, Sensor | Function]:
+    def _observations(self) -> Mapping[str, Sensor | Function]:
         observation = self.observation
         return dict(observation) if isinstance(observation, Mapping) else {name: Sensor() for name in observation}
 
     @cached_property
-    def observed(self) -> tuple[str, ...]:
+    def observed_names(self) -> tuple[str, ...]:
         """Names of the observed signals, in order, before those drawn for an episode."""
-        return tuple(self._observed)
+        return tuple(self._observations)
 
     @cached_property
     def sensors(self) -> Mapping[str, Sensor]:
         """The sensor of every observed variable; perfect ones unless given."""
-        return {name: each for name, each in self._observed.items() if isinstance(each, Sensor)}
+        return {name: sensor for name, sensor in self._observations.items() if isinstance(sensor, Sensor)}
 
     def derive(self, signals: Signals, worlds: int) -> dict[str, Array]:
-        """Return the task's own signals, of readings and of draws, by name, shapes (worlds, ...).
+        """Return the observations that are functions of readings and draws, by name, shapes (worlds, ...).
 
         Raises:
             InputError: If a function returns another shape, or what is not finite.
         """
-        derived = {}
-        for name, (entry, function) in self._derived.items():
-            value = _numbers(entry, function, signals)
+        values_by_name = {}
+        for name, (entry, function) in self._functions.items():
+            value = _evaluate(entry, function, signals)
             if value.shape[:1] != (worlds,):
                 allowed = f"must return arrays with the worlds in front, shape ({worlds}, ...); see per_world"
                 raise InputError(entry, allowed, list(value.shape))
             if not all_finite(value):
                 raise InputError(entry, "must return finite numbers", value.tolist())
-            derived[name] = value
-        return derived
+            values_by_name[name] = value
+        return values_by_name
 
     @cached_property
-    def _derived(self) -> Mapping[str, tuple[str, Function]]:
+    def _functions(self) -> Mapping[str, tuple[str, Function]]:
         """The functions among the observations, with their entries."""
-        observed = self._observed.items()
-        return {name: (f"observation.{name}", each) for name, each in observed if not isinstance(each, Sensor)}
+        observed_names = self._observations.items()
+        return {name: (f"observation.{name}", each) for name, each in observed_names if not isinstance(each, Sensor)}
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
@@ -141,12 +141,12 @@ class Task:
         Raises:
             InputError: If a function returns another shape, or a reward is not finite.
         """
-        reward = _shaped("reward", self.reward, signals, worlds)
+        reward = _evaluate_scalar("reward", self.reward, signals, worlds)
         if not all_finite(reward):
             raise InputError("reward", "must return finite numbers", reward.tolist())
         if self.done is None:
             return reward, np.zeros(worlds, dtype=bool)
-        done = _shaped("done", self.done, signals, worlds)
+        done = _evaluate_scalar("done", self.done, signals, worlds)
         if np.isnan(done).any():
             raise InputError("done", "must return whether the task has ended", done.tolist())
         return reward, done != 0.0
@@ -159,32 +159,32 @@ def per_world(function: Callable[[Signals], Any]) -> Function:
     that cannot be written so.
     """
 
-    def together(signals: Signals) -> Array:
+    def batched(signals: Signals) -> Array:
         count = len(next(iter(signals.values())))
-        return np.array([function({name: value[i] for name, value in signals.items()}) for i in range(count)])
+        return np.array([function({name: value[world] for name, value in signals.items()}) for world in range(count)])
 
-    return together
+    return batched
 
 
-def _numbers(name: str, function: Function, signals: Signals) -> Array:
-    """Return the result of a function of signals; refuse one that asks for a name that is not among them."""
+def _evaluate(name: str, function: Function, signals: Signals) -> Array:
+    """Return the result of a function of signals; refuse one that reads a signal that does not exist."""
     try:
         value = function(signals)
     except KeyError as error:
-        asked = error.args[0] if error.args else None
-        if asked in signals:
+        missing_name = error.args[0] if error.args else None
+        if missing_name in signals:
             raise
         allowed = f"asks for a signal that it is not told; there are {', '.join(signals)}"
-        raise InputError(name, allowed, asked) from None
+        raise InputError(name, allowed, missing_name) from None
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise InputError(name, "must return numbers", value) from None
 
 
-def _shaped(name: str, function: Function, signals: Signals, worlds: int) -> Array:
+def _evaluate_scalar(name: str, function: Function, signals: Signals, worlds: int) -> Array:
     """Return the result of a function of signals, one number per world."""
-    values = _numbers(name, function, signals)
+    values = _evaluate(name, function, signals)
     if values.shape != (worlds,):
         allowed = f"must return one value per world, shape ({worlds},): signals have the worlds in front; see per_world"
         raise InputError(name, allowed, list(values.shape))
@@ -193,5 +193,5 @@ def _shaped(name: str, function: Function, signals: Signals, worlds: int) -> Arr
 
 def all_finite(values: np.ndarray) -> bool:
     """Return whether all numbers of an array are finite; plain Python is faster for a few."""
-    # The sum of their squares tells in most cases.
+    # The sum of squares suffices in most cases.
     return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())

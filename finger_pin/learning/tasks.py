@@ -20,20 +20,20 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
 #: At these tolerances angles err by about a thousandth of a radian, which no policy feels.
-COARSE = {"simulation.method": "Rodas4", "simulation.rtol": 1e-2, "simulation.atol_scale": 2e-2}
+COARSE_TOLERANCES = {"simulation.method": "Rodas4", "simulation.rtol": 1e-2, "simulation.atol_scale": 2e-2}
 # Most tensions, N, half of which hold the finger in the air, and half of which press on things with a newton or two.
-_LIGHT, _FIRM = (2.0, 2.0, 8.8, 6.2), (12.0, 12.0, 25.0, 8.0)
+_REACH_LIMITS, _PRESS_LIMITS = (2.0, 2.0, 8.8, 6.2), (12.0, 12.0, 25.0, 8.0)
 # Errors over which the halves of a reward fall off, m and N: the first leads there, the second asks for more.
-_NEAR, _GENTLE, _HALVES = np.array([0.06, 0.015]), np.array([2.0, 0.3]), np.array([0.5, 0.5])
+_DISTANCE_SCALES, _FORCE_SCALES, _HALF_WEIGHTS = np.array([0.06, 0.015]), np.array([2.0, 0.3]), np.array([0.5, 0.5])
 # What a newton on the ball costs.
-_COST = 0.1
+_FORCE_COST = 0.1
 # A ball that is further than this from between the fingertips is lost, m.
-_LOST = 0.025
+_LOST_DISTANCE = 0.025
 
 
 @cache
 def _scenario(name: str, overrides: tuple[tuple[str, Any], ...] = ()) -> Scenario:
-    return load_scenario(name, {**COARSE, **dict(overrides)})
+    return load_scenario(name, {**COARSE_TOLERANCES, **dict(overrides)})
 
 
 @cache
@@ -55,18 +55,18 @@ def wanted_force(random: np.random.Generator) -> dict[str, Array]:
     return {"wanted_force": random.uniform(0.5, 3.0, 1)}
 
 
-def _nearness(error: Array, scales: Array) -> Array:
+def _closeness(error: Array, scales: Array) -> Array:
     """Return 1 for no error, and 0 for a large one."""
-    return np.asarray(1.0 - np.tanh(error[:, None] / scales) @ _HALVES)
+    return np.asarray(1.0 - np.tanh(error[:, None] / scales) @ _HALF_WEIGHTS)
 
 
-def _length(way: Array) -> Array:
-    # Of three numbers numpy's own norm spends more on what it is asked than on the answer.
-    return np.asarray(np.sqrt(np.vecdot(way, way)))
+def _norm(vector: Array) -> Array:
+    # Faster than numpy.linalg.norm for three components.
+    return np.asarray(np.sqrt(np.vecdot(vector, vector)))
 
 
 def to_goal(signals: Signals) -> Array:
-    """Return the way from the fingertip to the goal, shape (worlds, 3), m."""
+    """Return the vector from the fingertip to the goal, shape (worlds, 3), m."""
     return np.asarray(signals["goal"] - signals["fingertip_position"])
 
 
@@ -81,39 +81,39 @@ def from_grip(signals: Signals) -> Array:
     return np.asarray(signals["object_position"][..., 0, :] - middle)
 
 
-def _reached(signals: Signals) -> Array:
-    return _nearness(_length(to_goal(signals)), _NEAR)
+def _reach_reward(signals: Signals) -> Array:
+    return _closeness(_norm(to_goal(signals)), _DISTANCE_SCALES)
 
 
-def _pressed(signals: Signals) -> Array:
-    return _nearness(np.abs(missing_force(signals)[..., 0]), _GENTLE)
+def _press_reward(signals: Signals) -> Array:
+    return _closeness(np.abs(missing_force(signals)[..., 0]), _FORCE_SCALES)
 
 
 def _grip_reward(signals: Signals) -> Array:
-    near = _nearness(_length(from_grip(signals)), _NEAR)
-    return np.asarray(near - _COST * signals["contact_normal_force"].sum(axis=-1))
+    closeness = _closeness(_norm(from_grip(signals)), _DISTANCE_SCALES)
+    return np.asarray(closeness - _FORCE_COST * signals["contact_normal_force"].sum(axis=-1))
 
 
-def _lost(signals: Signals) -> NDArray[np.bool_]:
-    return np.asarray(_length(from_grip(signals)) > _LOST)
+def _ball_is_lost(signals: Signals) -> NDArray[np.bool_]:
+    return np.asarray(_norm(from_grip(signals)) > _LOST_DISTANCE)
 
 
-def _observed(*names: str, **functions: Function) -> dict[str, Sensor | Function]:
+def _observations(*names: str, **functions: Function) -> dict[str, Sensor | Function]:
     return {name: Sensor() for name in names} | functions
 
 
-def _reach() -> dict[str, Any]:
+def _reach_task() -> dict[str, Any]:
     return {
         "scenario": _scenario("reversals", (("title", "the fingertip reaches a point"),)),
-        "limits": (0.0, _LIGHT),
-        "reward": _reached,
-        "observation": _observed("joint_position", "joint_velocity", "fingertip_position", to_goal=to_goal),
+        "limits": (0.0, _REACH_LIMITS),
+        "reward": _reach_reward,
+        "observation": _observations("joint_position", "joint_velocity", "fingertip_position", to_goal=to_goal),
         "draw": fingertip_goal,
         "start": "random",
     }
 
 
-def _press() -> dict[str, Any]:
+def _press_task() -> dict[str, Any]:
     plate = "environment.objects.plate.path.z"
     return {
         "scenario": _scenario(
@@ -124,10 +124,10 @@ def _press() -> dict[str, Any]:
                 (f"{plate}.frequency", 0.5),
             ),
         ),
-        "limits": (0.0, _FIRM),
-        "reward": _pressed,
-        # Frictions hide what pulls: without tensions a policy knows neither what it did last nor what arrived of it.
-        "observation": _observed(
+        "limits": (0.0, _PRESS_LIMITS),
+        "reward": _press_reward,
+        # Friction hides the commands: without tensions a policy knows neither its last action nor its effect.
+        "observation": _observations(
             "tendon_tension", "joint_position", "joint_velocity", "contact_normal_force", missing_force=missing_force
         ),
         "draw": wanted_force,
@@ -135,13 +135,13 @@ def _press() -> dict[str, Any]:
     }
 
 
-def _grasp() -> dict[str, Any]:
+def _grasp_task() -> dict[str, Any]:
     return {
         "scenario": _scenario("pinch", (("title", "two fingers hold a ball while the palm is shaken"),)),
-        "limits": (0.0, _FIRM * 2),
+        "limits": (0.0, _PRESS_LIMITS * 2),
         "reward": _grip_reward,
-        "done": _lost,
-        "observation": _observed(
+        "done": _ball_is_lost,
+        "observation": _observations(
             "joint_position",
             "joint_velocity",
             "fingertip_position",
@@ -158,7 +158,7 @@ def _grasp() -> dict[str, Any]:
     }
 
 
-TASKS = {"Reach-v0": _reach, "Press-v0": _press, "Grasp-v0": _grasp}
+TASKS = {"Reach-v0": _reach_task, "Press-v0": _press_task, "Grasp-v0": _grasp_task}
 
 
 def make(name: str, render_mode: str | None = None, **task: Any) -> Environment:
@@ -172,7 +172,7 @@ def make_vector(name: str, num_envs: int = 1, render_mode: str | None = None, **
 
 
 def register() -> None:
-    """Tell Gymnasium of the tasks."""
+    """Register the tasks in Gymnasium."""
     for name in TASKS:
         if f"finger_pin/{name}" not in gymnasium.registry:
             gymnasium.register(

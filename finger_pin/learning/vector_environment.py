@@ -23,8 +23,8 @@ from finger_pin.mechanism.coerce import FingerLike
 class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     """Many worlds of one scenario; world i with seed + i repeats `Environment` with that seed.
 
-    The compiled core holds no lock of Python, so threads step the worlds side by side; numbers do not depend on how
-    many threads there are. An episode that is over begins anew at the next step, whose action does not count.
+    The compiled core releases the GIL, so threads step the worlds side by side; results do not depend on the number
+    of threads. An episode that is over restarts at the next step, whose action does not count.
     """
 
     def __init__(
@@ -56,18 +56,18 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             read_render_mode(render_mode),
         )
         self._worlds = Worlds(scenario, self.task, self.num_envs, finger)
-        self.single_observation_space, single = self._worlds.spaces()
-        self.single_action_space = single
+        self.single_observation_space, action_box = self._worlds.spaces()
+        self.single_action_space = action_box
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        low, high = (np.tile(each, (self.num_envs, 1)) for each in (single.low, single.high))
+        low, high = (np.tile(bound, (self.num_envs, 1)) for bound in (action_box.low, action_box.high))
         self.action_space, self._limits = Box(low, high, dtype=np.float32), (low.astype(float), high.astype(float))
         self.metadata = {
             "autoreset_mode": AutoresetMode.NEXT_STEP,
             "render_modes": ["rgb_array"],
             "render_fps": round(1.0 / self.task.period),
         }
-        self._randoms: list[np.random.Generator] = []
-        self._ended, self._all = np.zeros(self.num_envs, dtype=bool), np.arange(self.num_envs)
+        self._generators: list[np.random.Generator] = []
+        self._ended, self._indices = np.zeros(self.num_envs, dtype=bool), np.arange(self.num_envs)
         self._observations: NDArray[Any] = np.zeros(self.observation_space.shape or (), dtype=np.float32)
 
     def reset(
@@ -77,26 +77,23 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         mask = np.ones(self.num_envs, dtype=bool)
         if options and "reset_mask" in options:
             mask = np.asarray(options["reset_mask"], dtype=bool)
-        seeds: list[int | None]
-        if isinstance(seed, list):
-            seeds = seed
-        else:
-            seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
+        first = [None] * self.num_envs if seed is None else seed
+        seeds = first if isinstance(first, list) else [first + i for i in range(self.num_envs)]
         if len(seeds) != self.num_envs or mask.shape != (self.num_envs,):
             raise InputError("seed and reset_mask", f"must have {self.num_envs} entries, one per world")
-        if not self._randoms:
-            self._randoms = [np_random(world_seed)[0] for world_seed in seeds]
+        if not self._generators:
+            self._generators = [np_random(world_seed)[0] for world_seed in seeds]
         else:
             for i in np.flatnonzero(mask):
                 if seeds[i] is not None:
-                    self._randoms[i] = np_random(seeds[i])[0]
-        # The others are not measured again: that would age what their sensors delay.
-        begun = np.flatnonzero(mask)
-        self._worlds.reset(begun.tolist(), self._randoms)
-        if len(begun):
-            self._observations[begun] = self._worlds.observe(begun, judged=False)[0]
+                    self._generators[i] = np_random(seeds[i])[0]
+        # The other worlds are not measured again, which would advance their delayed sensors.
+        restarted = np.flatnonzero(mask)
+        self._worlds.reset(restarted.tolist(), self._generators)
+        if len(restarted):
+            self._observations[restarted] = self._worlds.observe(restarted, for_reward=False)[0]
         self._ended[mask] = False
-        return self._observations.copy(), self._drawn(begun)
+        return self._observations.copy(), self._draw_info(restarted)
 
     def step(
         self, actions: NDArray[Any]
@@ -107,25 +104,25 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             InputError: If the actions have another shape or are not finite, or the reward is wrong.
             gymnasium.error.ResetNeeded: Before the first `reset`.
         """
-        if not self._randoms:
+        if not self._generators:
             raise ResetNeeded("there are no episodes yet: call reset before step")
         commands, worlds = read_actions(actions, *self._limits), self._worlds
-        begun = self._ended.copy()
-        at_start = np.flatnonzero(begun)
-        worlds.reset(at_start.tolist(), self._randoms)
-        worlds.act(commands, np.flatnonzero(~begun).tolist())
-        self._observations, signals = worlds.observe(self._all)
-        rewards, done = self.task.judge(signals, self.num_envs)
-        rewards, done, over = np.where(begun, 0.0, rewards), done & ~begun, worlds.over & ~begun
-        self._ended = done | over
-        info = self._drawn(at_start)
+        fresh = self._ended.copy()
+        indices = np.flatnonzero(fresh)
+        worlds.reset(indices.tolist(), self._generators)
+        worlds.act(commands, np.flatnonzero(~fresh).tolist())
+        self._observations, signals = worlds.observe(self._indices)
+        rewards, terminated = self.task.judge(signals, self.num_envs)
+        rewards, terminated, truncated = np.where(fresh, 0.0, rewards), terminated & ~fresh, worlds.over & ~fresh
+        self._ended = terminated | truncated
+        info = self._draw_info(indices)
         if self.task.privileged:
             privileged = {name: signals[name] for name in self.task.privileged}
-            info |= {"privileged": privileged | {f"_{name}": ~begun for name in privileged}, "_privileged": ~begun}
-        for i in np.flatnonzero(over).tolist():
+            info |= {"privileged": privileged | {f"_{name}": ~fresh for name in privileged}, "_privileged": ~fresh}
+        for i in np.flatnonzero(truncated).tolist():
             if worlds.worlds[i].reason:
                 info = self._add_info(info, {"reason": worlds.worlds[i].reason}, i)
-        return self._observations.copy(), rewards, done, over, info
+        return self._observations.copy(), rewards, terminated, truncated, info
 
     def __copy__(self) -> Self:
         """Return an independent environment: two that share their worlds would step each other."""
@@ -137,8 +134,8 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             return None
         return tuple(world.picture() for world in self._worlds.worlds)
 
-    def _drawn(self, begun: NDArray[np.int64]) -> dict[str, Any]:
+    def _draw_info(self, restarted: NDArray[np.int64]) -> dict[str, Any]:
         info: dict[str, Any] = {}
-        for i in begun.tolist():
+        for i in restarted.tolist():
             info = self._add_info(info, {"drawn": self._worlds.worlds[i].sampled}, i)
         return info

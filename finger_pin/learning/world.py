@@ -22,7 +22,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.learning.action import Action
 from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
-from finger_pin.learning.snapshot import known_variables, snapshot
+from finger_pin.learning.snapshot import instant_variables, snapshot
 from finger_pin.learning.task import Task
 from finger_pin.mechanism.coerce import FingerLike, is_other_hand, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
@@ -35,21 +35,21 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Starts that are drawn anew where bodies overlap.
-_TRIES = 100
+_MAX_STARTS = 100
 
 
 class World:
-    """One world.
+    """World of an environment: a scenario in steps, and the draws of an episode.
 
     Attributes:
         task: The task of the policy.
         origin: The scenario's own loop, whose controller does not act.
-        action: Action that acts in its place.
+        action: Controller that applies the actions in its place.
         stepper: Its stepper.
-        drawn: Draws of the episode: numbers by key, and those of the task.
+        sampled: Draws of the episode: parameters by key, and those of the task.
         context: Draws of the task.
         sensors: The sensors of the episode.
-        reason: Why the motion cannot go on; empty if it can.
+        reason: Reason of a failed motion; empty otherwise.
         now: Simulated time that the motion has reached, s.
     """
 
@@ -88,29 +88,29 @@ class World:
             if key.startswith("hand."):
                 raise InputError("randomise", "does not act: the hand that was given is not the scenario's", key)
         family = ParametrisedScenario(scenario, randomisation.keys)
-        for values in randomisation.ends():
-            # What cannot be drawn is said now, not at the hundredth reset.
+        for values in randomisation.corner_values():
+            # Wrong ranges are refused now, not at the hundredth reset.
             family.with_values(values)
         world = cls(family, task, randomisation, custom_finger)
-        known = known_variables(world.origin)
+        available = instant_variables(world.origin)
         for name in task.variables:
-            if name not in known:
+            if name not in available:
                 entry = "observation" if name in task.sensors else "privileged"
-                raise InputError(entry, f"no such variable; there are {choices(name, known)}", name)
+                raise InputError(entry, f"no such variable; there are {choices(name, available)}", name)
         return world
 
     def twin(self) -> World:
-        """Return another world of the same scenario and task; all share the parts that no reset draws anew."""
+        """Return another world of the same scenario and task; they share the parts that no reset changes."""
         origin = None if self._randomisation.keys else self.origin
         return World(self._family, self.task, self._randomisation, self._custom_finger, origin)
 
     @property
     def rebuilt(self) -> bool:
-        """Whether every episode builds a new loop and stepper."""
+        """True if every episode builds a new loop and stepper."""
         return bool(self._randomisation.keys)
 
     def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
-        """Build the loop, under inputs that are held."""
+        """Build the loop and the action."""
         if origin is None:
             finger = self._custom_finger
             if self._nominal is not None:
@@ -120,15 +120,15 @@ class World:
             origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled()
         self._scenario, self.origin = scenario, origin
         finger, family = self.origin.finger, self._family.scenario
-        # Drives know what the scenario says, not what was drawn.
+        # Drives use the parameters of the scenario, not the drawn ones.
         self._nominal = self._nominal or (finger, family.coupling(finger.routing))
         self.action = Action(self.task.action, finger, self.task.duration, *self._nominal)
 
     @property
     def loop(self) -> ClosedLoop:
         """The loop, with the actions in the place of its controller."""
-        driven = self.action if self.action.compiled is not None else None
-        return replace(self.origin, controller=self.action, drives=driven)
+        drives = self.action if self.action.compiled is not None else None
+        return replace(self.origin, controller=self.action, drives=drives)
 
     def _stepper_at(self, x: Array) -> Stepper:
         """Return a stepper that starts from a state, with the loops of the action if there are any."""
@@ -153,40 +153,40 @@ class World:
 
     @property
     def over(self) -> bool:
-        """Whether the episode is truncated: its time is over, or the motion cannot go on."""
+        """True if the episode is truncated: its time is over, or the motion failed."""
         return bool(self.reason) or self._step >= self.task.steps
 
     def reset(self, random: np.random.Generator) -> None:
         """Reset for an episode.
 
         Raises:
-            InputError: If what is drawn is not allowed.
+            InputError: If a draw is not allowed.
         """
         self._random, self.reason, self._step, self.now = random, "", 0, 0.0
         self.sampled = self._randomisation.sample_context(random)
         if self._randomisation.keys:
             self._build(self._family.with_values([self.sampled[key] for key in self._randomisation.keys]))
-        self._begun = self._start()
+        self._start_state = self._draw_start()
         if self.rebuilt:
-            self.stepper = self._stepper_at(self._begun)
+            self.stepper = self._stepper_at(self._start_state)
         else:
-            self.stepper.restart(self._begun, time=0.0)
+            self.stepper.restart(self._start_state, time=0.0)
         task = self.task
-        self.context = self._context()
+        self.context = self._draw_context()
         self.sampled |= self.context
         self.sensors = {
             name: self._randomisation.sensor(name, sensor, self.sampled) for name, sensor in task.sensors.items()
         }
         self.action.reset(self._randomisation.delay(self.sampled, task.delay))
 
-    def _context(self) -> dict[str, Array]:
+    def _draw_context(self) -> dict[str, Array]:
         """Return the task's draws for an episode, by name."""
         if self.task.draw is None:
             return {}
-        drawn = self.task.draw(self._random)
-        if not isinstance(drawn, Mapping):
-            raise InputError("draw", "must return arrays by name", drawn)
-        draws = {name: np.asarray(value, dtype=float) for name, value in drawn.items()}
+        returned = self.task.draw(self._random)
+        if not isinstance(returned, Mapping):
+            raise InputError("draw", "must return arrays by name", returned)
+        draws = {name: np.asarray(value, dtype=float) for name, value in returned.items()}
         shapes = {name: value.shape for name, value in self.context.items()}
         for name, value in draws.items():
             if not np.isfinite(value).all():
@@ -195,26 +195,26 @@ class World:
                 raise InputError(f"draw.{name}", f"must keep its shape {shapes[name]}", list(value.shape))
         return draws
 
-    def _start(self) -> Array:
+    def _draw_start(self) -> Array:
         """Return the packed state at the start."""
         loop, task = self.origin, self.task
         if task.start == "reference":
             return loop.initial_state()
-        around, joints = loop.finger.scene, len(loop.finger.routing.joints)
-        for _ in range(_TRIES):
+        scene, joints = loop.finger.scene, len(loop.finger.routing.joints)
+        for _ in range(_MAX_STARTS):
             if callable(task.start):
                 position = np.asarray(task.start(self._random), dtype=float)
                 if position.shape != (joints,) or not np.isfinite(position).all():
                     raise InputError("start", f"must return {joints} finite angles, rad", position.tolist())
             else:
                 limiter, coupling = loop.finger.stroke_limiter, self._scenario.coupling(loop.finger.routing)
-                free = self._random.uniform(limiter.lower, limiter.upper)
-                position = np.clip(coupling.matrix @ free + coupling.offset, limiter.lower, limiter.upper)
+                free_position = self._random.uniform(limiter.lower, limiter.upper)
+                position = np.clip(coupling.matrix @ free_position + coupling.offset, limiter.lower, limiter.upper)
             x = loop.rest_state(position, np.zeros(joints))
-            if around is None:
+            if scene is None:
                 return x
             try:
-                around.check(loop.finger.layout.unpack(x))
+                scene.check(loop.finger.layout.unpack(x))
             except InputError as error:
                 problem = error
             else:
@@ -222,13 +222,13 @@ class World:
         raise problem
 
     def act(self, action: Array) -> float:
-        """Begin a control period with an action; return the end of its first piece, s."""
-        self.action.take(action, self.time)
+        """Start a control period with an action; return the end of its first piece, s."""
+        self.action.apply(action, self.time)
         self._step += 1
         return self._next_end()
 
     def finish_piece(self, end: float, status: int) -> float:
-        """Note the status with which a stepper ended a piece; return the end of the next, s, or `NO_END`."""
+        """Record the status with which a stepper ended a piece; return the end of the next, s, or `NO_END`."""
         self.now = end
         if status:
             self.now = self.stepper.time
@@ -236,7 +236,7 @@ class World:
         return self._next_end()
 
     def _next_end(self) -> float:
-        """Hold the inputs that act now, and return the time of their end, s; `NO_END` after the period."""
+        """Apply the present inputs, and return the time of their end, s; `NO_END` after the period."""
         end = self._step * self.task.period
         if self.reason or self.now >= end:
             return NO_END
@@ -246,28 +246,28 @@ class World:
         """Return the episode so far, repeated step by step, as a Dataset with its energy account."""
         if not self._step:
             raise InputError("result", "is of steps, and there are none yet: call step")
-        stepper, end = self._stepper_at(self._begun), self.stepper.time
+        stepper, end = self._stepper_at(self._start_state), self.stepper.time
         if self.action.compiled is not None:
-            stepper.drive(self.action.again())
-        replayed = self.action.replayed()
-        trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, controller=replayed)
-        # None beyond the end, also by rounding.
+            stepper.drive(self.action.restarted_drives())
+        controller = self.action.recorded_inputs()
+        trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, controller=controller)
+        # Rounding must not move a sample beyond the end.
         times = np.minimum(np.arange(int(end * sample_rate * (1.0 + 1e-12)) + 1) / sample_rate, end)
-        motions = SampledTrajectory(self.loop, trajectory, times)
-        dataset = record(self._scenario, motions, self._scenario.simulation.method)
+        samples = SampledTrajectory(self.loop, trajectory, times)
+        dataset = record(self._scenario, samples, self._scenario.simulation.method)
         dataset.attrs["custom"] = "policy"
         return dataset
 
     def picture(self) -> NDArray[np.uint8]:
         """Return a picture of the present posture, from a point with all postures in view, of bytes."""
         method = self._scenario.simulation.method
-        motions = snapshot(self.loop, self.stepper.time, self.stepper.x)
-        dataset = record(self._scenario, motions, method, list(known_variables(self.origin)))
+        samples = snapshot(self.loop, self.stepper.time, self.stepper.x)
+        dataset = record(self._scenario, samples, method, list(instant_variables(self.origin)))
         goal = self.context.get("goal")
-        return draw_picture(dataset, self._stage, goal if goal is not None and goal.shape == (3,) else None)
+        return draw_picture(dataset, self._extreme_tips, goal if goal is not None and goal.shape == (3,) else None)
 
     @cached_property
-    def _stage(self) -> Array:
+    def _extreme_tips(self) -> Array:
         """Fingertips at the corners of the joints' ranges, shape (k, 3), m."""
         limiter, body = self.origin.finger.stroke_limiter, self.origin.finger.rigid_body
         corners = np.array([limiter.lower, limiter.upper, 0.5 * (limiter.lower + limiter.upper)])

@@ -17,7 +17,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.references.signal import Signal, no_harmonics
 from finger_pin.typing import Array
 
-_STILL = JointReference()
+_CONSTANT_REFERENCE = JointReference()
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class LoopReference(Reference, Protocol):
     """A reference in a loop: its motion, its knots, its compiled form."""
 
     def signals(self) -> tuple[Signal, ...]:
-        """Return the functions of time that it follows; steps end at their knots."""
+        """Return the functions of time in it; steps end at their knots."""
 
     def planned(self) -> SignalReference | None:
         """Return the signals for the compiled core; None for a Python reference."""
@@ -60,8 +60,8 @@ class SignalReference:
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> SignalReference:
         """Read a scenario's reference, for the routing of its finger."""
-        settings = [scenario.reference.joints.get(name, _STILL) for name in routing.joints]
-        signal = Signal.from_settings(settings, scenario.simulation.rtol).later(scenario.simulation.start_time)
+        settings = [scenario.reference.joints.get(name, _CONSTANT_REFERENCE) for name in routing.joints]
+        signal = Signal.from_settings(settings, scenario.simulation.rtol).starting_at(scenario.simulation.start_time)
         return cls(signal, scenario.coupling(routing))
 
     @classmethod
@@ -73,32 +73,32 @@ class SignalReference:
         Args:
             samples: Times, shape (m,), s, and angles, shape (m, k), rad, one column for each of the k joints, in order,
                 that no passive tendon drives.
-            scenario: Whose passive tendons the others follow.
-            routing: Of its finger.
+            scenario: Scenario whose passive tendons drive the other joints.
+            routing: Routing of its finger.
 
         Raises:
             InputError: If shapes or numbers are wrong, or an angle is beyond two turns.
         """
         coupling = scenario.coupling(routing)
-        free = coupling.free
-        names = [routing.joints[index] for index in free]
-        free_signal = Signal.from_samples("reference", samples, names, scenario.simulation.rtol)
+        free_joints = coupling.free
+        names = [routing.joints[index] for index in free_joints]
+        signal = Signal.from_samples("reference", samples, names, scenario.simulation.rtol)
         largest = float(np.max(np.abs(np.asarray(samples[1], dtype=float))))
         if largest > MOST_ANGLE:
             raise InputError("reference", f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}", largest)
-        free_signal = free_signal.later(scenario.simulation.start_time)
-        coefficients = np.zeros((*free_signal.coefficients.shape[:2], len(routing.joints)))
-        coefficients[..., free] = free_signal.coefficients
-        return cls(Signal(no_harmonics(len(routing.joints)), free_signal.knots, coefficients), coupling)
+        signal = signal.starting_at(scenario.simulation.start_time)
+        coefficients = np.zeros((*signal.coefficients.shape[:2], len(routing.joints)))
+        coefficients[..., free_joints] = signal.coefficients
+        return cls(Signal(no_harmonics(len(routing.joints)), signal.knots, coefficients), coupling)
 
     def at(self, time: Array | float) -> ReferenceSignals:
         """Return theta^d and its rate at one time, or at times of shape (m,)."""
-        base, rate = self.signal.at(time)
+        position, rate = self.signal.at(time)
         matrix = self.coupling.matrix.T
-        return ReferenceSignals(base @ matrix + self.coupling.offset, rate @ matrix)
+        return ReferenceSignals(position @ matrix + self.coupling.offset, rate @ matrix)
 
     def signals(self) -> tuple[Signal, ...]:
-        """Return the functions of time that it follows."""
+        """Return the functions of time in it."""
         return (self.signal,)
 
     def planned(self) -> SignalReference:

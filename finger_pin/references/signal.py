@@ -18,8 +18,8 @@ from finger_pin.description.caching import cached_property
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.input_functions import harmonic, harmonic_rate, quintic, quintic_curvature, quintic_rate
-from finger_pin.references.polynomials import ORDER, joined, polynomials
-from finger_pin.references.sample_fitting import thinned
+from finger_pin.references.polynomials import ORDER, combine_polynomials, polynomials
+from finger_pin.references.sample_fitting import fit_samples
 from finger_pin.typing import Array
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Harmonic(NamedTuple):
     amplitude: int
     frequency: int
     phase: int
-    begin: int
+    start: int
 
 
 HARMONIC = Harmonic(*range(len(Harmonic._fields)))
@@ -62,12 +62,12 @@ class Signal:
         """Return the signals that settings describe, k of them.
 
         Args:
-            settings: Of each signal.
-            tolerance: Of their range, what dense samples may be missed by (`sample_fitting`).
+            settings: Settings of each signal.
+            tolerance: Largest error at dense samples, over the range of their signal (`sample_fitting`).
         """
         harmonics = [[each.offset, each.amplitude, each.frequency, each.phase, -np.inf] for each in settings]
         shape = len(settings), len(HARMONIC)
-        return cls(np.reshape(harmonics, shape), *joined(polynomials(settings, tolerance)))
+        return cls(np.reshape(harmonics, shape), *combine_polynomials(polynomials(settings, tolerance)))
 
     @classmethod
     def from_samples(
@@ -76,88 +76,88 @@ class Signal:
         """Return signals through samples: monotone cubics, fewer of them for dense samples (`sample_fitting`).
 
         Args:
-            name: Of the argument, for messages.
+            name: Name of the argument, for messages.
             samples: Times, shape (m,), s, and values, shape (m, k).
             columns: Names of the k signals.
-            tolerance: Of their range, what dense samples may be missed by.
+            tolerance: Largest error at dense samples, over the range of their signal.
 
         Raises:
             InputError: If the shapes differ from these, a number is not finite, or times do not increase.
         """
         try:
-            times, values = (np.asarray(each, dtype=float) for each in samples)
+            times, values = (np.asarray(array, dtype=float) for array in samples)
         except (TypeError, ValueError):
             raise InputError(name, "must be a pair of arrays: times, and values with one row for each") from None
-        shape, wanted = values.shape, f"one column for each of {', '.join(columns)}"
+        shape, column_message = values.shape, f"one column for each of {', '.join(columns)}"
         if times.ndim != 1 or len(times) < 2 or shape != (len(times), len(columns)):
-            rows = f"{max(times.size, 2)} rows like the times, and {wanted}"
-            raise InputError(name, f"times have shape {times.shape} and values {shape}; values must have {rows}")
+            message = f"{max(times.size, 2)} rows like the times, and {column_message}"
+            raise InputError(name, f"times have shape {times.shape} and values {shape}; values must have {message}")
         if not (np.isfinite(times).all() and np.isfinite(values).all()):
             raise InputError(name, "times and values must be finite")
         if not np.all(np.diff(times) > 0.0):
             raise InputError(name, "times must increase")
-        return cls(no_harmonics(len(columns)), *thinned(times, values, tolerance))
+        return cls(no_harmonics(len(columns)), *fit_samples(times, values, tolerance))
 
     @classmethod
     def from_held_values(cls, knots: Array, values: Array) -> Signal:
-        """Return signals that are held between knots, shape (m + 1,), s, at values of shape (m, k)."""
+        """Return signals that are constant between knots, shape (m + 1,), s, with values of shape (m, k)."""
         coefficients = np.zeros((ORDER, *values.shape))
         coefficients[-1] = values
         return cls(no_harmonics(values.shape[1]), knots, coefficients)
 
     @classmethod
     def from_polynomials(cls, columns: Sequence[PPoly]) -> Signal:
-        """Return the signals that piecewise polynomials of degree five at most are."""
-        return cls(no_harmonics(len(columns)), *joined(columns))
+        """Return the signals of piecewise polynomials of degree five at most."""
+        return cls(no_harmonics(len(columns)), *combine_polynomials(columns))
 
     @classmethod
     def from_signals(cls, signals: Sequence[Signal]) -> Signal:
         """Return the functions of several signals one after the other."""
         from scipy.interpolate import PPoly
 
-        columns = [PPoly(column.T, each.knots) for each in signals for column in each.coefficients.T]
-        return cls(np.concatenate([each.harmonics for each in signals]), *joined(columns))
+        columns = [PPoly(column.T, signal.knots) for signal in signals for column in signal.coefficients.T]
+        return cls(np.concatenate([signal.harmonics for signal in signals]), *combine_polynomials(columns))
 
     @cached_property
     def is_harmonic(self) -> bool:
-        """Whether all are sinusoids."""
+        """True if all signals are sinusoids."""
         return not self.coefficients.any()
 
     def at(self, time: Array | float) -> tuple[Array, Array]:
         """Return values and rates at one time, each of shape (k,), or at times of shape (m,), each (m, k)."""
         instant = np.asarray(time, dtype=float)[..., None]
-        offset, amplitude, frequency, phase, begin = self.harmonics.T
-        begun = instant >= begin
-        value = np.where(begun, harmonic(instant, offset, amplitude, frequency, phase), 0.0)
-        rate = np.where(begun, harmonic_rate(instant, amplitude, frequency, phase), 0.0)
+        offset, amplitude, frequency, phase, start = self.harmonics.T
+        started = instant >= start
+        value = np.where(started, harmonic(instant, offset, amplitude, frequency, phase), 0.0)
+        rate = np.where(started, harmonic_rate(instant, amplitude, frequency, phase), 0.0)
         if self.is_harmonic:
             return value, rate
-        inside = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
-        piece = np.searchsorted(self.knots[1:-1], inside, side="right")
-        since, factors = inside - self.knots[piece], self.coefficients[:, piece[..., 0]]
+        clipped = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
+        piece = np.searchsorted(self.knots[1:-1], clipped, side="right")
+        elapsed, factors = clipped - self.knots[piece], self.coefficients[:, piece[..., 0]]
         moving = (instant >= self.knots[0]) & (instant < self.knots[-1])
-        return value + quintic(since, *factors), rate + moving * quintic_rate(since, *factors[:-1])
+        return value + quintic(elapsed, *factors), rate + moving * quintic_rate(elapsed, *factors[:-1])
 
     def derivative(self, time: Array | float, order: int) -> Array:
         """Return a time derivative of a given order at one time, shape (k,), or at times of shape (m,), (m, k)."""
         instant = np.asarray(time, dtype=float)[..., None]
-        offset, amplitude, frequency, phase, begin = self.harmonics.T
-        circular = 2.0 * np.pi * frequency
-        value = (offset if order == 0 else 0.0) + amplitude * circular**order * np.sin(
-            circular * instant + phase + 0.5 * np.pi * order
+        offset, amplitude, frequency, phase, start = self.harmonics.T
+        angular_frequency = 2.0 * np.pi * frequency
+        value = (offset if order == 0 else 0.0) + amplitude * angular_frequency**order * np.sin(
+            angular_frequency * instant + phase + 0.5 * np.pi * order
         )
-        value = np.where(instant >= begin, value, 0.0)
+        value = np.where(instant >= start, value, 0.0)
         if self.is_harmonic:
             return np.asarray(value)
-        inside = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
-        piece = np.searchsorted(self.knots[1:-1], inside, side="right")
-        since, factors = inside - self.knots[piece], self.coefficients[:, piece[..., 0]]
+        clipped = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
+        piece = np.searchsorted(self.knots[1:-1], clipped, side="right")
+        elapsed, factors = clipped - self.knots[piece], self.coefficients[:, piece[..., 0]]
         powers = np.arange(ORDER - 1, order - 1, -1)
-        terms = [math.perm(int(n), order) * c * since ** (n - order) for n, c in zip(powers, factors, strict=False)]
+        terms = [math.perm(int(n), order) * c * elapsed ** (n - order) for n, c in zip(powers, factors, strict=False)]
         moving = (instant >= self.knots[0]) & (instant < self.knots[-1])
         return np.asarray(value + sum(terms) * (moving | (order == 0)))
 
-    def bends(self, tolerance: float) -> Array:
+    def step_ends(self, tolerance: float) -> Array:
         """Return the knots at which an integrator's steps should end, shape (b,), s, in order.
 
         These are knots where a signal jumps, or its rate jumps by more than a tolerance over the shorter of the pieces
@@ -170,92 +170,92 @@ class Signal:
         Args:
             tolerance: Relative to the range of each signal.
         """
-        begins = self.harmonics[:, HARMONIC.begin]
-        begins = np.unique(begins[np.isfinite(begins)])
-        return begins if self.is_harmonic else np.union1d(begins, self._knots_to_end_at(tolerance))
+        starts = self.harmonics[:, HARMONIC.start]
+        starts = np.unique(starts[np.isfinite(starts)])
+        return starts if self.is_harmonic else np.union1d(starts, self._polynomial_step_ends(tolerance))
 
-    def _knots_to_end_at(self, tolerance: float) -> Array:
-        """Return the knots of `bends`."""
+    def _polynomial_step_ends(self, tolerance: float) -> Array:
+        """Return the knots of the polynomials at which steps should end."""
         length = np.diff(self.knots)[:, None]
-        begin, end = self.coefficients[-1], quintic(length, *self.coefficients)
-        size = np.maximum(np.ptp(begin, axis=0), np.ptp(end, axis=0))
-        size = np.maximum(np.maximum(size, _ROUNDING * np.max(np.abs(begin), axis=0)), np.finfo(float).tiny)
-        still = np.zeros((1, len(size)))
-        rates = np.concatenate([still, quintic_rate(length, *self.coefficients[:-1])])
-        rates -= np.concatenate([self.coefficients[-2], still])
-        beside = np.concatenate([length, length[-1:]])
-        kinks = np.abs(rates) * np.minimum(beside, np.concatenate([length[:1], length]))
+        first, last = self.coefficients[-1], quintic(length, *self.coefficients)
+        range_ = np.maximum(np.ptp(first, axis=0), np.ptp(last, axis=0))
+        range_ = np.maximum(np.maximum(range_, _ROUNDING * np.max(np.abs(first), axis=0)), np.finfo(float).tiny)
+        zeros = np.zeros((1, len(range_)))
+        rates = np.concatenate([zeros, quintic_rate(length, *self.coefficients[:-1])])
+        rates -= np.concatenate([self.coefficients[-2], zeros])
+        next_length = np.concatenate([length, length[-1:]])
+        kinks = np.abs(rates) * np.minimum(next_length, np.concatenate([length[:1], length]))
         jumps = np.zeros_like(kinks)
-        jumps[1:-1] = np.abs(begin[1:] - end[:-1])
-        stops = np.maximum(jumps, kinks) > tolerance * size
-        # A value that deviates by the tolerance, and its neighbours by as much to the other side.
-        bent = self._bent(np.concatenate([begin, end[-1:]]), stops, 2.0 * tolerance * size)
-        turns = np.floor(np.cumsum(bent, axis=0) / np.sqrt(2.0 * size * math.sqrt(tolerance)))
-        stops[1:] |= np.diff(turns, axis=0, prepend=0.0) > 0.0
+        jumps[1:-1] = np.abs(first[1:] - last[:-1])
+        stops = np.maximum(jumps, kinks) > tolerance * range_
+        # A value may deviate by the tolerance, and its neighbours by as much to the other side.
+        bend_integral = self._bend_integral(np.concatenate([first, last[-1:]]), stops, 2.0 * tolerance * range_)
+        bend_count = np.floor(np.cumsum(bend_integral, axis=0) / np.sqrt(2.0 * range_ * math.sqrt(tolerance)))
+        stops[1:] |= np.diff(bend_count, axis=0, prepend=0.0) > 0.0
         return np.asarray(self.knots[np.any(stops, axis=1)])
 
-    def _bent(self, values: Array, covered: Flags, least: Array) -> Array:
+    def _bend_integral(self, values: Array, is_step_end: Flags, least: Array) -> Array:
         """Return the integral of the root of |u''| over each piece, shape (m - 1, k), of bends above a least size.
 
-        A bend is seen that displaces u from a chord by more than a least distance: first within each piece, then at
-        every knot between its neighbours, at every second between those, and so on. Where it is seen on a short chord
-        none is asked that is longer. What is missed displaces u by less than that on any chord.
+        A bend counts that displaces u from a chord by more than a least distance: first within each piece, then at
+        every knot between its neighbours, at every second between those, and so on. Where it counts on a short chord
+        no longer one is checked. Other bends displace u by less than that on any chord.
 
         Args:
             values: At the knots, shape (m, k).
-            covered: Whether a knot ends a step anyway, shape (m, k).
+            is_step_end: Whether a knot ends a step anyway, shape (m, k).
             least: Distance from a chord, shape (k,), in the unit of each signal.
         """
         length = np.diff(self.knots)[:, None]
         order = np.arange(ORDER - 1, 1, -1)
-        bent = np.zeros((len(length), values.shape[1]))
+        integral = np.zeros((len(length), values.shape[1]))
         powers = zip(order, self.coefficients, strict=False)
-        pieces = sum((n * (n - 1) * np.abs(c) * length**n for n, c in powers if c.any()), bent) > 8.0 * least
+        pieces = sum((n * (n - 1) * np.abs(c) * length**n for n, c in powers if c.any()), integral) > 8.0 * least
         rows = np.flatnonzero(pieces.any(axis=1))
         span, factors = length[rows], self.coefficients[:-2, rows]
         for node, weight in ((0.11270166537925831, 5.0), (0.5, 8.0), (0.8872983346207417, 5.0)):
-            bent[rows] += weight / 18.0 * span * np.sqrt(np.abs(quintic_curvature(node * span, *factors)))
-        bent[~pieces] = 0.0
-        covered = covered.copy()
-        covered[:-1] |= pieces
-        covered[1:] |= pieces
+            integral[rows] += weight / 18.0 * span * np.sqrt(np.abs(quintic_curvature(node * span, *factors)))
+        integral[~pieces] = 0.0
+        is_step_end = is_step_end.copy()
+        is_step_end[:-1] |= pieces
+        is_step_end[1:] |= pieces
         times, stride = self.knots[:, None], 1
         while len(times) > 2:
             before, after = times[1:-1] - times[:-2], times[2:] - times[1:-1]
-            off = np.abs(values[1:-1] - (after * values[:-2] + before * values[2:]) / (before + after))
-            new = _widened(off > least) & ~_widened(covered)[1:-1]
-            rows, columns = np.nonzero(new)
-            width = (0.5 * (before + after) / np.sqrt(before * after))[rows, 0]
-            bent[stride * (rows + 1) - 1, columns] += width * np.sqrt(2.0 * off[rows, columns])
-            covered[1:-1] |= new
-            times, values, covered, stride = times[::2], values[::2], _widened(covered)[::2], 2 * stride
-        return bent
+            distance = np.abs(values[1:-1] - (after * values[:-2] + before * values[2:]) / (before + after))
+            new_bends = _with_neighbours(distance > least) & ~_with_neighbours(is_step_end)[1:-1]
+            rows, columns = np.nonzero(new_bends)
+            factor = (0.5 * (before + after) / np.sqrt(before * after))[rows, 0]
+            integral[stride * (rows + 1) - 1, columns] += factor * np.sqrt(2.0 * distance[rows, columns])
+            is_step_end[1:-1] |= new_bends
+            times, values, is_step_end, stride = times[::2], values[::2], _with_neighbours(is_step_end)[::2], 2 * stride
+        return integral
 
-    def later(self, start: float) -> Signal:
+    def starting_at(self, start: float) -> Signal:
         """Return the signals with their time counted from a start, s."""
         if start == 0.0:
             return self
         harmonics = self.harmonics.copy()
         harmonics[:, HARMONIC.phase] += 2.0 * math.pi * harmonics[:, HARMONIC.frequency] * start
-        harmonics[:, HARMONIC.begin] -= start
+        harmonics[:, HARMONIC.start] -= start
         return replace(self, harmonics=harmonics, knots=self.knots - start)
 
     def delayed(self, delays: Array) -> Signal:
         """Return the signals after delays, shape (k,), s: u(t - d), and zero before t = d."""
-        late = np.flatnonzero(delays)
-        if not late.size:
+        indices = np.flatnonzero(delays)
+        if not indices.size:
             return self
         from scipy.interpolate import PPoly
 
         harmonics, columns = self.harmonics.copy(), []
         harmonics[:, HARMONIC.phase] -= 2.0 * math.pi * harmonics[:, HARMONIC.frequency] * delays
-        harmonics[late, HARMONIC.begin] = delays[late]
+        harmonics[indices, HARMONIC.start] = delays[indices]
         for column, delay in zip(self.coefficients.T, delays, strict=True):
-            # The piece of nothing up to the delay makes it a knot.
+            # The zero piece up to the delay makes it a knot.
             columns += [PPoly(column.T, self.knots + delay), PPoly(np.zeros((1, 1)), np.array([delay - 1.0, delay]))]
-        knots, coefficients = joined(columns)
+        knots, coefficients = combine_polynomials(columns)
         coefficients = coefficients[:, :, ::2].copy()
-        for k in late:
+        for k in indices:
             coefficients[:, knots[:-1] < delays[k], k] = 0.0
         return Signal(harmonics, knots, coefficients)
 
@@ -263,13 +263,13 @@ class Signal:
 def no_harmonics(count: int) -> Array:
     """Return the sinusoids of signals that are polynomials alone, shape (count, 5)."""
     harmonics = np.zeros((count, len(HARMONIC)))
-    harmonics[:, HARMONIC.begin] = -np.inf
+    harmonics[:, HARMONIC.start] = -np.inf
     return harmonics
 
 
-def _widened(marks: Flags) -> Flags:
+def _with_neighbours(mask: Flags) -> Flags:
     """Return marks, shape (m, k), with the neighbours of all that are set."""
-    wide = marks.copy()
-    wide[1:] |= marks[:-1]
-    wide[:-1] |= marks[1:]
-    return wide
+    widened = mask.copy()
+    widened[1:] |= mask[:-1]
+    widened[:-1] |= mask[1:]
+    return widened

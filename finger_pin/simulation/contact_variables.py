@@ -18,33 +18,33 @@ from finger_pin.typing import Array
 
 # Dimensions, unit and name.
 Variables = dict[str, tuple[tuple[str, ...], str, str]]
-_OBJECTS = {
+_OBJECT_VARIABLES = {
     "object_pose": ("object_position", "object_orientation"),
     "object_velocity": ("object_velocity", "object_angular_velocity"),
 }
 #: Attribute of a result: how many pairs of contacts it leaves out, as they never came near.
-LEFT_OUT = "contacts_left_out"
+OMITTED_PAIRS = "contacts_left_out"
 # Pairs whose gap stays above this never come near, m.
-_NEAR = 1e-3
-_CONTACT, _SPACE = ("time", "contact"), ("time", "contact", "axis")
+_FAR_GAP = 1e-3
+_SCALAR, _SPACE = ("time", "contact"), ("time", "contact", "axis")
 
 
 def contact_variables(finger: Finger) -> Variables:
     """Return the variables of contacts and free objects, none if there are no objects."""
-    around = finger.scene
-    if around is None:
+    scene = finger.scene
+    if scene is None:
         return {}
     table: Variables = {
         "contact_gap": (
-            _CONTACT,
+            _SCALAR,
             "m",
             "distance of the surfaces, negative where they penetrate; far apart, no more than it",
         ),
-        "contact_slip": (_CONTACT, "m/s", "speed of sliding"),
+        "contact_slip": (_SCALAR, "m/s", "speed of sliding"),
         "contact_force": (_SPACE, "N", "force on the second body of the pair"),
-        "contact_normal_force": (_CONTACT, "N", "normal force"),
-        "contact_friction": (_CONTACT, "N", "friction force"),
-        "contact_level": (_CONTACT, "N", "most friction, mu times the normal force"),
+        "contact_normal_force": (_SCALAR, "N", "normal force"),
+        "contact_friction": (_SCALAR, "N", "friction force"),
+        "contact_level": (_SCALAR, "N", "most friction, mu times the normal force"),
         "contact_point": (_SPACE, "m", "midway between the surfaces; zero where they are open"),
         "contact_normal": (_SPACE, "1", "normal of the second body, shorter deep in an edge; zero where they are open"),
         "contact_bend": (
@@ -53,30 +53,30 @@ def contact_variables(finger: Finger) -> Variables:
             "bend of the bristles along the tangents, and by spinning",
         ),
     }
-    if around.contacts.law.arms > SPIN:
-        table["contact_moment"] = (_CONTACT, "N m", "friction moment about the normal, on the second body of the pair")
-    if around.free:
-        axes, turns = ("time", "object", "axis"), ("time", "object", "quaternion")
+    if scene.contacts.law.arms > SPIN:
+        table["contact_moment"] = (_SCALAR, "N m", "friction moment about the normal, on the second body of the pair")
+    if scene.free:
+        vectors, quaternions = ("time", "object", "axis"), ("time", "object", "quaternion")
         table |= {
-            "object_position": (axes, "m", "position of a free object"),
-            "object_orientation": (turns, "1", "orientation of a free object, a unit quaternion"),
-            "object_velocity": (axes, "m/s", "velocity of a free object"),
-            "object_angular_velocity": (axes, "rad/s", "angular velocity of a free object"),
+            "object_position": (vectors, "m", "position of a free object"),
+            "object_orientation": (quaternions, "1", "orientation of a free object, a unit quaternion"),
+            "object_velocity": (vectors, "m/s", "velocity of a free object"),
+            "object_angular_velocity": (vectors, "rad/s", "angular velocity of a free object"),
         }
     return table
 
 
-def contact_value(name: str, finger: Finger, of: SampledTrajectory) -> Array:
+def contact_value(samples: SampledTrajectory, name: str) -> Array:
     """Return the values of one of these variables."""
     if name.startswith("object_"):
-        return _of_object(name, of.state)
+        return _object_value(name, samples.state)
+    scene, evaluation = samples.loop.finger.scene, samples.finger.mechanism
+    assert scene is not None
+    contacts, arms = evaluation.rows[scene.contacts.group], scene.contacts.law.arms
     if name == "contact_bend":
-        return _split(of.state.contact_bend, _arms(finger) - 1)
-    around, evaluation = finger.scene, of.finger.mechanism
-    assert around is not None
-    contacts, arms = evaluation.rows[around.contacts.group], _arms(finger)
+        return _split(samples.state.contact_bend, arms - 1)
     if name in ("contact_force", "contact_point", "contact_normal"):
-        return np.asarray(getattr(of.touching, name.removeprefix("contact_")))
+        return np.asarray(getattr(samples.touching, name.removeprefix("contact_")))
     if name == "contact_normal_force":
         return contacts.force[:, ::arms]
     if name == "contact_moment":
@@ -90,70 +90,66 @@ def contact_value(name: str, finger: Finger, of: SampledTrajectory) -> Array:
     return friction if name == "contact_friction" else contacts["sliding_speed"] * (friction > 0.0)
 
 
-def _arms(finger: Finger) -> int:
+def _slip_names(finger: Finger) -> list[str]:
     assert finger.scene is not None
-    return finger.scene.contacts.law.arms
+    return ["1", "2", "spin"][: finger.scene.contacts.law.arms - 1]
 
 
-def _slips(finger: Finger) -> list[str]:
-    return ["1", "2", "spin"][: _arms(finger) - 1]
-
-
-def _of_object(name: str, state: State) -> Array:
-    """Return place, turn, or rates of the free objects."""
+def _object_value(name: str, state: State) -> Array:
+    """Return position, orientation, velocity or angular velocity of the free objects."""
     pose, velocity = _split(state.object_pose, POSE), _split(state.object_velocity, VELOCITY)
     if name == "object_position":
         return pose[..., :3]
     if name == "object_orientation":
         return pose[..., 3:]
-    return velocity[..., :3] if name == "object_velocity" else _turned(pose[..., 3:], velocity[..., 3:])
+    return velocity[..., :3] if name == "object_velocity" else _rotate(pose[..., 3:], velocity[..., 3:])
 
 
 def contact_coordinates(finger: Finger) -> dict[str, Any]:
     """Return the coordinates of these variables."""
-    around = finger.scene
-    if around is None:
+    scene = finger.scene
+    if scene is None:
         return {}
     coordinates = {
-        "contact": ("contact", list(around.contacts.names), {"long_name": "contact"}),
-        "tangent": ("tangent", _slips(finger), {"long_name": "tangent of a contact"}),
+        "contact": ("contact", list(scene.contacts.names), {"long_name": "contact"}),
+        "tangent": ("tangent", _slip_names(finger), {"long_name": "tangent of a contact"}),
     }
-    if around.free:
-        coordinates["object"] = ("object", list(around.free), {"long_name": "free object"})
+    if scene.free:
+        coordinates["object"] = ("object", list(scene.free), {"long_name": "free object"})
         coordinates["quaternion"] = ("quaternion", ["x", "y", "z", "w"], {"long_name": "component of a quaternion"})
     return coordinates
 
 
-def last_touching(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
+def last_contact_state(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
     """Return poses and velocities of free objects and the bend of bristles at an instant of a result, packed.
 
     Raises:
         InputError: If the result has other contacts or objects.
     """
-    around = finger.scene
-    if around is None:
+    scene = finger.scene
+    if scene is None:
         return {}
-    parts = {"contact_bend": ("contact_bend",)} | (_OBJECTS if around.free else {})
-    for dimension, expected in (("contact", around.contacts.names), ("object", tuple(around.free))):
+    blocks = {"contact_bend": ("contact_bend",)} | (_OBJECT_VARIABLES if scene.free else {})
+    for dimension, expected in (("contact", scene.contacts.names), ("object", tuple(scene.free))):
         recorded_names = tuple(map(str, last[dimension].values)) if dimension in last.coords else ()
-        left_out = last.attrs.get(LEFT_OUT, 0) if dimension == "contact" else 0
+        omitted = last.attrs.get(OMITTED_PAIRS, 0) if dimension == "contact" else 0
         if recorded_names != expected and not (
-            left_out and left_out + len(recorded_names) == len(expected) and {*recorded_names} < {*expected}
+            omitted and omitted + len(recorded_names) == len(expected) and {*recorded_names} < {*expected}
         ):
             raise InputError("initial", f"is a result with other {dimension}s: they must be {', '.join(expected)}")
-    # Bristles of pairs that never came near are not bent, nor those that the result's contacts did not have.
-    last = last[[name for names in parts.values() for name in names]]
-    last = last.reindex(contact=list(around.contacts.names), tangent=_slips(finger), fill_value=0.0)
-    values = {part: np.concatenate([last[name].values for name in names], axis=-1) for part, names in parts.items()}
-    if around.free:
-        # A state has angular velocities in the objects' own frames.
-        rates, back = values["object_velocity"], last["object_orientation"].values * [-1.0, -1.0, -1.0, 1.0]
-        values["object_velocity"] = np.concatenate([rates[..., :3], _turned(back, rates[..., 3:])], axis=-1)
-    return {part: each.reshape(-1) for part, each in values.items()}
+    # Bristles of omitted pairs, and those that the result's contacts did not have, are not bent.
+    last = last[[name for names in blocks.values() for name in names]]
+    last = last.reindex(contact=list(scene.contacts.names), tangent=_slip_names(finger), fill_value=0.0)
+    values = {block: np.concatenate([last[name].values for name in names], axis=-1) for block, names in blocks.items()}
+    if scene.free:
+        # A state has angular velocities in the frames of the objects.
+        velocity, inverse = values["object_velocity"], last["object_orientation"].values * [-1.0, -1.0, -1.0, 1.0]
+        values["object_velocity"] = np.concatenate([velocity[..., :3], _rotate(inverse, velocity[..., 3:])], axis=-1)
+    return {block: value.reshape(-1) for block, value in values.items()}
 
 
 def without_far_pairs(result: xr.Dataset) -> xr.Dataset:
-    """Return a result without the pairs of contacts that never came near; the attribute `LEFT_OUT` counts them.
+    """Return a result without the pairs of contacts that never came near; the attribute `OMITTED_PAIRS` counts them.
 
     Near is a millimetre, and twice what a gap changes by between samples, as pairs may touch between these.
     """
@@ -163,17 +159,17 @@ def without_far_pairs(result: xr.Dataset) -> xr.Dataset:
     bent = (result["contact_bend"] != 0.0).any(("time", "tangent")).values
     with np.errstate(invalid="ignore"):
         change = np.max(np.abs(np.diff(gap, axis=0)), axis=0, initial=0.0)
-        far = (gap.min(axis=0) > _NEAR + 2.0 * change) & ~bent
+        far = (gap.min(axis=0) > _FAR_GAP + 2.0 * change) & ~bent
     if not far.any():
         return result
-    return result.isel(contact=~far).assign_attrs({LEFT_OUT: int(result.attrs.get(LEFT_OUT, 0) + far.sum())})
+    return result.isel(contact=~far).assign_attrs({OMITTED_PAIRS: int(result.attrs.get(OMITTED_PAIRS, 0) + far.sum())})
 
 
-def _turned(quaternion: Array, vector: Array) -> Array:
+def _rotate(quaternion: Array, vector: Array) -> Array:
     """Turn vectors by unit quaternions x, y, z, w, shapes (..., 3) and (..., 4)."""
     axis, scalar = quaternion[..., :3], quaternion[..., 3:]
-    across = 2.0 * np.cross(axis, vector)
-    return np.asarray(vector + scalar * across + np.cross(axis, across))
+    cross = 2.0 * np.cross(axis, vector)
+    return np.asarray(vector + scalar * cross + np.cross(axis, cross))
 
 
 def _split(values: Array, size: int) -> Array:

@@ -20,9 +20,9 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.references.reference import Reference
-from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
+from finger_pin.simulation.accuracy import LEAST_TOLERANCES, with_tighter_tolerances
 from finger_pin.simulation.initial_state import custom_parts
-from finger_pin.simulation.recording import custom_of
+from finger_pin.simulation.recording import recorded_custom_parts
 from finger_pin.simulation.simulate import simulate
 from finger_pin.typing import Array
 
@@ -64,7 +64,7 @@ class Convergence:
 
     @property
     def converged(self) -> bool:
-        """Whether the runs stay together."""
+        """True if the runs stay together."""
         return self.parting_time is None
 
     @property
@@ -99,16 +99,16 @@ class Convergence:
         )
 
 
-def tightened(scenario: Scenario, factor: float = FACTOR) -> Scenario:
-    """Return a scenario with tolerances divided by a factor, within their bounds.
+def scenario_to_repeat(scenario: Scenario, factor: float = FACTOR) -> Scenario:
+    """Return a scenario with tolerances divided by a factor; refuse a factor that tightens nothing.
 
     Raises:
         InputError: If the factor is not above 1, or a tolerance is as tight as it can be.
     """
     if not 1.0 < factor < math.inf:
         raise InputError("factor", "must be above 1 and finite", factor)
-    tighter = with_tighter(scenario, factor)
-    for name, least in TOLERANCES.items():
+    tighter = with_tighter_tolerances(scenario, factor)
+    for name, least in LEAST_TOLERANCES.items():
         tolerance = getattr(scenario.simulation, name)
         if not getattr(tighter.simulation, name) < tolerance:
             allowed = f"must be above {least:g}, so that the run can be repeated at a tighter tolerance"
@@ -145,21 +145,21 @@ def check_convergence(
         initial: As for `simulate`.
         control_period: As for `simulate`.
         progress: Called with the simulated time of each run, s.
-        stop: Asked now and then; true ends the simulation that is running.
+        stop: Called now and then; true ends the simulation that is running.
 
     Raises:
-        InputError: If the tolerances cannot be tightened, or the result is of another scenario, or had a controller,
-            reference, force, finger or initial state of its own that is not given here.
+        InputError: If the tolerances cannot be tightened, the result is of another scenario, or it had a controller,
+            reference, force, finger or initial state that is not among these arguments.
         IntegrationError: If an integrator cannot go on.
         Interrupted: After Ctrl-C, or if ``stop`` returned true.
     """
     scenario = load_scenario(scenario)
-    tighter = tightened(scenario, factor)
+    tighter = scenario_to_repeat(scenario, factor)
     if not 0.0 < limit < math.inf:
         raise InputError("limit", "must be above 0 and finite", limit)
     finger = resolve_finger(finger, scenario)
     if result is not None:
-        _refuse_other(result, scenario, custom_parts(controller, reference, fingertip_force, initial, finger))
+        _check_same_run(result, scenario, custom_parts(controller, reference, fingertip_force, initial, finger))
 
     run = partial(
         simulate,
@@ -175,18 +175,18 @@ def check_convergence(
     first = run(scenario) if result is None else result
     # The first run has given the warnings of both.
     with warnings.catch_warnings(action="ignore", category=ScenarioWarning):
-        return _compared(first, run(tighter), limit, tighter)
+        return _compare(first, run(tighter), limit, tighter)
 
 
-def _refuse_other(result: xr.Dataset, scenario: Scenario, custom: str) -> None:
+def _check_same_run(result: xr.Dataset, scenario: Scenario, custom: str) -> None:
     """Refuse the result of another scenario, or one with other custom parts."""
     if result.attrs["scenario"] != to_toml(scenario):
         raise InputError("result", "is of another scenario")
-    if custom_of(result) != custom:
-        raise InputError("result", f"had {custom_of(result) or 'nothing'} of its own: give the same here")
+    if recorded_custom_parts(result) != custom:
+        raise InputError("result", f"had {recorded_custom_parts(result) or 'nothing'} of its own: give the same here")
 
 
-def _compared(first: xr.Dataset, second: xr.Dataset, limit: float, tighter: Scenario) -> Convergence:
+def _compare(first: xr.Dataset, second: xr.Dataset, limit: float, tighter: Scenario) -> Convergence:
     """Return the difference of two runs, the second at the tolerances of ``tighter``, as far as both go."""
     count = min(first.sizes["time"], second.sizes["time"])
     angles = [each["joint_position"].transpose("time", "joint").values[:count] for each in (first, second)]

@@ -20,16 +20,16 @@ from finger_pin.typing import Array
 
 FINGERTIP = Energy("fingertip", "fingertip force", SUPPLIED)
 _KINETIC, _GRAVITY = Energy("kinetic", "kinetic"), Energy("gravity", "gravity")
-_ROTORS = Energy("rotors", "rotors")
-_OBJECTS = Energy("objects_kinetic", "objects, kinetic"), Energy("objects_gravity", "objects, gravity")
+_ROTOR_TERM = Energy("rotors", "rotors")
+_OBJECT_TERMS = Energy("objects_kinetic", "objects, kinetic"), Energy("objects_gravity", "objects, gravity")
 
 
 @dataclass(frozen=True, eq=False)
 class Flows:
     """Powers, W, or their integrals, J, by name.
 
-    Slack is the difference that cutting a tension at zero makes: (f^a - f^f) v where f = 0. What the micro-damping
-    takes while the bristles follow the motion it may return in part while they spring back.
+    Slack is the difference that cutting a tension at zero makes: (f^a - f^f) v where f = 0. Micro-damping may return
+    part of the energy that it takes while the bristles spring back.
 
     Attributes:
         values: By name, shape (..., f).
@@ -43,7 +43,7 @@ class Flows:
     def from_rows(cls, energies: Energies, rows: Array, fingertip: Array) -> Flows:
         """Join the powers of the rows, shape (..., powers), and that of the fingertip force, shape (...,)."""
         values = np.concatenate([rows, np.asarray(fingertip)[..., None]], axis=-1)
-        return cls(values, flows(energies))
+        return cls(values, flow_terms(energies))
 
     def __getitem__(self, name: str) -> Array:
         """Return one energy or power by name, shape (...,)."""
@@ -62,22 +62,22 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
     lumps = 0.5 * np.sum(finger.tendons.mass * state.passive_velocity**2, axis=-1)
     energy_by_name = {_KINETIC.name: motion.kinetic_energy + lumps, _GRAVITY.name: motion.potential_energy, **stored}
     if finger.actuators.names and state.motor_velocity is not None:
-        turning = np.concatenate([state.spool_velocity, state.motor_velocity], axis=-1)
-        energy_by_name[_ROTORS.name] = 0.5 * np.sum(finger.actuators.inertias * turning**2, axis=-1)
+        rotor_velocity = np.concatenate([state.spool_velocity, state.motor_velocity], axis=-1)
+        energy_by_name[_ROTOR_TERM.name] = 0.5 * np.sum(finger.actuators.inertias * rotor_velocity**2, axis=-1)
     if isinstance(motion, Motion) and motion.objects is not None:
-        energy_by_name |= dict(zip((each.name for each in _OBJECTS), motion.objects, strict=True))
+        energy_by_name |= dict(zip((each.name for each in _OBJECT_TERMS), motion.objects, strict=True))
     return energy_by_name
 
 
-def flows(energies: Energies) -> tuple[Energy, ...]:
+def flow_terms(energies: Energies) -> tuple[Energy, ...]:
     """Return the entries of a mechanism's powers, with that of the fingertip force."""
     return (*energies.powers, FINGERTIP)
 
 
-def stores(finger: Finger) -> tuple[Energy, ...]:
+def stored_terms(finger: Finger) -> tuple[Energy, ...]:
     """Return the entries of a finger's stored energies."""
-    rotors = (_ROTORS,) if finger.actuators.names else ()
-    objects = () if finger.scene is None else _OBJECTS
+    rotors = (_ROTOR_TERM,) if finger.actuators.names else ()
+    objects = () if finger.scene is None else _OBJECT_TERMS
     return (_KINETIC, _GRAVITY, *finger.mechanism.energies.stored, *rotors, *objects)
 
 
@@ -91,12 +91,12 @@ def powers(signals: FingerSignals) -> Flows:
     return Flows.from_rows(evaluation.energies, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))
 
 
-def entries(result: xr.Dataset, *kinds: str) -> dict[str, xr.Variable]:
+def account_entries(result: xr.Dataset, *kinds: str) -> dict[str, xr.Variable]:
     """Return the energies in a result's account, J, that are of some kinds: stored, supplied or lost.
 
     Args:
         result: Dataset of `simulate`.
-        kinds: Of `mechanism.energies`.
+        kinds: `STORED`, `SUPPLIED` or `LOST`, of `mechanism.rows`.
 
     Returns:
         By the name of the variable; ``label`` among its attributes says in words what it is.

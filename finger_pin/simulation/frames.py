@@ -23,7 +23,7 @@ from finger_pin.typing import Array
 def in_world(result: xr.Dataset) -> xr.Dataset:
     """Return a result with all vectors in the world's frame.
 
-    Places gain the palm's, velocities of objects what the palm's motion adds; all else is turned.
+    The palm's position is added to positions, its motion to velocities of objects; all other vectors are rotated.
 
     Args:
         result: Dataset that `simulate` returned or saved, with the four variables of its palm if that moves.
@@ -31,14 +31,14 @@ def in_world(result: xr.Dataset) -> xr.Dataset:
     Raises:
         InputError: If it is a result of a palm that moves, and lacks one of these.
     """
-    turned = result.copy()
-    moves = _Palm(result) if any(str(name).startswith("palm_") for name in result) else None
+    transformed = result.copy()
+    palm = _Palm(result) if any(str(name).startswith("palm_") for name in result) else None
     for name, variable in result.data_vars.items():
         if variable.attrs.get("frame") == BASE_FRAME:
-            values = variable.values if moves is None else moves.to_world(str(name), variable)
-            turned[name] = (variable.dims, values, variable.attrs | {"frame": WORLD_FRAME})
-    turned.attrs["frame"] = WORLD_FRAME
-    return turned
+            values = variable.values if palm is None else palm.to_world(str(name), variable)
+            transformed[name] = (variable.dims, values, variable.attrs | {"frame": WORLD_FRAME})
+    transformed.attrs["frame"] = WORLD_FRAME
+    return transformed
 
 
 class _Palm:
@@ -49,35 +49,35 @@ class _Palm:
             if f"palm_{name}" not in result:
                 raise InputError("result", f"has no palm_{name}, by which places in the world are known")
         self.result = result
-        self.place, self.velocity, self.turning = (
+        self.position, self.velocity, self.angular_velocity = (
             result[f"palm_{name}"].values for name in ("position", "velocity", "angular_velocity")
         )
-        self.attitude = Rotation.from_quat(result.palm_orientation.values)
+        self.rotation = Rotation.from_quat(result.palm_orientation.values)
 
     def to_world(self, name: str, variable: xr.DataArray) -> Array:
         """Return the values of a variable in the world frame."""
         values = np.array(variable.values)
         if "quaternion" in variable.dims:
             return self._map_items(
-                values, lambda quaternion: (self.attitude * Rotation.from_quat(quaternion)).as_quat()
+                values, lambda quaternion: (self.rotation * Rotation.from_quat(quaternion)).as_quat()
             )
-        turned = self._map_items(values, self.attitude.apply)
+        rotated = self._map_items(values, self.rotation.apply)
         lead = (slice(None), *[None] * (values.ndim - 2))
         if name == "object_velocity":
-            places = self._map_items(np.array(self.result.object_position.values), self.attitude.apply)
-            return np.asarray(turned + self.velocity[lead] + np.cross(self.turning[lead], places))
+            positions = self._map_items(np.array(self.result.object_position.values), self.rotation.apply)
+            return np.asarray(rotated + self.velocity[lead] + np.cross(self.angular_velocity[lead], positions))
         if name == "object_angular_velocity":
-            return np.asarray(turned + self.turning[lead])
+            return np.asarray(rotated + self.angular_velocity[lead])
         if name == "contact_point":
-            # Of contacts that are open there is none.
-            return np.asarray(turned + self.place[lead] * np.any(values, axis=-1, keepdims=True))
-        return np.asarray(turned + self.place[lead] if variable.attrs["units"] == "m" else turned)
+            # Open contacts have no point.
+            return np.asarray(rotated + self.position[lead] * np.any(values, axis=-1, keepdims=True))
+        return np.asarray(rotated + self.position[lead] if variable.attrs["units"] == "m" else rotated)
 
     @staticmethod
-    def _map_items(values: Array, change: Callable[[Array], Array]) -> Array:
-        """Change vectors or quaternions, shape (m, ..., k), at all samples, for each of several items."""
+    def _map_items(values: Array, function: Callable[[Array], Array]) -> Array:
+        """Apply a function of all samples of one vector or quaternion to several, shape (m, ..., k)."""
         flat = values.reshape(len(values), -1, values.shape[-1])
-        return np.stack([change(flat[:, k]) for k in range(flat.shape[1])], axis=1).reshape(values.shape)
+        return np.stack([function(flat[:, k]) for k in range(flat.shape[1])], axis=1).reshape(values.shape)
 
 
 class Scene(NamedTuple):
@@ -90,15 +90,15 @@ class Scene(NamedTuple):
 def scene_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the attributes of a result of a scenario from which `read_scene` reads."""
     kind, subject = ("hand", scenario.hand) if scenario.hand else ("finger", scenario.finger)
-    objects = {name: _plain(body) for name, body in (scenario.environment.objects or {}).items()}
-    return {kind: json.dumps(_plain(subject)), "objects": json.dumps(objects)}
+    objects = {name: _as_dict(body) for name, body in (scenario.environment.objects or {}).items()}
+    return {kind: json.dumps(_as_dict(subject)), "objects": json.dumps(objects)}
 
 
 def read_scene(attributes: Mapping[Any, Any]) -> Scene:
     """Return the subject of a result, given its attributes.
 
     Raises:
-        InputError: If they do not say.
+        InputError: If they lack it.
     """
     for kind in ("finger", "hand"):
         if kind in attributes:
@@ -114,11 +114,11 @@ def _read_scene(kind: str, text: str, objects: str) -> Scene:
         table, bodies = json.loads(text), json.loads(objects)
     except ValueError as error:
         raise InputError(entry, "must be a description in JSON") from error
-    around = {name: validate(Object, body, ("result.attrs.objects", name)) for name, body in bodies.items()}
+    scene_objects = {name: validate(Object, body, ("result.attrs.objects", name)) for name, body in bodies.items()}
     if kind == "hand":
-        return Scene(validate(HandSettings, table, (entry,)).joined(), around)
-    return Scene(validate(FingerDescription, table, (entry,)), around)
+        return Scene(validate(HandSettings, table, (entry,)).joined(), scene_objects)
+    return Scene(validate(FingerDescription, table, (entry,)), scene_objects)
 
 
-def _plain(description: Description) -> dict[str, Any]:
+def _as_dict(description: Description) -> dict[str, Any]:
     return description.model_dump(mode="python", exclude_none=True)

@@ -14,7 +14,7 @@ from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import BLOCKS, State
-from finger_pin.simulation.contact_variables import last_touching
+from finger_pin.simulation.contact_variables import last_contact_state
 from finger_pin.simulation.motor_variables import LOOP_VARIABLES
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.typing import Array
@@ -39,7 +39,7 @@ def custom_parts(
         "initial state": initial,
         "finger": finger,
     }
-    return ", ".join(name for name, each in arguments.items() if each is not None)
+    return ", ".join(name for name, argument in arguments.items() if argument is not None)
 
 
 def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
@@ -65,16 +65,16 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
         if dimension not in initial.coords or tuple(map(str, initial[dimension].values)) != names:
             raise InputError("initial", f"is a result of another finger: its {dimension}s must be {', '.join(names)}")
     require_samples(initial)
-    last, parts = initial.isel(time=-1), {}
+    last, blocks = initial.isel(time=-1), {}
     sizes = vars(finger.layout.unpack(np.zeros(finger.layout.size)))
-    for part, name in ((part, block.variable) for part, block in BLOCKS.items() if block.variable):
+    for block, name in ((block, entry.variable) for block, entry in BLOCKS.items() if entry.variable):
         if name in last:
-            parts[part] = np.atleast_1d(last[name].values)
-        elif sizes[part].size:
+            blocks[block] = np.atleast_1d(last[name].values)
+        elif sizes[block].size:
             raise InputError("initial", f"has no {name}; give what simulate returned")
         else:
-            parts[part] = np.zeros(0)
-    x = finger.layout.pack(State(**(parts | last_touching(finger, last))))
+            blocks[block] = np.zeros(0)
+    x = finger.layout.pack(State(**(blocks | last_contact_state(finger, last))))
     _fill_rows(finger, last, x)
     return finite_vector("initial", x, finger.layout.size)
 
@@ -94,8 +94,8 @@ def _fill_rows(finger: Finger, last: xr.Dataset, x: Array) -> None:
             z[part] = np.ravel(last[name].values)
 
 
-def started(loop: ClosedLoop, initial: ArrayLike | xr.Dataset | None) -> ClosedLoop:
-    """Return a loop that starts at a packed state, or goes on from a result; the loop itself for None.
+def with_initial_state(loop: ClosedLoop, initial: ArrayLike | xr.Dataset | None) -> ClosedLoop:
+    """Return a loop with an initial state: a packed one, or the last of a result; the loop itself for None.
 
     Raises:
         InputError: As `packed_state`.
@@ -117,8 +117,8 @@ def _last_samples(initial: xr.Dataset, finger: Finger) -> LoopMemory | None:
     last = initial.isel(time=-1)
     if missing := [name for name in LOOP_VARIABLES if name not in last]:
         raise InputError("initial", f"has no {missing[0]}; give what simulate returned")
-    age, *rest = (last[name].values for name in LOOP_VARIABLES)
-    return LoopMemory(float(age), *(each[finger.actuators.holds] for each in rest))
+    age, *signals = (last[name].values for name in LOOP_VARIABLES)
+    return LoopMemory(float(age), *(signal[finger.actuators.holds] for signal in signals))
 
 
 def as_finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -130,23 +130,23 @@ def as_finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Arra
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(name, _wanted(shape), value) from None
+        raise InputError(name, _size_message(shape), value) from None
     if array.shape != shape:
-        raise InputError(name, f"{_wanted(shape)}, not an array of shape {array.shape}")
-    # Of a few numbers Python asks sooner than NumPy.
+        raise InputError(name, f"{_size_message(shape)}, not an array of shape {array.shape}")
+    # Plain Python is faster than NumPy for a few values.
     if not all(map(math.isfinite, array.ravel().tolist())):
         raise InputError(name, "must be finite", array.tolist())
     return array
 
 
-def _wanted(shape: tuple[int, ...]) -> str:
+def _size_message(shape: tuple[int, ...]) -> str:
     return f"must be {' times '.join(map(str, shape))} numbers"
 
 
 def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:
-    """Refuse a packed state in which a motor turns faster than its supply and its current limit can stand.
+    """Refuse a packed state in which a motor turns faster than its supply and its current limit allow.
 
-    What it induces is then more than the supply and what the greatest current takes away at its resistance.
+    Its induced voltage is then above the supply voltage plus the drop of the greatest current at its resistance.
 
     Args:
         finger: With motors or without.
@@ -160,8 +160,8 @@ def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:
         return
     speed, actuators = finger.layout.unpack(x).motor_velocity, finger.actuators
     constant, resistance, supply, limit = actuators.motor[:4]
-    most = (supply + resistance * limit) / constant
-    for motor, rate, greatest in zip(actuators.names, speed, most, strict=True):
-        if abs(rate) > greatest:
+    greatest_speeds = (supply + resistance * limit) / constant
+    for motor, motor_speed, greatest in zip(actuators.names, speed, greatest_speeds, strict=True):
+        if abs(motor_speed) > greatest:
             allowed = f"motor {motor} must turn by at most {greatest:.4g} rad/s at its spool, which its supply can hold"
-            raise InputError(name, allowed, float(rate))
+            raise InputError(name, allowed, float(motor_speed))

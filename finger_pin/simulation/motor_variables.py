@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory, of_state
+from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory, state_block
 from finger_pin.typing import Array
 
-_MOTOR = ("time", "motor")
+_DIMS = ("time", "motor")
 #: What a run that goes on needs of its loops' last sample, in the order of `LoopMemory`.
 LOOP_VARIABLES = ("position_loop_age", "position_loop_error", "position_loop_integral", "position_loop_voltage")
 
@@ -21,14 +21,14 @@ def motor_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     if not actuators.names:
         return {}
 
-    def driven(of: SampledTrajectory, name: str) -> Array:
-        return np.asarray(getattr(of.finger.motors, name))
+    def motor_signal(run: SampledTrajectory, name: str) -> Array:
+        return np.asarray(getattr(run.finger.motors, name))
 
-    loose = ("spool_position", "spool_velocity") if actuators.loose_names else ()
-    table = {name: of_state(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction", *loose)}
+    spools = ("spool_position", "spool_velocity") if actuators.loose_names else ()
+    table = {name: state_block(name) for name in ("motor_position", "motor_velocity", "gearbox_stiction", *spools)}
     table |= {
-        name: Quantity(_MOTOR, partial(driven, name=inner), units, long_name, equation)
-        for name, inner, units, long_name, equation in (
+        name: Quantity(_DIMS, partial(motor_signal, name=attribute), units, long_name, equation)
+        for name, attribute, units, long_name, equation in (
             ("motor_current", "current", "A", "current of the winding", ""),
             ("motor_voltage", "voltage", "V", "voltage at the winding", ""),
             ("motor_torque", "torque", "N m", "torque of the motor, at the spool", ""),
@@ -37,23 +37,23 @@ def motor_variables(loop: ClosedLoop) -> dict[str, Quantity]:
         )
     }
     if loop.drives is not None and loop.drives.compiled is not None:
-        table |= _of_loops()
+        table |= _loop_variables()
     return table
 
 
-def _of_loops() -> dict[str, Quantity]:
+def _loop_variables() -> dict[str, Quantity]:
     """Return the variables of the last sample of position loops; zero for motors without one."""
 
-    def age(of: SampledTrajectory) -> Array:
-        assert of.loop.drives is not None and of.loop.drives.compiled is not None
-        drives = of.loop.drives.compiled
-        since: Array = of.times - drives.first - drives.period * drives.latest(of.times)
-        return np.maximum(since, 0.0)
+    def age(run: SampledTrajectory) -> Array:
+        assert run.loop.drives is not None and run.loop.drives.compiled is not None
+        drives = run.loop.drives.compiled
+        elapsed: Array = run.times - drives.first - drives.period * drives.latest(run.times)
+        return np.maximum(elapsed, 0.0)
 
-    def sampled(of: SampledTrajectory, name: str) -> Array:
-        assert of.loop.drives is not None and of.loop.drives.compiled is not None
-        drives, values = of.loop.drives.compiled, np.zeros((len(of.times), len(of.loop.finger.actuators.names)))
-        values[:, of.loop.finger.actuators.holds] = drives.zero_order_hold(getattr(drives, name), of.times)
+    def sampled_signal(run: SampledTrajectory, name: str) -> Array:
+        assert run.loop.drives is not None and run.loop.drives.compiled is not None
+        drives, values = (run.loop.drives.compiled, np.zeros((len(run.times), len(run.loop.finger.actuators.names))))
+        values[:, run.loop.finger.actuators.holds] = drives.zero_order_hold(getattr(drives, name), run.times)
         return values
 
     texts = (
@@ -63,6 +63,6 @@ def _of_loops() -> dict[str, Quantity]:
     )
     ages = Quantity(("time",), age, "s", "time since the last sample of the position loops")
     return {LOOP_VARIABLES[0]: ages} | {
-        name: Quantity(_MOTOR, partial(sampled, name=history), unit, text)
+        name: Quantity(_DIMS, partial(sampled_signal, name=history), unit, text)
         for name, (history, unit, text) in zip(LOOP_VARIABLES[1:], texts, strict=True)
     }

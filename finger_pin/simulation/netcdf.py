@@ -62,8 +62,8 @@ def _columns(dataset: xr.Dataset) -> dict[str, Array]:
         labels = product(*(dataset[each].values if each in dataset else range(signal.sizes[each]) for each in others))
         values = signal.transpose("time", *others).values.reshape(signal.sizes["time"], -1)
         for label, column in zip(labels, values.T, strict=True):
-            which = f"[{' '.join(map(str, label))}]" if label else ""
-            columns[f"{name}{which} ({signal.attrs.get('units', '1')})"] = column
+            suffix = f"[{' '.join(map(str, label))}]" if label else ""
+            columns[f"{name}{suffix} ({signal.attrs.get('units', '1')})"] = column
     return columns
 
 

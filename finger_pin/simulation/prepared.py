@@ -1,4 +1,4 @@
-"""A prepared scenario: many runs with other numbers, at the cost of their steps."""
+"""A prepared scenario: many runs with other parameters, without the cost of building them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.accuracy import with_tighter
-from finger_pin.simulation.initial_state import custom_parts, started
-from finger_pin.simulation.recording import RunArrays, attributes_of, record, recorded, refuse_unknown
-from finger_pin.simulation.running import interruptible, run
+from finger_pin.simulation.accuracy import with_tighter_tolerances
+from finger_pin.simulation.initial_state import custom_parts, with_initial_state
+from finger_pin.simulation.recording import RunArrays, check_variables, record, record_arrays, run_attributes
+from finger_pin.simulation.run import interruptible, run
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
-from finger_pin.simulation.sensitivity import add_slopes, changed, nearby, with_exact_encoders
+from finger_pin.simulation.sensitivity import add_slopes, make_variations, repeat_steps, with_exact_encoders
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates, variables
 from finger_pin.typing import Array
@@ -32,7 +32,7 @@ from finger_pin.typing import Array
 #: What a run records unless it is told otherwise.
 RECORDED = ("joint_position", "tendon_tension")
 # Derivatives are those of runs at so much smaller tolerances: they err more than what they are of.
-_FINER = 10.0
+_SENSITIVITY_FACTOR = 10.0
 
 
 def prepare(
@@ -42,7 +42,7 @@ def prepare(
     *,
     finger: FingerLike | None = None,
 ) -> Prepared:
-    """Prepare a scenario for many runs with other numbers.
+    """Prepare a scenario for many runs with other parameters.
 
         prepared = fp.prepare("fig6", ["finger.tendon_friction.coulomb", "controller.gain"], ["joint_position"])
         run = prepared.run([0.12, 1.0])
@@ -58,10 +58,10 @@ def prepare(
     Raises:
         InputError: If there is no such key or variable.
     """
-    described = load_scenario(scenario)
-    custom_finger = resolve_finger(finger, described)
+    loaded = load_scenario(scenario)
+    custom_finger = resolve_finger(finger, loaded)
     return Prepared(
-        ParametrisedScenario(with_finger(described, custom_finger), tuple(parameters)), tuple(record), custom_finger
+        ParametrisedScenario(with_finger(loaded, custom_finger), tuple(parameters)), tuple(record), custom_finger
     )
 
 
@@ -78,7 +78,7 @@ class Prepared:
         """Build the parts that the runs share; use `prepare`."""
         self.family, self.record, self._custom_finger = family, record, finger
         loop = ClosedLoop.from_scenario(family.scenario, finger=finger)
-        refuse_unknown("record", record, variables(loop))
+        check_variables("record", record, variables(loop))
         self._finger = loop.finger
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
@@ -116,7 +116,7 @@ class Prepared:
     ) -> RunArrays:
         """Simulate, and return only the recorded variables, bit for bit those of `simulate`.
 
-        Nothing is judged: whether the energy account closes, `simulate` says.
+        Accuracy is not checked; `simulate` also computes the energy account.
 
         Args:
             values: One for each key, in their order; by default the scenario's own.
@@ -132,56 +132,56 @@ class Prepared:
             Interrupted: After Ctrl-C, or if ``stop`` returned true; its ``result`` holds what was computed. It is a
                 KeyboardInterrupt.
         """
-        return interruptible(lambda asked: self._run(values, initial, asked, sensitivities), stop)
+        return interruptible(lambda token: self._run(values, initial, token, sensitivities), stop)
 
     def _run(
         self, values: Sequence[Any] | None, initial: ArrayLike | xr.Dataset | None, stop: Stop, sensitivities: bool
     ) -> RunArrays:
         scenario = self.scenario(values)
-        setup, _, arrays = self._made(scenario, initial, stop)
+        setup, _, arrays = self._integrate(scenario, initial, stop)
         if not sensitivities:
             return arrays
-        chosen_values = self.values if values is None else values
-        for key, value in zip(self.parameters, chosen_values, strict=True):
+        parameter_values = self.values if values is None else values
+        for key, value in zip(self.parameters, parameter_values, strict=True):
             if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
                 raise InputError(key, "sensitivities are those to single numbers", value)
         if setup.method not in TABLEAUS:
             raise InputError("simulation.method", f"sensitivities are for {', '.join(TABLEAUS)}", setup.method)
-        numbers = [float(value) for value in chosen_values]
-        sizes = [abs(value) or 1.0 for value in numbers]
-        others, changes = changed(
-            numbers, sizes, lambda moved: self._setup(with_exact_encoders(self.scenario(moved)), initial)
+        base_values = [float(value) for value in parameter_values]
+        sizes = [abs(value) or 1.0 for value in base_values]
+        variations, changes = make_variations(
+            base_values, sizes, lambda varied: self._setup(with_exact_encoders(self.scenario(varied)), initial)
         )
         scenario = with_exact_encoders(scenario)
-        _, chosen, _ = self._made(with_tighter(scenario, _FINER), initial, stop)
-        # The unchanged one too, so that what a parameter does not touch differs by nothing, not by rounding.
-        setups = [self._setup(scenario, initial), *others]
-        repeated = list(zip(setups, nearby(chosen, setups), strict=True))
-        base, *runs = in_threads(lambda pair: self._recorded(*pair), repeated)
-        return add_slopes(arrays, base, numbers, runs, changes)
+        _, reference, _ = self._integrate(with_tighter_tolerances(scenario, _SENSITIVITY_FACTOR), initial, stop)
+        # The unchanged run is repeated as well, so that signals without a dependence differ by exactly zero.
+        setups = [self._setup(scenario, initial), *variations]
+        runs = list(zip(setups, repeat_steps(reference, setups), strict=True))
+        base, *varied_runs = in_threads(lambda pair: self._record(*pair), runs)
+        return add_slopes(arrays, base, base_values, varied_runs, changes)
 
     def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
         return Setup.from_scenario(scenario, self._loop(scenario, initial))
 
-    def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
-        motions = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
-        names = coordinates(setup.scenario, setup.loop, motions.times)
-        attributes = attributes_of(setup.scenario, trajectory, setup.method)
-        return RunArrays(recorded(motions, self.record), names, attributes)
+    def _record(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
+        samples = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
+        labels = coordinates(setup.scenario, setup.loop, samples.times)
+        attributes = run_attributes(setup.scenario, trajectory, setup.method)
+        return RunArrays(record_arrays(samples, self.record), labels, attributes)
 
-    def _made(
+    def _integrate(
         self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, stop: Stop | None
     ) -> tuple[Setup, Trajectory, RunArrays]:
-        """Make a run."""
+        """Return the setup, trajectory and arrays of a run; raise with the partial result if it ends early."""
         setup = self._setup(scenario, initial)
         trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:
-            motions = SampledTrajectory(setup.loop, trajectory, scenario.sample_times(), self.record)
-            reached, partial = float(trajectory.breakpoints[-1]), record(scenario, motions, setup.method, self.record)
+            samples = SampledTrajectory(setup.loop, trajectory, scenario.sample_times(), self.record)
+            end, partial = float(trajectory.breakpoints[-1]), record(scenario, samples, setup.method, self.record)
             if trajectory.failure:
-                raise IntegrationError(reached, *setup.failure(trajectory), partial)
-            raise Interrupted(reached, partial)
-        return setup, trajectory, self._recorded(setup, trajectory)
+                raise IntegrationError(end, *setup.failure(trajectory), partial)
+            raise Interrupted(end, partial)
+        return setup, trajectory, self._record(setup, trajectory)
 
     def simulate(
         self,
@@ -201,11 +201,11 @@ class Prepared:
         """
         scenario = self.scenario(values)
         custom, loop = custom_parts(None, None, None, initial, self._custom_finger), self._loop(scenario, initial)
-        return interruptible(lambda asked: run(scenario, loop, custom, progress=progress, stop=asked), stop)
+        return interruptible(lambda token: run(scenario, loop, custom, progress=progress, stop=token), stop)
 
     def _loop(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None = None) -> ClosedLoop:
         """Return the loop of one scenario of the family."""
-        # Where nothing of it changes in a run all share it, also in threads.
+        # Runs in which the finger does not change share it, also in threads.
         finger = with_parameters_of(self._finger, self.family.scenario, scenario)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
-        return started(loop, initial)
+        return with_initial_state(loop, initial)

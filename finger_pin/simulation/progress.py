@@ -38,8 +38,8 @@ class ProgressBar:
             from tqdm.auto import tqdm
 
         patience = _PATIENCE if in_notebook() else 0.0
-        look: dict[str, Any] = {"unit": f" {unit}", "bar_format": _SIMULATED if unit == "s" else None}
-        self._bar = tqdm(total=total, delay=patience, leave=in_notebook(), dynamic_ncols=True, **look)
+        options: dict[str, Any] = {"unit": f" {unit}", "bar_format": _SIMULATED if unit == "s" else None}
+        self._bar = tqdm(total=total, delay=patience, leave=in_notebook(), dynamic_ncols=True, **options)
 
     def __call__(self, done: float, *further: float, text: str = "", note: str = "") -> None:
         """Show the finished part, with a text before the bar and a note after it."""

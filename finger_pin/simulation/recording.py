@@ -27,51 +27,51 @@ from finger_pin.typing import Array
 _PACKAGES = ("finger-pin", "pin", "numba", "numpy", "scipy", "xarray")
 
 #: Variables by name: dimensions, of which time is the first, values and attributes.
-Recorded = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
+Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
 
 
-def recorded(motions: SampledTrajectory, names: Sequence[str] | None = None, entry: str = "record") -> Recorded:
+def record_arrays(samples: SampledTrajectory, names: Sequence[str] | None = None, entry: str = "record") -> Variables:
     """Return variables of a motion, by default all, from only the signals that they need.
 
     Args:
-        motions: The motion at the times that are recorded.
+        samples: The motion at the times that are recorded.
         names: Of the variables.
-        entry: What named them.
+        entry: Argument that named them, for messages.
 
     Raises:
         InputError: If the result has no such variable.
     """
-    table = variables(motions.loop)
-    refuse_unknown(entry, names or (), table)
-    if names is None and motions.control.torque_deficit is None:
+    table = variables(samples.loop)
+    check_variables(entry, names or (), table)
+    if names is None and samples.control.torque_deficit is None:
         del table[SHORTFALL]
-    chosen = table if names is None else {name: table[name] for name in names}
-    # A motion at the edge of what numbers hold has energies beyond it: that is told apart from this.
-    # And a few variables are no reason to keep what they are views of.
-    kept = np.asarray if names is None else np.array
+    quantities = table if names is None else {name: table[name] for name in names}
+    # Energies of a diverging motion may overflow; the motion itself is checked elsewhere.
+    # A few variables are copied, so that the arrays they are views of are freed.
+    convert = np.asarray if names is None else np.array
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return {name: (each.dims, kept(each.value(motions)), each.attributes) for name, each in chosen.items()}
+        return {name: (each.dims, convert(each.value(samples)), each.attributes) for name, each in quantities.items()}
 
 
-def only(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
+def select(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
     """Return a result with variables of some names, and all coordinates."""
-    kept = {*names}
-    return result.drop_vars([name for name in result.data_vars if name not in kept])
+    selected = {*names}
+    return result.drop_vars([name for name in result.data_vars if name not in selected])
 
 
-def refuse_unknown(entry: str, names: Iterable[str], known: Iterable[str]) -> None:
+def check_variables(entry: str, names: Iterable[str], allowed_names: Iterable[str]) -> None:
     """Raise unless a result has all variables of some names."""
     if isinstance(names, str):
         raise InputError(entry, "must be a list of names", names)
-    known = list(known)
+    allowed_names = list(allowed_names)
     for name in names:
-        if name not in known:
-            raise InputError(entry, f"the result has no such variable; it has {choices(name, known)}", name)
+        if name not in allowed_names:
+            raise InputError(entry, f"the result has no such variable; it has {choices(name, allowed_names)}", name)
 
 
 def record(
     scenario: Scenario,
-    motions: SampledTrajectory,
+    samples: SampledTrajectory,
     method: str,
     names: Sequence[str] | None = None,
     text: str | None = None,
@@ -80,18 +80,18 @@ def record(
 
     Args:
         scenario: The scenario of the run.
-        motions: The motion at the times that are recorded.
+        samples: The motion at the times that are recorded.
         method: Its integrator.
         names: Of the variables; by default all.
         text: The scenario's TOML; written anew unless it is given.
     """
-    data_variables = recorded(motions, names)
+    data_variables = record_arrays(samples, names)
     texts = {"scenario": to_toml(scenario) if text is None else text, **scene_metadata(scenario)}
-    attributes = {**attributes_of(scenario, motions.trajectory, method), **texts}
-    return xr.Dataset(data_variables, coordinates(scenario, motions.loop, motions.times), attributes)
+    attributes = {**run_attributes(scenario, samples.trajectory, method), **texts}
+    return xr.Dataset(data_variables, coordinates(scenario, samples.loop, samples.times), attributes)
 
 
-def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
+def run_attributes(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
     """Return the attributes of a result about its run: its end, method and cost."""
     statistics = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
     return {
@@ -107,14 +107,14 @@ def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> di
     }
 
 
-def custom_of(result: xr.Dataset) -> str:
+def recorded_custom_parts(result: xr.Dataset) -> str:
     """Return the names of a result's custom parts, empty for none; results before 0.6 call them ``own``."""
     return str(result.attrs.get("custom", result.attrs.get("own", "")))
 
 
 def is_tracking(result: xr.Dataset) -> bool:
     """Return whether joints were to follow a reference; under given tensions only one that moves counts."""
-    open_loop = result.attrs.get("controller") == "tensions" and not custom_of(result)
+    open_loop = result.attrs.get("controller") == "tensions" and not recorded_custom_parts(result)
     return not open_loop or bool(np.ptp(result["joint_reference"].values, axis=0).any())
 
 
@@ -130,7 +130,7 @@ def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
     ones = np.ones(length)
     for name in result.data_vars:
         values = result.variables[name].values.reshape(len(ones), -1)
-        # The sums alone tell in most cases, and BLAS has them soonest.
+        # The sums suffice in most cases, and BLAS computes them fastest.
         if np.isfinite(ones @ values).all():
             continue
         finite = np.isfinite(values).all(axis=1)
@@ -154,11 +154,11 @@ def check_memory(settings: SimulationSettings, finger: Finger) -> None:
     # Every signal of a result, and what it is computed from: measured, 3.5 kB a sample of fig6 and 19 kB of pinch.
     rows = sum(table.count for table in finger.mechanism.rows)
     needed = samples * 8.0 * (25 * rows + 3 * finger.layout.size)
-    present = physical_memory()
-    if needed > present:
+    available = physical_memory()
+    if needed > available:
         allowed = (
             f"{samples:.3g} samples need about {needed / 2**30:.3g} GiB of memory, of which there are "
-            f"{present / 2**30:.3g}; must be at most {settings.sample_rate * present / needed:.3g}"
+            f"{available / 2**30:.3g}; must be at most {settings.sample_rate * available / needed:.3g}"
         )
         raise InputError("simulation.sample_rate", allowed, settings.sample_rate)
 
@@ -169,13 +169,13 @@ class RunArrays:
 
     Attributes:
         variables: Dimensions, of which time is the first, values and attributes, by name.
-        coordinates: Likewise, or the values alone.
+        coordinates: The same, or the values alone.
         attrs: End, cost and settings of the run.
         slopes: Derivatives of the variables by the values that the run was given, shape (p, ...), if they were asked
             for.
     """
 
-    variables: Recorded
+    variables: Variables
     coordinates: dict[str, Any]
     attrs: dict[str, Any]
     slopes: dict[str, Array] = field(default_factory=dict)

@@ -14,16 +14,16 @@ import xarray as xr
 from finger_pin.exceptions import InputError
 from finger_pin.files import NEW, publish
 from finger_pin.simulation.netcdf import save
-from finger_pin.simulation.recording import custom_of
+from finger_pin.simulation.recording import recorded_custom_parts
 
-_MARK = "# The input that led to the results in this folder, complete: running it again gives the same trajectory.\n"
-_MARK_OF_CUSTOM = (
+_HEADER = "# The input that led to the results in this folder, complete: running it again gives the same trajectory.\n"
+_CUSTOM_HEADER = (
     "# The scenario of the results in this folder, run with a {} of its own: alone it gives another motion.\n"
 )
 _FILES = ("scenario.toml", "trajectory.nc", "animation.html")
 _FIGURES = "figures"
 # What has not been touched for so long, s, is from a run that was killed; a run makes its stage anew where need be.
-_STAGE, _STALE = ".unfinished-", 3600.0
+_STAGE_PREFIX, _STALE_AGE = ".unfinished-", 3600.0
 
 
 class ResultFolder:
@@ -52,20 +52,20 @@ class ResultFolder:
             OSError: If it cannot be written.
         """
         self.path = Path(path)
-        self._whole = self.path / f"{_STAGE}{uuid.uuid4().hex[:12]}"
-        self.stage = self._whole / NEW
+        self._staging = self.path / f"{_STAGE_PREFIX}{uuid.uuid4().hex[:12]}"
+        self.stage = self._staging / NEW
         if "\0" in str(path):
             raise InputError("output", "is no name of a folder", str(path))
-        self._refuse_foreign()
-        self._made = [each for each in (self.path, *self.path.parents) if not each.exists()]
+        self._check_contents()
+        self._new_folders = [each for each in (self.path, *self.path.parents) if not each.exists()]
         try:
             self.stage.mkdir(parents=True)
         except OSError as error:
             self.discard()
             raise OSError(error.errno, error.strerror, str(path)) from None
-        for stale in self.path.glob(f"{_STAGE}*"):
+        for stale in self.path.glob(f"{_STAGE_PREFIX}*"):
             with contextlib.suppress(OSError):
-                if stale.stat().st_mtime < time.time() - _STALE:
+                if stale.stat().st_mtime < time.time() - _STALE_AGE:
                     shutil.rmtree(stale)
 
     def write(self, result: xr.Dataset) -> None:
@@ -75,10 +75,10 @@ class ResultFolder:
             OSError: If they cannot be written, such as on a full disk.
         """
         self.stage.mkdir(parents=True, exist_ok=True)
-        self._whole.touch()
-        custom = custom_of(result)
-        mark = _MARK_OF_CUSTOM.format(custom) if custom else _MARK
-        (self.stage / "scenario.toml").write_text(mark + result.attrs["scenario"], encoding="utf-8", newline="\n")
+        self._staging.touch()
+        custom = recorded_custom_parts(result)
+        header = _CUSTOM_HEADER.format(custom) if custom else _HEADER
+        (self.stage / "scenario.toml").write_text(header + result.attrs["scenario"], encoding="utf-8", newline="\n")
         save(result, self.stage / "trajectory.nc")
 
     def publish(self) -> None:
@@ -87,12 +87,12 @@ class ResultFolder:
         Raises:
             OSError: If a file cannot be written; the earlier results are then in place.
         """
-        publish(self._whole, self.path, lambda: _artifacts(self.path))
+        publish(self._staging, self.path, lambda: _artifacts(self.path))
 
     def discard(self) -> None:
         """Remove the stage, and folders that were made and stayed empty."""
-        shutil.rmtree(self._whole, ignore_errors=True)
-        for folder in self._made:
+        shutil.rmtree(self._staging, ignore_errors=True)
+        for folder in self._new_folders:
             with contextlib.suppress(OSError):
                 folder.rmdir()
 
@@ -109,16 +109,16 @@ class ResultFolder:
         """Remove the rest of the stage."""
         self.discard()
 
-    def _refuse_foreign(self) -> None:
+    def _check_contents(self) -> None:
         """Refuse to replace files that no run wrote."""
         path_text = str(self.path)
         for folder in (self.path, self.path / _FIGURES):
             if folder.exists() and not folder.is_dir():
                 raise InputError("output", f"{folder} is a file; name a folder", path_text)
-        present = _artifacts(self.path)
-        if present and not _is_marked(self.path):
+        existing = _artifacts(self.path)
+        if existing and not _has_header(self.path):
             raise InputError(
-                "output", f"holds a {Path(present[0]).name} that is not from a run; name another folder", path_text
+                "output", f"holds a {Path(existing[0]).name} that is not from a run; name another folder", path_text
             )
 
 
@@ -128,10 +128,10 @@ def _artifacts(folder: Path) -> list[str]:
     return [name for name in [*_FILES, *figures] if (folder / name).exists()]
 
 
-def _is_marked(folder: Path) -> bool:
+def _has_header(folder: Path) -> bool:
     try:
         with open(folder / "scenario.toml", "rb") as file:
             line = file.readline(1000).decode("utf-8", "replace")
-            return any(line.startswith(mark.split("{")[0]) for mark in (_MARK, _MARK_OF_CUSTOM))
+            return any(line.startswith(header.split("{")[0]) for header in (_HEADER, _CUSTOM_HEADER))
     except OSError:
         return False

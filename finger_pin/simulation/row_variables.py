@@ -9,26 +9,26 @@ import numpy as np
 
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rows import LOST, Rows
-from finger_pin.simulation.energy import flows, stores
+from finger_pin.simulation.energy import flow_terms, stored_terms
 from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory
 from finger_pin.typing import Array
 
-_TIME = ("time",)
+_DIMS = ("time",)
 RESIDUAL = "energy_residual"
 
 
 def extra_row_variables(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
     """Return the signals of the rows of some tables, by name."""
 
-    def row_signal(of: SampledTrajectory, group: str, name: str) -> Array:
-        rows = of.finger.mechanism.rows[group]
+    def row_signal(run: SampledTrajectory, group: str, name: str) -> Array:
+        rows = run.finger.mechanism.rows[group]
         return np.asarray(getattr(rows.row, name))
 
-    def force(of: SampledTrajectory, group: str) -> Array:
-        return of.finger.mechanism.rows[group].force
+    def force(run: SampledTrajectory, group: str) -> Array:
+        return run.finger.mechanism.rows[group].force
 
-    def shown(of: SampledTrajectory, group: str, index: int) -> Array:
-        return of.finger.mechanism.rows[group].signals[index]
+    def law_signal(run: SampledTrajectory, group: str, index: int) -> Array:
+        return run.finger.mechanism.rows[group].signals[index]
 
     quantities: dict[str, Quantity] = {}
     for table in tables:
@@ -36,7 +36,7 @@ def extra_row_variables(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
         units = {"length": table.unit, "speed": f"{table.unit}/s", "force": "N m" if table.unit == "rad" else "N"}
         values: dict[str, Callable[[SampledTrajectory], Array]] = {"force": partial(force, group=group)}
         values |= {name: partial(row_signal, group=group, name=name) for name in ("length", "speed")}
-        values |= {name: partial(shown, group=group, index=i) for i, name in enumerate(table.law.signals)}
+        values |= {name: partial(law_signal, group=group, index=i) for i, name in enumerate(table.law.signals)}
         if np.any(table.channels >= 0):
             values["input"] = partial(row_signal, group=group, name="command")
         if table.law.scale is not None:
@@ -52,33 +52,33 @@ def cord_variables(finger: Finger) -> dict[str, Quantity]:
     if not finger.cord_names:
         return {}
     text = "delivered tension of a cord that servos, muscles or springs pull; negative where a servo pushes it"
-    return {"cord_tension": Quantity(("time", "cord"), lambda of: of.finger.cord_tension, "N", text, "12")}
+    return {"cord_tension": Quantity(("time", "cord"), lambda run: run.finger.cord_tension, "N", text, "12")}
 
 
 def account_variables(finger: Finger) -> dict[str, Quantity]:
     """Return the stored energies, the powers, their integrals and the residual of the account, by name."""
 
-    def stored(of: SampledTrajectory, name: str) -> Array:
-        return of.stored[name]
+    def stored(run: SampledTrajectory, name: str) -> Array:
+        return run.stored[name]
 
-    def power(of: SampledTrajectory, name: str) -> Array:
-        return of.powers[name]
+    def power(run: SampledTrajectory, name: str) -> Array:
+        return run.powers[name]
 
-    def work(of: SampledTrajectory, name: str) -> Array:
-        return of.account.works[name]
+    def work(run: SampledTrajectory, name: str) -> Array:
+        return run.account.works[name]
 
     table = {}
-    for term in stores(finger):
+    for term in stored_terms(finger):
         table[f"energy_{term.name}"] = Quantity(
-            _TIME, partial(stored, name=term.name), "J", f"energy stored: {term.label}", energy_term=term
+            _DIMS, partial(stored, name=term.name), "J", f"energy stored: {term.label}", energy_term=term
         )
-    # What comes in before what is lost.
-    for term in sorted(flows(finger.mechanism.energies), key=lambda term: term.kind == LOST):
+    # Supplied powers come before losses.
+    for term in sorted(flow_terms(finger.mechanism.energies), key=lambda term: term.kind == LOST):
         name, text = term.name, f"{term.kind}: {term.label}"
-        table[f"power_{name}"] = Quantity(_TIME, partial(power, name=name), "W", f"power {text}", energy_term=term)
+        table[f"power_{name}"] = Quantity(_DIMS, partial(power, name=name), "W", f"power {text}", energy_term=term)
         table[f"energy_exchanged_{name}"] = Quantity(
-            _TIME, partial(work, name=name), "J", f"energy {text}", energy_term=term
+            _DIMS, partial(work, name=name), "J", f"energy {text}", energy_term=term
         )
     text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
-    table[RESIDUAL] = Quantity(_TIME, lambda of: of.account.residual, "J", text)
+    table[RESIDUAL] = Quantity(_DIMS, lambda run: run.account.residual, "J", text)
     return table

@@ -22,7 +22,7 @@ from finger_pin.typing import Array
 BASE_FRAME, WORLD_FRAME = "base", "world"
 
 #: Variables that need states, plans and no more of the finger's signals than forces.
-_OF_FORCES = frozenset(
+_FORCE_VARIABLES = frozenset(
     {
         "joint_position",
         "joint_velocity",
@@ -57,10 +57,10 @@ class SampledTrajectory:
             loop: The system.
             trajectory: Its solution.
             times: Shape (m,), in order, s.
-            names: Names of `variables` that will be asked for; by default all.
+            names: Names of `variables` that will be used; by default all.
         """
         self._outputs: Outputs = "all" if names is None or "joint_acceleration" in names else "no_acceleration"
-        if names is not None and _OF_FORCES.issuperset(names):
+        if names is not None and _FORCE_VARIABLES.issuperset(names):
             self._outputs = "row_forces"
         self.loop, self.trajectory = loop, trajectory
         self.times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
@@ -98,9 +98,9 @@ class SampledTrajectory:
     @cached_property
     def touching(self) -> ContactPoints:
         """Contacts in space."""
-        around, mechanism = self.loop.finger.scene, self.finger.mechanism
-        assert around is not None
-        return mechanism.touching or around.touching(self.state, mechanism.rows[around.contacts.group].force)
+        scene, mechanism = self.loop.finger.scene, self.finger.mechanism
+        assert scene is not None
+        return mechanism.touching or scene.touching(self.state, mechanism.rows[scene.contacts.group].force)
 
     @cached_property
     def motion(self) -> Motion:
@@ -128,7 +128,7 @@ class Quantity(NamedTuple):
 
     Attributes:
         dims: Names of its dimensions, time first.
-        value: Returns its values from what is known of a motion.
+        value: Function that returns its values from a sampled trajectory.
         units: SI.
         long_name: In words.
         equation: Number of its equation in the paper; empty for none.
@@ -153,12 +153,14 @@ class Quantity(NamedTuple):
         return metadata | {"equation": f"({self.equation})"} if self.equation else metadata
 
 
-def of_state(block: str, single: bool = False) -> Quantity:
+def state_block(block: str, single: bool = False) -> Quantity:
     """Return the variable of a block of the state; without a second dimension if ``single``."""
-    of = BLOCKS[block]
+    entry = BLOCKS[block]
 
-    def value(motion: SampledTrajectory) -> Array:
-        values: Array = getattr(motion.state, block)
+    def value(samples: SampledTrajectory) -> Array:
+        values: Array = getattr(samples.state, block)
         return values[:, 0] if single else values
 
-    return Quantity(("time",) if single else ("time", of.dimension), value, of.unit, of.long_name, of.equation)
+    return Quantity(
+        ("time",) if single else ("time", entry.dimension), value, entry.unit, entry.long_name, entry.equation
+    )

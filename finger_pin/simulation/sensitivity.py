@@ -22,23 +22,23 @@ from finger_pin.simulation.setup import Setup
 from finger_pin.typing import Array
 
 #: Change of a number, of its size: far above rounding, far below where anything bends.
-CHANGE = 1e-7
+RELATIVE_CHANGE = 1e-7
 # A signal that changes so much more than its number does, both of their size, says nothing of the number any more.
-_LOST = 1e4
+_LARGEST_GAIN = 1e4
 
-_Made = TypeVar("_Made")
+_Variation = TypeVar("_Variation")
 
 
-def changed(
-    values: Sequence[float], sizes: Sequence[float], make: Callable[[list[float]], _Made]
-) -> tuple[list[_Made], Array]:
-    """Return variations, made of the values with one of them changed, and the changes.
+def make_variations(
+    values: Sequence[float], sizes: Sequence[float], make: Callable[[list[float]], _Variation]
+) -> tuple[list[_Variation], Array]:
+    """Return the results of a function of the values with one of them changed each, and the changes.
 
-    At the edge of what is allowed a number is changed the other way.
+    A value at the edge of its range is changed the other way.
 
     Args:
         values: p numbers.
-        sizes: Of what size they are.
+        sizes: Their magnitudes.
         make: Function of values.
 
     Raises:
@@ -46,64 +46,64 @@ def changed(
     """
     variations, changes = [], []
     for k, (value, size) in enumerate(zip(values, sizes, strict=True)):
-        other = list(values)
+        varied = list(values)
         try:
-            other[k] = value + CHANGE * size
-            made = make(other)
+            varied[k] = value + RELATIVE_CHANGE * size
+            variation = make(varied)
         except InputError:
-            other[k] = value - CHANGE * size
-            made = make(other)
-        variations.append(made)
-        changes.append(other[k] - value)
+            varied[k] = value - RELATIVE_CHANGE * size
+            variation = make(varied)
+        variations.append(variation)
+        changes.append(varied[k] - value)
     return variations, np.array(changes)
 
 
 def with_exact_encoders(scenario: Scenario) -> Scenario:
     """Return a scenario whose position drives read exact angles.
 
-    Between the steps of an encoder a loop would not feel what a parameter does to its angle: derivatives of a run are
-    those of one that reads it exactly.
+    A small change of the angle stays within one step of an encoder, so that derivatives are those of a run that reads
+    it exactly.
     """
     finger = scenario.finger
-    rounding = {
+    exact = {
         name: each.updated(motor={"encoder": {"resolution": 0.0}})
         for name, each in finger.actuators.items()
         if each.drive == "position" and each.motor.encoder is not None and each.motor.encoder.resolution > 0.0
     }
-    return scenario.updated(finger={"actuators": finger.actuators | rounding}) if rounding else scenario
+    return scenario.updated(finger={"actuators": finger.actuators | exact}) if exact else scenario
 
 
-def nearby(trajectory: Trajectory, others: Sequence[Setup]) -> list[Trajectory]:
+def repeat_steps(trajectory: Trajectory, setups: Sequence[Setup]) -> list[Trajectory]:
     """Return the trajectories of setups with one parameter changed each, on the steps of that of the unchanged one."""
-    return in_threads(lambda other: other.integrate(steps=trajectory.steps), others)
+    return in_threads(lambda setup: setup.integrate(steps=trajectory.steps), setups)
 
 
 def add_slopes(
-    run: RunArrays, base: RunArrays, values: Sequence[float], moved: Sequence[RunArrays], changes: Array
+    run: RunArrays, base: RunArrays, values: Sequence[float], varied_runs: Sequence[RunArrays], changes: Array
 ) -> RunArrays:
     """Add the derivatives of all variables to a run, as `RunArrays.slopes`, and return it.
 
     Args:
-        run: The run that is to have them.
+        run: The run that gets them.
         values: Numbers that it was given.
         base: The run on the steps of those with a number changed.
-        moved: These, for each number.
+        varied_runs: Runs with one value changed, for each value.
         changes: By how much.
     """
     for name in run.variables:
-        parts = [(each[name] - base[name]) / change for each, change in zip(moved, changes, strict=True)]
-        run.slopes[name] = np.stack(parts) if parts else np.zeros((0, *run[name].shape))
-    run.attrs["sensitivities_lost"] = _lost(run, np.abs(np.asarray(values, dtype=float)))
+        slopes = [(each[name] - base[name]) / change for each, change in zip(varied_runs, changes, strict=True)]
+        run.slopes[name] = np.stack(slopes) if slopes else np.zeros((0, *run[name].shape))
+    run.attrs["sensitivities_lost"] = _loss_time(run, np.abs(np.asarray(values, dtype=float)))
     return run
 
 
-def _lost(run: RunArrays, sizes: Array) -> float:
+def _loss_time(run: RunArrays, sizes: Array) -> float:
     """Return the time at which the motion becomes too sensitive to a parameter, s; infinite if it never does."""
-    first = np.inf
+    loss_time = np.inf
     for name, slope in run.slopes.items():
         scale = float(np.max(np.abs(run[name]), initial=0.0)) or 1.0
         gain = np.abs(slope).reshape(*slope.shape[:2], -1).max(axis=-1, initial=0.0) * sizes[:, None] / scale
-        beyond = np.flatnonzero(gain.max(axis=0, initial=0.0) > _LOST)
+        beyond = np.flatnonzero(gain.max(axis=0, initial=0.0) > _LARGEST_GAIN)
         if len(beyond):
-            first = min(first, float(run.time[beyond[0]]))
-    return first
+            loss_time = min(loss_time, float(run.time[beyond[0]]))
+    return loss_time

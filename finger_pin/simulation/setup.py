@@ -1,4 +1,4 @@
-"""A scenario made ready: loop, stepper and recorded variables, built once."""
+"""Setup of a run: loop, stepper and inputs of a scenario, built once."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from finger_pin.core.stepping.trajectory import Trajectory, Watch
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.accuracy import CHUNK
+from finger_pin.simulation.accuracy import CHUNK_STEPS
 from finger_pin.simulation.initial_state import check_motors
 
 #: What to try where an integrator cannot go on.
 ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
-_TIGHT = 1e-8
-_ADVICE_TIGHT = "a larger simulation.rtol and simulation.atol_scale, or softer contacts and tendons"
-_ADVICE_RUNAWAY = "a smaller controller.gain, heavier links, or a start within the joints' ranges"
-_CONTINUOUS = "Radau"
+_TIGHT_TOLERANCE = 1e-8
+_ROUNDING_ADVICE = "a larger simulation.rtol and simulation.atol_scale, or softer contacts and tendons"
+_RUNAWAY_ADVICE = "a smaller controller.gain, heavier links, or a start within the joints' ranges"
+_METHOD_WITHOUT_SAMPLING = "Radau"
 #: Steps between two looks at a compiled simulation that is observed.
-CHUNK_OBSERVED = 4
+OBSERVED_CHUNK = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +65,13 @@ class Setup:
 
         Args:
             scenario: The scenario to simulate.
-            loop: Its loop, where something in it is a user's own.
+            loop: Its loop, where a part of it is custom.
             custom: Names of the parts given in place of the scenario's, from `custom_parts`.
             control_period: As for `simulate`.
 
         Raises:
             InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
-                a motor turns too fast at the start, or a user's own controller answers wrongly.
+                a motor turns too fast at the start, or a custom controller answers wrongly.
         """
         method = scenario.simulation.method
         loop = loop or ClosedLoop.from_scenario(scenario)
@@ -86,32 +86,32 @@ class Setup:
             raise InputError("control_period", "is missing: a controller that reads sensors is sampled")
         if sampling is None and loop.controller.delays is not None:
             raise InputError("control_period", "is missing: a controller of actuators with a delay is sampled")
-        positioned = bool(np.any(loop.finger.actuators.holds))
-        if positioned and method not in TABLEAUS:
+        has_position_drives = bool(np.any(loop.finger.actuators.holds))
+        if has_position_drives and method not in TABLEAUS:
             raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)
         control = compiled_control(loop) if sampling is None and method in TABLEAUS else None
         if sampling is None and method in TABLEAUS and control is None:
-            if positioned:
+            if has_position_drives:
                 raise InputError(
                     "controller.sampling.period", "is missing: beside position drives this controller is sampled"
                 )
-            method = _CONTINUOUS
+            method = _METHOD_WITHOUT_SAMPLING
         if scenario.simulation.method not in METHODS_IN_NUMPY:
             loop = loop.compiled()
         controller = loop.controller
         sampled = None if sampling is None else SampledController(loop, sampling)
-        if positioned:
+        if has_position_drives:
             duration, start = scenario.simulation.duration, scenario.simulation.start_time
-            wound = spool_windings(scenario, loop.finger)
+            winding = spool_windings(scenario, loop.finger)
             voltages = voltage_signals(scenario, loop.finger, "motor_voltage")
             supplies = voltage_signals(scenario, loop.finger, "supply_voltage")
-            planned = loop.finger, loop.controller, loop.reference, duration, start, wound, voltages, supplies
-            drives = PositionDrives(*planned, loop.last_samples)
+            drive_arguments = loop.finger, loop.controller, loop.reference, duration, start, winding, voltages, supplies
+            drives = PositionDrives(*drive_arguments, loop.last_samples)
             loop = replace(loop, drives=drives)
         if sampled is not None:
             loop = replace(loop, controller=sampled)
         elif custom:
-            # A wrong answer of a user's own controller is refused before anything is computed.
+            # A wrong answer of a custom controller is refused before anything is computed.
             loop.evaluate(0.0, loop.initial_state())
         return cls(scenario, loop, method, controller, sampled, control)
 
@@ -121,15 +121,15 @@ class Setup:
         stop: Stop | None = None,
         *,
         scenario: Scenario | None = None,
-        chunk: int = CHUNK,
+        chunk: int = CHUNK_STEPS,
         steps: Sequence[Steps] | None = None,
     ) -> Trajectory:
         """Integrate, at the tolerances of another scenario if given.
 
         Args:
             watch: Called with the simulated time and the state now and then.
-            stop: Asked now and then.
-            scenario: Like this one, with tolerances of its own.
+            stop: Called now and then; true ends the integration.
+            scenario: This one with other tolerances.
             chunk: Steps between two calls.
             steps: Of every island, to be taken whatever their errors: what comes out is then as smooth a function of
                 start and parameters as the equations are.
@@ -175,7 +175,7 @@ class Setup:
             knots=knots,
             watch=watch,
             chunk=chunk,
-            together=chunk == CHUNK_OBSERVED,
+            together=chunk == OBSERVED_CHUNK,
             stop=stop,
         )
 
@@ -192,17 +192,17 @@ class Setup:
             atol_scale=tolerances.atol_scale,
         )
 
-    def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:
+    def failure(self, trajectory: Trajectory, cause: str = "") -> tuple[str, str]:
         """Return the reason of a trajectory's early end, and advice.
 
         Args:
             trajectory: One that failed.
-            slow: Cause of its slowness, if that is known.
+            cause: Cause of its slowness, if that is known.
         """
         controller, settings = self.controller, self.scenario.simulation
         if controller.problem_time >= trajectory.breakpoints[-1]:
             return controller.problem, "another controller"
-        advice = _ADVICE_TIGHT if min(settings.rtol, settings.atol_scale) < _TIGHT else ADVICE
+        advice = _ROUNDING_ADVICE if min(settings.rtol, settings.atol_scale) < _TIGHT_TOLERANCE else ADVICE
         if "physical range" in trajectory.failure:
-            advice = _ADVICE_RUNAWAY
-        return f"{trajectory.failure}; {slow}" if slow else trajectory.failure, advice
+            advice = _RUNAWAY_ADVICE
+        return f"{trajectory.failure}; {cause}" if cause else trajectory.failure, advice

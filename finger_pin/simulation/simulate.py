@@ -17,9 +17,9 @@ from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.exceptions import ScenarioWarning
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.references.reference import Reference
-from finger_pin.simulation.initial_state import custom_parts, started
+from finger_pin.simulation.initial_state import custom_parts, with_initial_state
 from finger_pin.simulation.progress import notebook_bar
-from finger_pin.simulation.running import interruptible, run
+from finger_pin.simulation.run import interruptible, run
 
 
 def simulate(
@@ -80,12 +80,12 @@ def simulate(
     scenario, controls = with_named_samples(load_scenario(scenario), controller)
     custom_finger = resolve_finger(finger, scenario)
     loop = ClosedLoop.from_scenario(scenario, controls, reference, fingertip_force, custom_finger)
-    loop = started(loop, initial)
+    loop = with_initial_state(loop, initial)
     if isinstance(initial, xr.Dataset) and sampling_settings(scenario, control_period) is not None:
         text = "the sampled controller starts anew: its sensors, delays and memory are not part of a result"
         warnings.warn(text, ScenarioWarning, stacklevel=2)
     custom = custom_parts(controls, reference, fingertip_force, initial, custom_finger)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
     return interruptible(
-        lambda asked: run(scenario, loop, custom, control_period, progress, observe, asked, variables), stop
+        lambda token: run(scenario, loop, custom, control_period, progress, observe, token, variables), stop
     )

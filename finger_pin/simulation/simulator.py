@@ -77,7 +77,7 @@ class Simulator:
         self._build(as_finger(finger))
         middle = 0.5 * (self.finger.stroke_limiter.lower + self.finger.stroke_limiter.upper)
         self._posture = middle if position is None else as_finite_array("position", position, middle.shape)
-        self._begin(self._at(self._posture), 0.0)
+        self._start(self._state_at_rest(self._posture), 0.0)
 
     def __repr__(self) -> str:
         """Return the finger, the time and the posture."""
@@ -85,7 +85,7 @@ class Simulator:
         return f"Simulator({self.finger.description.name} at t = {self.time:.6g} s, theta = [{posture}] rad)"
 
     def _build(self, finger: Finger) -> None:
-        """Build the stepper of a finger; `_begin` gives it a state."""
+        """Build the stepper of a finger; `_start` gives it a state."""
         self.finger, mechanism = finger, finger.mechanism
         control = held_control(mechanism.channels, mechanism.coordinates)
         self._guides = PrescribedPaths.from_finger(finger, 0.0, self._settings["rtol"])
@@ -93,11 +93,11 @@ class Simulator:
         control = with_paths(control, self._palm, self._guides)
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
         self._stepper = Stepper.from_finger(finger, control, rest, **self._settings)
-        self._fresh = self._stepper.state_snapshot
+        self._initial_snapshot = self._stepper.state_snapshot
         self._compiled = CompiledFinger(finger)
-        self._tensions = np.setdiff1d(np.flatnonzero(~finger.routing.winched), finger.actuators.voltages)
+        self._tension_channels = np.setdiff1d(np.flatnonzero(~finger.routing.winched), finger.actuators.voltages)
 
-    def _at(self, position: Array) -> Array:
+    def _state_at_rest(self, position: Array) -> Array:
         """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
         finger = self.finger
         x = start_state(finger, finger.rest_state(position), self._palm, self._guides)
@@ -105,14 +105,14 @@ class Simulator:
             finger.scene.check(finger.layout.unpack(x))
         return x
 
-    def _begin(self, x: Array, time: float) -> None:
-        """Go on from a state at a time, with a new record and nothing held."""
+    def _start(self, x: Array, time: float) -> None:
+        """Start from a state at a time, with a new record and zero inputs."""
         tips = len(self.finger.mechanism.body.tips)
-        self._tension = np.zeros(self.finger.mechanism.channels)
+        self._inputs = np.zeros(self.finger.mechanism.channels)
         self._queue = InputQueue(input_delays(self.finger.description, self.finger.routing))
-        self._force = self._unloaded = np.zeros(3 if tips == 1 else (tips, 3))
-        # Not even what was loaded once is remembered.
-        self._stepper.restore(self._fresh)
+        self._force = self._zero_force = np.zeros(3 if tips == 1 else (tips, 3))
+        # The snapshot also resets the loaded force.
+        self._stepper.restore(self._initial_snapshot)
         self._stepper.restart(x, time)
         self._log = StepLog(self._stepper)
 
@@ -129,15 +129,15 @@ class Simulator:
             initial = self.finger.layout.pack(initial)
         if initial is None or np.shape(initial) == self._posture.shape:
             posture = self._posture if initial is None else initial
-            x = self._at(as_finite_array("initial", posture, self._posture.shape))
+            x = self._state_at_rest(as_finite_array("initial", posture, self._posture.shape))
         else:
             x = as_finite_array("initial", initial, (self.finger.layout.size,))
             check_motors(self.finger, x)
-        self._begin(x, 0.0)
+        self._start(x, 0.0)
         return self.state
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
-        """Give the finger other numbers, and go on from the same state at the same time, with a new record.
+        """Change parameters of the finger, and go on from the same state at the same time, with a new record.
 
         Args:
             values: By dotted key, as of `load_finger`, such as ``{"finger.tendon_friction.coulomb": 0.1}``.
@@ -147,14 +147,14 @@ class Simulator:
         """
         if self._family is None or self._family.keys != tuple(values):
             self._family = ParametrisedScenario.from_finger(self.finger.description, tuple(values))
-        described = self._family.with_values([*values.values()]).finger
-        changed = self.finger.changed(described, self.finger.constructor_args.objects)
-        if changed.layout.names != self.finger.layout.names:
+        description = self._family.with_values([*values.values()]).finger
+        finger = self.finger.changed(description, self.finger.constructor_args.objects)
+        if finger.layout.names != self.finger.layout.names:
             raise InputError("values", "make a finger with another state: make another simulator of it")
-        check_motors(changed, x := self.x, "values")
+        check_motors(finger, x := self.x, "values")
         time = self.time
-        self._build(changed)
-        self._begin(x, time)
+        self._build(finger)
+        self._start(x, time)
 
     @property
     def time(self) -> float:
@@ -191,21 +191,21 @@ class Simulator:
             InputError: If an argument is not finite or has the wrong size, or a tension is negative; nothing moved.
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
-        command, force = self._checked(inputs, dt, fingertip_force)
+        command, force = self._check_step(inputs, dt, fingertip_force)
         end = self.time + dt
         self._queue.add(self.time, command)
         while True:
-            until = self._hold(force, end)
-            status = self._stepper.advance(until)
-            self._log.add(self._stepper.time, self._tension, self._force)
-            if status or until == end:
-                return self._reached(status)
+            piece_end = self._apply_inputs(force, end)
+            status = self._stepper.advance(piece_end)
+            self._log.add(self._stepper.time, self._inputs, self._force)
+            if status or piece_end == end:
+                return self._state_after(status)
 
-    def _checked(self, inputs: Inputs, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
+    def _check_step(self, inputs: Inputs, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
         if isinstance(inputs, Mapping):
             inputs = inputs_by_name("inputs", inputs, self.finger)
-        command, force = as_finite_array("inputs", inputs, self._tension.shape), self._unloaded
-        if min(command.tolist(), default=0.0) < 0.0 and (command[self._tensions] < 0.0).any():
+        command, force = as_finite_array("inputs", inputs, self._inputs.shape), self._zero_force
+        if min(command.tolist(), default=0.0) < 0.0 and (command[self._tension_channels] < 0.0).any():
             raise InputError("inputs", "a tension must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
@@ -213,15 +213,15 @@ class Simulator:
             return command, force
         return command, as_finite_array("fingertip_force", fingertip_force, force.shape)
 
-    def _hold(self, force: Array, end: float) -> float:
-        """Hold a force and the inputs that have arrived; return until when, s: the end, or the next arrival."""
+    def _apply_inputs(self, force: Array, end: float) -> float:
+        """Apply a force and the inputs that have arrived; return the end, or the time of the next arrival, s."""
         if force is not self._force:
             self._stepper.load(force)
-        self._tension, self._force = self._queue.at(self.time), force
-        self._stepper.hold(self._tension)
+        self._inputs, self._force = self._queue.at(self.time), force
+        self._stepper.hold(self._inputs)
         return self._queue.next_arrival(self.time, end)
 
-    def _reached(self, status: int) -> State:
+    def _state_after(self, status: int) -> State:
         """Return the state after a step, unless it failed."""
         if status:
             raise IntegrationError(self.time, self._stepper.failure(status, self.finger.layout.names), _ADVICE)
@@ -245,19 +245,19 @@ class Simulator:
 
     def signals(self) -> FingerSignals:
         """Return all signals at the present state, under the tensions and force of the last step."""
-        mover = self._palm or self._guides
-        base = None if mover is None else mover.base(self.time)
-        return self._compiled.evaluate(self.x, self._tension, self._force, base)
+        path = self._palm or self._guides
+        base_motion = None if path is None else path.base(self.time)
+        return self._compiled.evaluate(self.x, self._inputs, self._force, base_motion)
 
     def clone(self) -> Simulator:
         """Return an independent copy in the same state; both continue bit for bit the same."""
-        twin = object.__new__(type(self))
-        twin.__dict__ |= self.__dict__
-        twin._compiled, twin._stepper = CompiledFinger(self.finger), self._stepper.copy()
-        twin._log, twin._queue = self._log.copy(twin._stepper), self._queue.copy()
-        return twin
+        copy = object.__new__(type(self))
+        copy.__dict__ |= self.__dict__
+        copy._compiled, copy._stepper = CompiledFinger(self.finger), self._stepper.copy()
+        copy._log, copy._queue = self._log.copy(copy._stepper), self._queue.copy()
+        return copy
 
-    __copy__ = clone  # Simulators that share what is stepped would step each other.
+    __copy__ = clone  # Simulators that share a stepper would step each other.
 
 
 def step_many(
@@ -271,10 +271,10 @@ def step_many(
     Each does bit by bit what `Simulator.step` does. There is no Python between the steps.
 
     Args:
-        simulators: All different ones.
-        tensions: Of each what `Simulator.step` takes.
+        simulators: The simulators, none of them twice.
+        tensions: The inputs of `Simulator.step` for each.
         dt: s.
-        fingertip_forces: Likewise; none by default.
+        fingertip_forces: The force of `Simulator.step` for each; none by default.
 
     Raises:
         InputError: If numbers of them differ, a simulator stands there twice, or an argument is wrong; nothing moved.
@@ -285,16 +285,16 @@ def step_many(
     for name, values in (("tensions", tensions), ("fingertip_forces", forces)):
         if len(values) != count:
             raise InputError(name, f"must be {count}, one per simulator", len(values))
-    if len({id(each) for each in simulators}) < count:
+    if len({id(simulator) for simulator in simulators}) < count:
         raise InputError("simulators", "must differ: one stands there twice; use clone")
-    acting = [one._checked(inputs, dt, force) for one, inputs, force in zip(simulators, tensions, forces, strict=True)]
-    ends, statuses, moving = [each.time + dt for each in simulators], [0] * count, [*range(count)]
-    for simulator, (command, _) in zip(simulators, acting, strict=True):
+    steps = [each._check_step(inputs, dt, f) for each, inputs, f in zip(simulators, tensions, forces, strict=True)]
+    ends, statuses, active = [simulator.time + dt for simulator in simulators], [0] * count, [*range(count)]
+    for simulator, (command, _) in zip(simulators, steps, strict=True):
         simulator._queue.add(simulator.time, command)
-    while moving:
-        until = [simulators[k]._hold(acting[k][1], ends[k]) for k in moving]
-        codes = BatchStepper([simulators[k]._stepper for k in moving]).advance(until)
-        for k, statuses[k] in zip(moving, codes, strict=True):
-            simulators[k]._log.add(simulators[k].time, simulators[k]._tension, simulators[k]._force)
-        moving = [k for k, reached in zip(moving, until, strict=True) if reached < ends[k] and not statuses[k]]
-    return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]
+    while active:
+        times = [simulators[k]._apply_inputs(steps[k][1], ends[k]) for k in active]
+        new_statuses = BatchStepper([simulators[k]._stepper for k in active]).advance(times)
+        for k, statuses[k] in zip(active, new_statuses, strict=True):
+            simulators[k]._log.add(simulators[k].time, simulators[k]._inputs, simulators[k]._force)
+        active = [k for k, time in zip(active, times, strict=True) if time < ends[k] and not statuses[k]]
+    return [simulator._state_after(status) for simulator, status in zip(simulators, statuses, strict=True)]

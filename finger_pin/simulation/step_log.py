@@ -1,4 +1,4 @@
-"""The log of a simulator's inputs, step by step: little to keep, and enough to repeat its run and record it."""
+"""Log of a simulator's inputs, step by step, from which its run can be repeated and recorded."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, SignalReference
 from finger_pin.references.signal import Signal
-from finger_pin.simulation.accuracy import left_open, open_account
+from finger_pin.simulation.accuracy import account_warning, residual_share
 from finger_pin.simulation.recording import check_memory, record
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.typing import Array
 
 # A sample this close to the end of a step, s, is taken there.
-_SAME = 1e-9
+_SAME_TIME = 1e-9
 
 
 class StepLog:
@@ -40,26 +40,26 @@ class StepLog:
 
     def __init__(self, stepper: Stepper) -> None:
         """Create an empty log at the present time of a stepper."""
-        self._stepper, self._moments = stepper, stepper.state_snapshot
-        self._numbers = array("d")
+        self._stepper, self._start_snapshot = stepper, stepper.state_snapshot
+        self._rows = array("d")
 
     @property
     def start(self) -> Stepper:
         """A copy of the stepper as it stood at the start."""
         start = self._stepper.copy()
-        start.restore(self._moments)
+        start.restore(self._start_snapshot)
         return start
 
     def add(self, end: float, inputs: Array, force: Array) -> None:
-        """Keep a step: its end, s, its inputs (u,), and its forces (3,) or (f, 3), N."""
-        self._numbers.append(end)
-        self._numbers.frombytes(inputs.tobytes() + force.tobytes())
+        """Append a step: its end, s, its inputs (u,), and its forces (3,) or (f, 3), N."""
+        self._rows.append(end)
+        self._rows.frombytes(inputs.tobytes() + force.tobytes())
 
     def copy(self, stepper: Stepper) -> StepLog:
         """Return a copy of the log for a copied stepper."""
-        twin = copy.copy(self)
-        twin._stepper, twin._numbers = stepper, self._numbers[:]
-        return twin
+        log = copy.copy(self)
+        log._stepper, log._rows = stepper, self._rows[:]
+        return log
 
     def result(
         self,
@@ -80,10 +80,10 @@ class StepLog:
             InputError: If there are no steps yet, or a setting or the reference is wrong.
             IntegrationError: If there are more steps than can be kept in memory; its ``result`` holds the first.
         """
-        if not self._numbers:
+        if not self._rows:
             raise InputError("result", "is of steps, and there are none yet: call step")
         tips = finger.mechanism.body.tips
-        steps = np.array(self._numbers).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
+        steps = np.array(self._rows).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
         stepper = self.start
         knots, joints = np.append(stepper.time, steps[:, 0]), len(finger.routing.joints)
         inputs, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
@@ -93,8 +93,8 @@ class StepLog:
         check_memory(scenario.simulation, finger)
         if reference is None:
             posture = finger.layout.unpack(stepper.x).position
-            resting = Signal.from_held_values(knots[[0, -1]], posture[None])
-            reference = SignalReference(resting, PassiveCoupling(np.eye(joints), np.zeros(joints), ()))
+            rest_signal = Signal.from_held_values(knots[[0, -1]], posture[None])
+            reference = SignalReference(rest_signal, PassiveCoupling(np.eye(joints), np.zeros(joints), ()))
         loop = replace(
             ClosedLoop.from_scenario(scenario, reference=reference, finger=finger),
             controller=OpenLoopTensions(Signal.from_held_values(knots, tension), finger.routing),
@@ -106,20 +106,20 @@ class StepLog:
             if len(channels)
             else None,
         )
-        again = _Repeated(stepper, knots, inputs, force)
-        trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, controller=again)
+        controller = _RecordedInputs(stepper, knots, inputs, force)
+        trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, controller=controller)
         # Rounding must not take a sample to the other side of a step's end, where other tensions act.
         times = knots[0] + scenario.sample_times()
-        near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]
-        times = np.where(np.abs(near - times) < _SAME, near, times)
+        nearest_knot = knots[np.clip(np.searchsorted(knots, times - _SAME_TIME), 0, len(knots) - 1)]
+        times = np.where(np.abs(nearest_knot - times) < _SAME_TIME, nearest_knot, times)
         result = record(scenario, SampledTrajectory(loop, trajectory, times), str(settings["method"]))
         result.attrs["custom"] = "loop"
         if trajectory.failure:
-            reached = float(trajectory.breakpoints[-1])
-            raise IntegrationError(reached, trajectory.failure, "fewer steps", result)
-        gap = open_account(result, left_open(result))
-        if gap:
-            result.attrs["account"] = gap
+            end = float(trajectory.breakpoints[-1])
+            raise IntegrationError(end, trajectory.failure, "fewer steps", result)
+        account_message = account_warning(result, residual_share(result))
+        if account_message:
+            result.attrs["account"] = account_message
         return result
 
 
@@ -135,11 +135,11 @@ def _scenario(description: FingerDescription, settings: dict[str, Any]) -> Scena
     return validate(Scenario, table, ())
 
 
-class _Repeated:
-    """A controller that holds recorded inputs once more.
+class _RecordedInputs:
+    """Controller that repeats recorded inputs.
 
     Attributes:
-        instant: When the next step begins, s.
+        instant: Start of the next step, s.
     """
 
     def __init__(self, stepper: Stepper, knots: Array, inputs: Array, force: Array) -> None:

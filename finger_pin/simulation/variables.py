@@ -16,11 +16,11 @@ from finger_pin.mechanism.rows import RowSignals
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.motor_variables import motor_variables
 from finger_pin.simulation.row_variables import account_variables, cord_variables, extra_row_variables
-from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory, of_state
+from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory, state_block
 from finger_pin.typing import Array
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
-_MOTOR, _TIME = ("time", "motor"), ("time",)
+_MOTORS, _TIME = ("time", "motor"), ("time",)
 #: A variable that is left out of a whole result where nothing limits tensions.
 SHORTFALL = "torque_shortfall"
 
@@ -28,46 +28,50 @@ SHORTFALL = "torque_shortfall"
 def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return all variables that a result of a loop can have, by name."""
     table = {
-        "joint_position": of_state("position"),
-        "joint_velocity": of_state("velocity"),
-        "joint_acceleration": Quantity(_JOINT, lambda of: of.finger.acceleration, "rad/s2", "joint acceleration", "18"),
-        "joint_reference": Quantity(_JOINT, lambda of: of.reference.position, "rad", "desired joint angle", "20"),
+        "joint_position": state_block("position"),
+        "joint_velocity": state_block("velocity"),
+        "joint_acceleration": Quantity(
+            _JOINT, lambda run: run.finger.acceleration, "rad/s2", "joint acceleration", "18"
+        ),
+        "joint_reference": Quantity(_JOINT, lambda run: run.reference.position, "rad", "desired joint angle", "20"),
         "tracking_error": Quantity(
-            _JOINT, lambda of: of.reference.position - of.state.position, "rad", "desired less actual joint angle"
+            _JOINT, lambda run: run.reference.position - run.state.position, "rad", "desired less actual joint angle"
         ),
     }
-    several = ("tip",) if loop.finger.description.tree.tip_names else ("finger",)
-    tip = ("time", *(several if len(loop.finger.rigid_body.tips) > 1 else ()), "axis")
+    tip_dims = ("tip",) if loop.finger.description.tree.tip_names else ("finger",)
+    dims = ("time", *(tip_dims if len(loop.finger.rigid_body.tips) > 1 else ()), "axis")
     table |= {
-        "fingertip_position": Quantity(tip, lambda of: of.motion.tip, "m", "fingertip position", "1"),
-        **_of_tendons(),
-        "joint_torque_command": Quantity(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
-        "joint_torque": Quantity(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
-        "joint_friction": Quantity(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
-        "joint_reaction": Quantity(_JOINT, lambda of: of.finger.joints.reaction, "N", "joint reaction force", "17"),
-        "limiter_torque": Quantity(_JOINT, lambda of: of.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
-        "fingertip_force": Quantity(tip, _fingertip_force, "N", "force on the fingertip", "6"),
-        "spring_torque": Quantity(_JOINT, lambda of: of.finger.spring_torque, "N m", "torque of the joints' springs"),
+        "fingertip_position": Quantity(dims, lambda run: run.motion.tip, "m", "fingertip position", "1"),
+        **_tendon_variables(),
+        "joint_torque_command": Quantity(_JOINT, lambda run: run.control.torque, "N m", "desired joint torque", "19"),
+        "joint_torque": Quantity(_JOINT, lambda run: run.finger.tendon_torque, "N m", "torque of the tendons", "11"),
+        "joint_friction": Quantity(
+            _JOINT, lambda run: run.finger.joints.friction, "N m", "joint friction torque", "9c"
+        ),
+        "joint_reaction": Quantity(_JOINT, lambda run: run.finger.joints.reaction, "N", "joint reaction force", "17"),
+        "limiter_torque": Quantity(_JOINT, lambda run: run.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
+        "fingertip_force": Quantity(dims, _fingertip_force, "N", "force on the fingertip", "6"),
+        "spring_torque": Quantity(_JOINT, lambda run: run.finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": Quantity(
-            _JOINT, lambda of: of.finger.external_torque, "N m", "torque of the fingertip force", "6"
+            _JOINT, lambda run: run.finger.external_torque, "N m", "torque of the fingertip force", "6"
         ),
         SHORTFALL: Quantity(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
     if isinstance(loop.prescribed_motion, PrescribedJoints):
         table["joint_effort"] = Quantity(_JOINT, _effort, "N m", "torque that the given motion of a joint takes", "18")
     if loop.finger.layout.names_of("joint_stiction"):
-        table["joint_stiction"] = of_state("joint_stiction")
+        table["joint_stiction"] = state_block("joint_stiction")
     if loop.finger.layout.names_of("elastic_stiction"):
-        table["elastic_stiction"] = of_state("elastic_stiction")
+        table["elastic_stiction"] = state_block("elastic_stiction")
     table |= (
-        _of_wraps(loop)
+        _wrap_variables(loop)
         | cord_variables(loop.finger)
-        | _of_windings(loop)
-        | _of_palm(loop)
+        | _winding_variables(loop)
+        | _palm_variables(loop)
         | motor_variables(loop)
-        | _of_passive(loop)
-        | _measured(loop)
-        | _more(loop)
+        | _passive_tendon_variables(loop)
+        | _sensor_variables(loop)
+        | _contact_and_row_variables(loop)
     )
     for name, quantity in table.items():
         if frame := _frame(name, quantity):
@@ -75,73 +79,75 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     return table
 
 
-def _of_tendons() -> dict[str, Quantity]:
+def _tendon_variables() -> dict[str, Quantity]:
     return {
-        "tendon_command": Quantity(_TENDON, _tension, "N", "commanded or planned tension", "21b"),
+        "tendon_command": Quantity(_TENDON, _commanded_tension, "N", "commanded or planned tension", "21b"),
         "tendon_tension": Quantity(
             _TENDON,
-            lambda of: of.loop.finger.routing.tendon_tension(of.finger.tendons.strands),
+            lambda run: run.loop.finger.routing.tendon_tension(run.finger.tendons.strands),
             "N",
             "delivered tension; distal half of a passive tendon",
             "12",
         ),
-        "tendon_velocity": Quantity(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
-        "tendon_friction": Quantity(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
-        "tendon_stiction": of_state("tendon_stiction"),
+        "tendon_velocity": Quantity(_TENDON, lambda run: run.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
+        "tendon_friction": Quantity(
+            _TENDON, lambda run: run.finger.tendons.friction, "N", "tendon friction force", "9c"
+        ),
+        "tendon_stiction": state_block("tendon_stiction"),
         "tendon_normal_force": Quantity(
-            _TENDON, lambda of: of.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
+            _TENDON, lambda run: run.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
         ),
         "tendon_friction_coefficient": Quantity(
-            _TENDON, lambda of: of.finger.tendons.coefficient, "1", "Coulomb coefficient", "16"
+            _TENDON, lambda run: run.finger.tendons.coefficient, "1", "Coulomb coefficient", "16"
         ),
         "tendon_curvature": Quantity(
-            _TENDON, lambda of: of.finger.tendons.curvature, "rad", "total curvature of the path", "15"
+            _TENDON, lambda run: run.finger.tendons.curvature, "rad", "total curvature of the path", "15"
         ),
     }
 
 
-def _tension(of: SampledTrajectory) -> Array:
-    routing, command = of.loop.finger.routing, of.control.tension
+def _commanded_tension(run: SampledTrajectory) -> Array:
+    routing, command = run.loop.finger.routing, run.control.tension
     # A winch is commanded a length.
     return np.where(np.append(routing.winched, np.zeros(routing.passive, dtype=bool)), 0.0, command)
 
 
-def _of_windings(loop: ClosedLoop) -> dict[str, Quantity]:
+def _winding_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return the commands to spools in position drive and to winches; zero elsewhere."""
     routing, actuators = loop.finger.routing, loop.finger.actuators
 
-    def angle(of: SampledTrajectory) -> Array:
-        angles = np.zeros((len(of.times), len(actuators.names)))
-        goals = of.loop.spool_goals(of.times)
+    def angle(run: SampledTrajectory) -> Array:
+        angles = np.zeros((len(run.times), len(actuators.names)))
+        goals = run.loop.spool_goals(run.times)
         if goals is not None:
             angles[:, actuators.holds] = goals
         return angles
 
-    def length(of: SampledTrajectory) -> Array:
-        lengths = np.zeros((len(of.times), len(routing.tendons)))
+    def length(run: SampledTrajectory) -> Array:
+        lengths = np.zeros((len(run.times), len(routing.tendons)))
         winched = np.flatnonzero(routing.winched)
-        lengths[:, winched] = of.control.tension[:, winched]
-        lengths[:, actuators.tendons] = of.loop.wound_lengths(angle(of))
+        lengths[:, winched] = run.control.tension[:, winched]
+        lengths[:, actuators.tendons] = run.loop.wound_lengths(angle(run))
         return lengths
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
     table = {}
     if actuators.names or routing.winched.any():
-        table["spool_tension"] = Quantity(_TENDON, lambda of: of.finger.tendons.entering, "N", text)
+        table["spool_tension"] = Quantity(_TENDON, lambda run: run.finger.tendons.entering, "N", text)
     if actuators.holds.any() and (loop.drives is None or loop.drives.compiled is not None):
-        table["spool_angle"] = Quantity(_MOTOR, angle, "rad", "commanded angle of a spool in position drive, else 0")
+        table["spool_angle"] = Quantity(_MOTORS, angle, "rad", "commanded angle of a spool in position drive, else 0")
     if "spool_angle" in table or routing.winched.any():
         table["tendon_winding"] = Quantity(_TENDON, length, "m", "commanded length of cord that is wound in, else 0")
     return table
 
 
-def _of_wraps(loop: ClosedLoop) -> dict[str, Quantity]:
+def _wrap_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return the signals of tendons that rub at several places."""
     if not loop.finger.wraps:
         return {}
 
-    def at(of: SampledTrajectory, signal: Callable[[RowSignals], Array]) -> Array:
-        return of.finger.tendons.at_wraps(signal)
+    def wrap_signal(run: SampledTrajectory, signal: Callable[[RowSignals], Array]) -> Array:
+        return run.finger.tendons.at_wraps(signal)
 
     signals: dict[str, tuple[Callable[[RowSignals], Array], str, str]] = {
         "wrap_friction": (lambda wraps: wraps["friction"], "N", "friction force at every bend of a tendon"),
@@ -150,109 +156,105 @@ def _of_wraps(loop: ClosedLoop) -> dict[str, Quantity]:
         "wrap_level": (lambda wraps: wraps["level"], "N", "friction of steady sliding at every bend of a tendon"),
     }
     tension = Quantity(
-        ("time", "wrap"), lambda of: of.finger.tendons.wrap_tension, "N", "tension behind every bend of a tendon"
+        ("time", "wrap"), lambda run: run.finger.tendons.wrap_tension, "N", "tension behind every bend of a tendon"
     )
     return {"wrap_tension": tension} | {
-        name: Quantity(("time", "wrap"), partial(at, signal=signal), unit, text)
+        name: Quantity(("time", "wrap"), partial(wrap_signal, signal=signal), unit, text)
         for name, (signal, unit, text) in signals.items()
     }
 
 
 def _frame(name: str, variable: Quantity) -> str:
-    """Return the frame of a variable with components: the base's, but the world's for the base's own place."""
+    """Return the frame of a variable with components: the base, but the world for the motion of the palm."""
     if not {"axis", "quaternion"} & set(variable.dims):
         return ""
     return WORLD_FRAME if name.startswith("palm_") else BASE_FRAME
 
 
-def _more(loop: ClosedLoop) -> dict[str, Quantity]:
+def _contact_and_row_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     table = {
-        name: Quantity(dims, partial(_contact, name), units, text)
+        name: Quantity(dims, partial(contact_value, name=name), units, text)
         for name, (dims, units, text) in contact_variables(loop.finger).items()
     }
     return table | extra_row_variables(loop.finger.extra_rows) | account_variables(loop.finger)
 
 
-def _contact(name: str, of: SampledTrajectory) -> Array:
-    return contact_value(name, of.loop.finger, of)
+def _fingertip_force(run: SampledTrajectory) -> Array:
+    force = run.loop.force(run.times)
+    return np.broadcast_to(force, (len(run.times), *run.loop.fingertip_force.shape))
 
 
-def _fingertip_force(of: SampledTrajectory) -> Array:
-    force = of.loop.force(of.times)
-    return np.broadcast_to(force, (len(of.times), *of.loop.fingertip_force.shape))
+def _shortfall(run: SampledTrajectory) -> Array:
+    missing = run.control.torque_deficit
+    return np.zeros_like(run.state.position) if missing is None else missing
 
 
-def _shortfall(of: SampledTrajectory) -> Array:
-    missing = of.control.torque_deficit
-    return np.zeros_like(of.state.position) if missing is None else missing
-
-
-def _effort(of: SampledTrajectory) -> Array:
-    """Return M a + h less all that the finger exerts itself, shape (m, n)."""
-    loop, state, mechanism = of.loop, of.state, of.finger.mechanism
+def _effort(run: SampledTrajectory) -> Array:
+    """Return M a + h less the torques that the finger exerts itself, shape (m, n), N m."""
+    loop, state, mechanism = run.loop, run.state, run.finger.mechanism
     assert loop.prescribed_motion is not None
-    motion = zip(state.position, state.velocity, loop.prescribed_motion.signal.derivative(of.times, 2), strict=True)
-    needed = np.array([loop.finger.rigid_body.inverse_dynamics(*each) for each in motion])
-    return np.asarray(needed - (mechanism.torque + mechanism.external)[:, : needed.shape[1]])
+    motion = zip(state.position, state.velocity, loop.prescribed_motion.signal.derivative(run.times, 2), strict=True)
+    torque = np.array([loop.finger.rigid_body.inverse_dynamics(*joint_motion) for joint_motion in motion])
+    return np.asarray(torque - (mechanism.torque + mechanism.external)[:, : torque.shape[1]])
 
 
-def _of_palm(loop: ClosedLoop) -> dict[str, Quantity]:
+def _palm_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     if loop.palm is None:
         return {}
     path = loop.palm
 
-    def turned(of: SampledTrajectory) -> Array:
-        return np.array([pin.Quaternion(each).coeffs() for each in path.place(of.times)[1]])
+    def orientation(run: SampledTrajectory) -> Array:
+        return np.array([pin.Quaternion(rotation).coeffs() for rotation in path.place(run.times)[1]])
 
     text = "rotation of the palm to the world, x, y, z, w"
     return {
         "palm_position": Quantity(
-            ("time", "axis"), lambda of: path.place(of.times)[0], "m", "place of the palm in the world"
+            ("time", "axis"), lambda run: path.place(run.times)[0], "m", "place of the palm in the world"
         ),
-        "palm_orientation": Quantity(("time", "quaternion"), turned, "1", text),
+        "palm_orientation": Quantity(("time", "quaternion"), orientation, "1", text),
         "palm_velocity": Quantity(
-            ("time", "axis"), lambda of: path.velocity(of.times)[0], "m/s", "velocity of the palm in the world"
+            ("time", "axis"), lambda run: path.velocity(run.times)[0], "m/s", "velocity of the palm in the world"
         ),
         "palm_angular_velocity": Quantity(
-            ("time", "axis"), lambda of: path.velocity(of.times)[1], "rad/s", "angular velocity of the palm"
+            ("time", "axis"), lambda run: path.velocity(run.times)[1], "rad/s", "angular velocity of the palm"
         ),
     }
 
 
-def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
+def _passive_tendon_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     count, actuated = loop.finger.routing.passive, loop.finger.routing.actuated
     if not count:
         return {}
-    # One passive tendon, the common case, needs no dimension of its own.
+    # One passive tendon, the common case, needs no separate dimension.
     single = count == 1
     dims = ("time",) if single else _PASSIVE
 
-    def shaped(values: Array) -> Array:
+    def squeezed(values: Array) -> Array:
         return values[:, 0] if single else values
 
-    def proximal(of: SampledTrajectory) -> Array:
-        return shaped(of.finger.tendons.strands[..., actuated::2])
+    def proximal(run: SampledTrajectory) -> Array:
+        return squeezed(run.finger.tendons.strands[..., actuated::2])
 
     return {
         "passive_tension_proximal": Quantity(dims, proximal, "N", "tension of the proximal half", "12"),
-        **{name: of_state(name, single) for name in ("passive_position", "passive_velocity")},
+        **{name: state_block(name, single) for name in ("passive_position", "passive_velocity")},
     }
 
 
-def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
+def _sensor_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return the readings of a sampled controller's sensors, each held until the next sample."""
 
-    def reading(of: SampledTrajectory, name: str) -> Array:
-        return of.loop.controller.measured(name, of.times)
+    def reading(run: SampledTrajectory, name: str) -> Array:
+        return run.loop.controller.measured(name, run.times)
 
     return {
-        f"measured_{each.name}": Quantity(
-            ("time", each.dimension) if each.dimension else _TIME,
-            partial(reading, name=each.name),
-            each.units,
-            f"{each.name.replace('_', ' ')} as the controller measures it",
+        f"measured_{sensor.name}": Quantity(
+            ("time", sensor.dimension) if sensor.dimension else _TIME,
+            partial(reading, name=sensor.name),
+            sensor.units,
+            f"{sensor.name.replace('_', ' ')} as the controller measures it",
         )
-        for each in loop.controller.sensors
+        for sensor in loop.controller.sensors
     }
 
 

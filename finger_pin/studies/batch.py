@@ -21,13 +21,13 @@ from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.prepared import Prepared
 from finger_pin.simulation.progress import notebook_bar
-from finger_pin.simulation.recording import refuse_unknown
+from finger_pin.simulation.recording import check_variables
 from finger_pin.simulation.sampled_trajectory import Quantity
 from finger_pin.simulation.simulate import simulate
-from finger_pin.simulation.variables import variables as known_variables
-from finger_pin.studies.executor import compile_for, one_line, open_executor, run_tasks
+from finger_pin.simulation.variables import variables as result_variables
+from finger_pin.studies.executor import compile_for, error_line, open_executor, run_tasks
 
-_PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
+_RUN_ATTRIBUTES = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
 
 
 def simulate_many(
@@ -52,8 +52,8 @@ def simulate_many(
         progress: Called with the numbers of finished and of all runs; in a notebook there is a bar by default.
 
     Returns:
-        The variables of `simulate` with a leading dimension ``run``. A run that could not be finished is NaN from
-        where it stopped; ``failure`` says why. What only some runs have, such as motors, is NaN in the others, and its
+        The variables of `simulate` with a leading dimension ``run``. A run that could not be finished is NaN after
+        its end; ``failure`` says why. A variable of only some runs, such as of motors, is NaN in the others, and its
         attribute ``comment`` names them. ``scenario`` holds every run's TOML.
 
     Raises:
@@ -64,11 +64,11 @@ def simulate_many(
     Warns:
         SelfLockingWarning: Once, if runs come close to self-locking; ``self_locking_margin`` says which.
     """
-    runs = _sharing([load_scenario(each) for each in scenarios])
+    runs = _share_fingers([load_scenario(scenario) for scenario in scenarios])
     finger = resolve_finger(finger, runs[0])
     _check_same_axes(runs)
-    _check_kept(runs, variables or (), finger)
-    run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
+    _check_variables(runs, variables or (), finger)
+    run = partial(_run, finger=finger, names=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
     outcomes: dict[int, xr.Dataset | BaseException] = {}
     texts = [""] * len(runs)
@@ -78,38 +78,38 @@ def simulate_many(
             if isinstance(result, InputError):
                 raise result
             outcomes[index] = result
-            # Here this thread would wait for the others.
+            # Written here, while other threads run.
             texts[index] = to_toml(runs[index])
             if progress is not None:
                 progress(len(outcomes), len(runs))
-    # To fill gigabytes for runs that there are not would take longer than a user waits.
+    # Only runs that were done get rows: filling gigabytes for the others takes too long.
     stacked = _stack(runs, dict(sorted(outcomes.items())), texts)
     if token.cancelled:
         raise Interrupted(math.nan, stacked, f"after {len(outcomes)} of {len(runs)} runs")
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
-    _warn_of_locking(stacked["self_locking_margin"].values)
+    _warn_about_locking(stacked["self_locking_margin"].values)
     return stacked
 
 
-def _warn_of_locking(margins: np.ndarray) -> None:
+def _warn_about_locking(margins: np.ndarray) -> None:
     """Warn once of all runs that come close to self-locking."""
     # Tensions in open loop, and custom controllers, have no margin.
     advice = locking_advice(float(np.nanmin(margins, initial=np.inf)))
     if advice:
-        close = sum(bool(locking_advice(float(margin))) for margin in margins)
-        message = f"{close} of {len(margins)} runs come close to self-locking; in the closest {advice}"
+        count = sum(bool(locking_advice(float(margin))) for margin in margins)
+        message = f"{count} of {len(margins)} runs come close to self-locking; in the closest {advice}"
         warnings.warn(message, SelfLockingWarning, stacklevel=3)
 
 
-def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None) -> xr.Dataset:
+def _run(scenario: Scenario, stop: Stop, finger: Finger | None, names: tuple[str, ...] | None) -> xr.Dataset:
     failure = ""
     try:
-        # The study has a bar of its own.
+        # The study shows the progress bar.
         result = (
             simulate(scenario, finger=finger, progress=lambda time: None, stop=stop)
-            if keep is None
-            else _prepared(scenario, finger, keep).run(stop=stop).dataset()
+            if names is None
+            else _prepared(scenario, finger, names).run(stop=stop).dataset()
         )
     except IntegrationError as error:
         assert error.result is not None
@@ -117,17 +117,17 @@ def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str,
     return result.assign_attrs(failure=failure)
 
 
-def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...]) -> Prepared:
+def _prepared(scenario: Scenario, finger: Finger | None, names: tuple[str, ...]) -> Prepared:
     family = ParametrisedScenario(with_finger(scenario, finger), ())
     try:
-        return Prepared(family, keep, finger)
+        return Prepared(family, names, finger)
     except InputError:
-        # It may lack what others have.
-        known = known_variables(ClosedLoop.from_scenario(scenario, finger=finger))
-        return Prepared(family, tuple(name for name in keep if name in known), finger)
+        # This run may lack variables that others have.
+        available = result_variables(ClosedLoop.from_scenario(scenario, finger=finger))
+        return Prepared(family, tuple(variable for variable in names if variable in available), finger)
 
 
-def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:
+def _share_fingers(runs: Sequence[Scenario]) -> list[Scenario]:
     """Return scenarios whose equal fingers are one object, so that it is built once."""
     if not runs:
         raise InputError("scenarios", "at least one is needed")
@@ -153,60 +153,60 @@ def _check_same_axes(runs: Sequence[Scenario]) -> None:
                 raise InputError(f"scenarios[{index}].{entry}", f"must be {expected}, as in the first scenario", value)
 
 
-def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | None) -> None:
+def _check_variables(runs: Sequence[Scenario], names: Sequence[str], finger: Finger | None) -> None:
     """Raise unless each variable exists in at least one run."""
-    known: dict[str, Quantity] = {}
+    available: dict[str, Quantity] = {}
     for run in runs:
-        if set(keep) <= set(known):
+        if set(names) <= set(available):
             return
-        known |= known_variables(ClosedLoop.from_scenario(run, finger=finger))
-    refuse_unknown("variables", keep, known)
+        available |= result_variables(ClosedLoop.from_scenario(run, finger=finger))
+    check_variables("variables", names, available)
 
 
 def _stack(
     runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | BaseException], texts: Sequence[str]
 ) -> xr.Dataset:
-    order, results = list(done), list(done.values())
+    indices, results = list(done), list(done.values())
     finished = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
     longest = max(finished.values(), key=lambda result: result.sizes["time"], default=xr.Dataset(coords={"time": []}))
     times = runs[0].sample_times()
     labels = _labels(finished.values())
     stacked: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]] = {}
     for name in dict.fromkeys(str(name) for result in finished.values() for name in result.data_vars):
-        having = {row: result[name] for row, result in finished.items() if name in result}
-        first = next(iter(having.values()))
+        present = {row: result[name] for row, result in finished.items() if name in result}
+        first = next(iter(present.values()))
         dims = tuple(map(str, first.dims))
         sizes = [len(labels[dim]) if dim in labels else first.sizes[dim] for dim in dims[1:]]
-        missing = [order[row] for row in finished if row not in having]
+        absent = [indices[row] for row in finished if row not in present]
         values = np.empty((len(results), len(times), *sizes))
-        values[[row for row in range(len(results)) if row not in having]] = np.nan
-        for row, variable in having.items():
+        values[[row for row in range(len(results)) if row not in present]] = np.nan
+        for row, variable in present.items():
             run_labels, count = {dim: variable[dim].values.tolist() for dim in dims[1:] if dim in labels}, len(variable)
-            if all(labels[dim] == names for dim, names in run_labels.items()):
+            if all(labels[dim] == label_names for dim, label_names in run_labels.items()):
                 values[row, :count], values[row, count:] = variable.values, np.nan
                 continue
             values[row] = np.nan
-            places = [
+            positions = [
                 [labels[dim].index(label) for label in run_labels[dim]] if dim in run_labels else range(size)
                 for dim, size in zip(dims[1:], sizes, strict=True)
             ]
-            values[np.ix_([row], range(count), *places)] = variable.values
+            values[np.ix_([row], range(count), *positions)] = variable.values
         attributes = dict(first.attrs)
-        if missing:
-            attributes["comment"] = f"NaN in runs that have none: {', '.join(map(str, missing))}"
+        if absent:
+            attributes["comment"] = f"NaN in runs that have none: {', '.join(map(str, absent))}"
         stacked[name] = (("run", *dims), values, attributes)
-    for name in _PER_RUN:
+    for name in _RUN_ATTRIBUTES:
         numbers = [result.attrs.get(name, np.nan) if isinstance(result, xr.Dataset) else np.nan for result in results]
         stacked[name] = (("run",), np.array(numbers), {"long_name": name})
-    failures = [one_line(each) if isinstance(each, BaseException) else each.attrs["failure"] for each in results]
+    failures = [error_line(each) if isinstance(each, BaseException) else each.attrs["failure"] for each in results]
     stacked["failure"] = (("run",), np.array(failures, dtype=str), {"long_name": "failure"})
-    described = np.array([texts[index] for index in order], dtype=str)
-    stacked["scenario"] = (("run",), described, {"long_name": "resolved scenario, TOML"})
-    shared = {key: value for key, value in longest.attrs.items() if key.startswith("version_")}
+    scenarios = np.array([texts[index] for index in indices], dtype=str)
+    stacked["scenario"] = (("run",), scenarios, {"long_name": "resolved scenario, TOML"})
+    versions = {key: value for key, value in longest.attrs.items() if key.startswith("version_")}
     return xr.Dataset(
         stacked,
-        coords={"time": ("time", times, dict(longest.time.attrs)), "run": np.array(order, dtype=int), **labels},
-        attrs=shared,
+        coords={"time": ("time", times, dict(longest.time.attrs)), "run": np.array(indices, dtype=int), **labels},
+        attrs=versions,
     )
 
 

@@ -27,9 +27,9 @@ def assemble(
     """Return the Dataset of a sweep.
 
     Args:
-        scenario: The one that is varied.
-        design: Which points.
-        metrics: Which metrics; one variable each, NaN where there is none.
+        scenario: The base scenario.
+        design: The points.
+        metrics: The metrics; one variable each, NaN where there is no value.
         records: In the order of the design's points; None where a run has not been done.
 
     Returns:
@@ -45,25 +45,25 @@ def assemble(
     shape = (len(design.points()),) if dims == (SAMPLE,) else tuple(map(len, design.values.values()))
     rows = list(records)
 
-    def over(values: list[Any]) -> Any:
+    def shaped(values: list[Any]) -> Any:
         return np.array(values).reshape(shape)
 
     variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
         metric.name: (
             dims,
-            over([np.nan if row is None else row.metrics.get(metric.name, np.nan) for row in rows]),
+            shaped([np.nan if row is None else row.metrics.get(metric.name, np.nan) for row in rows]),
             {"units": metric.unit, "long_name": metric.long_name},
         )
         for metric in metrics
     }
-    status = over([MISSING if row is None else row.status for row in rows])
-    reason = over(["" if row is None else row.reason for row in rows])
+    status = shaped([MISSING if row is None else row.status for row in rows])
+    reason = shaped(["" if row is None else row.reason for row in rows])
     variables["status"] = (dims, status, {"long_name": "what came of the run: done, failed or missing"})
     variables["reason"] = (dims, reason, {"long_name": "why the run failed"})
-    return xr.Dataset(variables, coords=coordinates, attrs=origin(scenario))
+    return xr.Dataset(variables, coords=coordinates, attrs=origin_attributes(scenario))
 
 
-def checked(result: xr.Dataset, interrupted: bool) -> xr.Dataset:
+def require_complete(result: xr.Dataset, interrupted: bool) -> xr.Dataset:
     """Return a complete result, or raise if every run failed or Ctrl-C ended the study.
 
     Raises:
@@ -77,6 +77,6 @@ def checked(result: xr.Dataset, interrupted: bool) -> xr.Dataset:
     return result
 
 
-def origin(scenario: Scenario) -> Mapping[str, str]:
+def origin_attributes(scenario: Scenario) -> Mapping[str, str]:
     """Return the attributes of a Dataset about its origin: the scenario and the versions of packages."""
     return {"title": scenario.title or scenario.name, "scenario": to_toml(scenario), **versions()}

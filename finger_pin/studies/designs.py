@@ -21,7 +21,7 @@ from finger_pin.studies.keys import Point, Value
 
 SAMPLE = "sample"
 #: More points than this are a mistake.
-MOST_POINTS = 1_000_000
+MAX_POINTS = 1_000_000
 
 
 class Design(Protocol):
@@ -55,11 +55,11 @@ class Grid:
         Raises:
             InputError: If there are none, one is not finite or comes twice, or there are too many points.
         """
-        object.__setattr__(self, "values", _checked(values))
+        object.__setattr__(self, "values", _read_values(values))
         for key, axis in self.values.items():
             if len(set(axis)) < len(axis):
-                twice = next(value for value in axis if axis.count(value) > 1)
-                raise InputError(key, "must not come twice", twice)
+                repeated = next(value for value in axis if axis.count(value) > 1)
+                raise InputError(key, "must not come twice", repeated)
         _check_count(math.prod(map(len, self.values.values())))
 
     @property
@@ -88,7 +88,7 @@ class PointList:
         Raises:
             InputError: If there are none, one is not finite, the keys have different numbers of them, or too many.
         """
-        object.__setattr__(self, "values", _checked(values))
+        object.__setattr__(self, "values", _read_values(values))
         first, *others = self.values
         for key in others:
             if len(self.values[key]) != len(self.values[first]):
@@ -196,10 +196,10 @@ class LatinHypercube:
         return PointList(self.values).points()
 
 
-def _checked(values: Mapping[str, Sequence[Value]]) -> dict[str, tuple[Value, ...]]:
+def _read_values(values: Mapping[str, Sequence[Value]]) -> dict[str, tuple[Value, ...]]:
     if not values:
         raise InputError("over", "at least one key is needed")
-    checked: dict[str, tuple[Value, ...]] = {}
+    values_by_key: dict[str, tuple[Value, ...]] = {}
     for key, axis_values in values.items():
         split(key)
         if isinstance(axis_values, str) or not isinstance(axis_values, Iterable):
@@ -211,13 +211,13 @@ def _checked(values: Mapping[str, Sequence[Value]]) -> dict[str, tuple[Value, ..
             axis[0], str | bool | int | float
         ):
             raise InputError(key, "must be given numbers, or names, or true and false", list(axis_values))
-        checked[key] = tuple(value if isinstance(value, str | bool) else float(value) for value in axis)
-        for value in checked[key]:
+        values_by_key[key] = tuple(value if isinstance(value, str | bool) else float(value) for value in axis)
+        for value in values_by_key[key]:
             if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(key, "must be a finite number", value)
-    return checked
+    return values_by_key
 
 
 def _check_count(count: int) -> None:
-    if count > MOST_POINTS:
-        raise InputError("over", f"makes {count} points; at most {MOST_POINTS} are run")
+    if count > MAX_POINTS:
+        raise InputError("over", f"makes {count} points; at most {MAX_POINTS} are run")

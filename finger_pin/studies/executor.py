@@ -33,8 +33,8 @@ from finger_pin.simulation.simulate import simulate
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 # Period of the checks for a stop, s, and length of the run that compiles, in simulated time, s.
-_POLL, _GLANCE = 0.1, 1e-3
-_WANTED = "must be a concurrent.futures.Executor, such as ThreadPoolExecutor(4)"
+_POLL_PERIOD, _COMPILE_DURATION = 0.1, 1e-3
+_EXECUTOR_MESSAGE = "must be a concurrent.futures.Executor, such as ThreadPoolExecutor(4)"
 
 
 @contextmanager
@@ -42,26 +42,26 @@ def open_executor(executor: Executor | None = None, workers: int | None = None) 
     """Provide an executor, by default threads, one for each usable core; in it single scenarios do not warn.
 
     Raises:
-        InputError: If it is none, or the number of threads is none or stands beside an executor.
+        InputError: If it is no executor, or the number of threads is wrong or given with an executor.
     """
     if workers is not None and executor is not None:
         raise InputError("workers", "are the executor's own", workers)
     if workers is not None and (not isinstance(workers, Integral) or isinstance(workers, bool) or workers < 1):
         raise InputError("workers", "must be a whole number of at least 1", workers)
     if executor is not None and (isinstance(executor, type) or not callable(getattr(executor, "submit", None))):
-        raise InputError("executor", _WANTED, executor)
+        raise InputError("executor", _EXECUTOR_MESSAGE, executor)
     pool = ThreadPoolExecutor(workers or usable_cores(), "finger_pin") if executor is None else nullcontext(executor)
-    with warnings.catch_warnings(action="ignore", category=ScenarioWarning), pool as opened:
-        yield opened
+    with warnings.catch_warnings(action="ignore", category=ScenarioWarning), pool as active_pool:
+        yield active_pool
 
 
 def compile_for(executor: Executor, scenario: Callable[[], Scenario]) -> None:
     """Compile for a scenario here, so that other processes find the code in the cache."""
-    # Its run reports why a scenario cannot be simulated.
+    # The run itself reports why a scenario cannot be simulated.
     with suppress(FingerPinError):
         if not isinstance(executor, ThreadPoolExecutor):
-            first = scenario()
-            simulate(first.updated(simulation={"duration": min(_GLANCE, first.simulation.duration)}))
+            example = scenario()
+            simulate(example.updated(simulation={"duration": min(_COMPILE_DURATION, example.simulation.duration)}))
 
 
 def run_tasks(
@@ -72,75 +72,75 @@ def run_tasks(
     When ``stop``, which is checked every tenth of a second, returns true, tasks that have not started are left.
 
     Raises:
-        InputError: If what the executor returns is no future.
+        InputError: If the executor returns something else than a future.
     """
-    ended, futures = CancelToken(), dict[Future[Any], int]()
+    token, futures = CancelToken(), dict[Future[Any], int]()
     finished: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
     threads = isinstance(executor, ThreadPoolExecutor)
     # A file that tells processes of this machine to stop; others go on to the end of their runs.
-    mark = Path(tempfile.gettempdir()) / f"finger_pin-{uuid.uuid4().hex}"
+    stop_file = Path(tempfile.gettempdir()) / f"finger_pin-{uuid.uuid4().hex}"
     try:
         for index, item in enumerate(items):
             if stop():
                 return
-            task = (function, item, ended) if threads else (_call, cloudpickle.dumps((function, item)), str(mark))
+            task = (function, item, token) if threads else (_call, cloudpickle.dumps((function, item)), str(stop_file))
             future = _submit(executor, *task)
             futures[future] = index
             future.add_done_callback(finished.put)
-        done = 0
-        while done < len(futures) and not stop():
+        count = 0
+        while count < len(futures) and not stop():
             with suppress(queue.Empty):
-                future = finished.get(timeout=_POLL)
-                done += 1
+                future = finished.get(timeout=_POLL_PERIOD)
+                count += 1
                 result = CancelledError() if future.cancelled() else future.exception() or future.result()
                 # Ctrl-C ends processes of an executor too.
                 if not (isinstance(result, BaseException) and stop()):
                     yield futures[future], result
     finally:
-        ended.cancel()
-        left = [future for future in futures if not future.cancel() and not future.done()]
-        if left and not threads:
+        token.cancel()
+        running = [future for future in futures if not future.cancel() and not future.done()]
+        if running and not threads:
             with suppress(OSError):
-                mark.touch()
-            for future in left:
-                future.add_done_callback(partial(_remove, mark, left))
+                stop_file.touch()
+            for future in running:
+                future.add_done_callback(partial(_remove, stop_file, running))
 
 
-def _remove(mark: Path, left: Sequence[Future[Any]], _: Future[Any]) -> None:
-    if all(future.done() for future in left):
-        mark.unlink(missing_ok=True)
+def _remove(stop_file: Path, running: Sequence[Future[Any]], _: Future[Any]) -> None:
+    if all(future.done() for future in running):
+        stop_file.unlink(missing_ok=True)
 
 
 def _submit(executor: Executor, *task: Any) -> Future[Any]:
     try:
         future = executor.submit(*task)
     except Exception as error:
-        # It is shut down, or broken.
+        # The executor is shut down, or broken.
         future = Future()
         future.set_exception(error)
     if not callable(getattr(future, "add_done_callback", None)):
-        raise InputError("executor", f"{_WANTED}: its submit returns no future", executor)
+        raise InputError("executor", f"{_EXECUTOR_MESSAGE}: its submit returns no future", executor)
     return future
 
 
-def _call(task: bytes, mark: str) -> Any:
-    stop = partial(os.path.exists, mark)
+def _call(task: bytes, stop_file: str) -> Any:
+    stop = partial(os.path.exists, stop_file)
     # Executors fetch tasks in advance, which they cannot take back.
     if stop():
         raise CancelledError
     function, item = pickle.loads(task)
-    with quiet():
+    with without_scenario_warnings():
         return function(item, stop)
 
 
-def one_line(error: BaseException) -> str:
+def error_line(error: BaseException) -> str:
     """Return an exception in one line, with its type unless it is of this package."""
     kind = "" if isinstance(error, FingerPinError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
+def without_scenario_warnings() -> Iterator[None]:
     """Ignore warnings of single scenarios, unless in a thread: filters are those of the whole process."""
     main = threading.current_thread() is threading.main_thread()
     with warnings.catch_warnings(action="ignore", category=ScenarioWarning) if main else nullcontext():

@@ -16,9 +16,9 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import versions
 
 # Imports point down, so nothing above the studies affects their results.
-_ABOVE = {"views", "commands"}
-_PLAIN = (type(None), bool, int, float, complex, str, bytes, type(...))
-_WRAPPED = ("fget", "fset", "fdel", "__wrapped__", "targetoptions")
+_EXCLUDED = {"views", "commands"}
+_PLAIN_TYPES = (type(None), bool, int, float, complex, str, bytes, type(...))
+_WRAPPED_ATTRIBUTES = ("fget", "fset", "fdel", "__wrapped__", "targetoptions")
 
 
 class UnknownDependency(Exception):
@@ -29,92 +29,92 @@ class UnknownDependency(Exception):
 def source_digest() -> str:
     """Return a digest of this package's source and of the versions of others."""
     package = Path(__file__).parent.parent
-    files = [each for each in sorted(package.rglob("*.py")) if each.relative_to(package).parts[0] not in _ABOVE]
-    return str(joblib.hash((versions(), [each.read_bytes() for each in files])))
+    files = [path for path in sorted(package.rglob("*.py")) if path.relative_to(package).parts[0] not in _EXCLUDED]
+    return str(joblib.hash((versions(), [path.read_bytes() for path in files])))
 
 
-def digest(thing: Any) -> str:
-    """Return a digest of a value: of functions the code, what they enclose, and the user code that they call.
+def digest(value: Any) -> str:
+    """Return a digest of a value: of functions the code, their closures, and the user code that they call.
 
-    What installed packages call counts by their names and versions. Files that a function reads are not seen.
+    Installed packages count by their names and versions. Files that a function reads do not count.
 
     Raises:
         UnknownDependency: If it depends on something without a lasting content, such as a lock or an open file.
     """
-    return _digest(thing, frozenset(), {})
+    return _digest(value, frozenset(), {})
 
 
 #: What holds a function of a user's: descriptors, and that of `functools.cache`.
 _WRAPPERS = (property, staticmethod, classmethod, type(source_digest))
 
 
-def _is_compiled(thing: Any) -> bool:
+def _is_compiled(value: Any) -> bool:
     """Return whether numba compiles a function; its type is not public."""
-    return type(thing).__module__.startswith("numba.") and hasattr(thing, "py_func")
+    return type(value).__module__.startswith("numba.") and hasattr(value, "py_func")
 
 
-def _digest(thing: Any, names: frozenset[str], known: dict[Any, tuple[Any, str]]) -> str:
-    """Return a digest of a thing; of a user's module, only of the parts used by one of some names."""
-    if type(thing) in _PLAIN:
+def _digest(value: Any, names: frozenset[str], digests: dict[Any, tuple[Any, str]]) -> str:
+    """Return a digest of a value; of a user's module, only of the members with some names."""
+    if type(value) in _PLAIN_TYPES:
         # A text such as "module:NAME" may be that of a user's law.
-        module, _, name = str(thing).partition(":")
-        named = vars(sys.modules[module]).get(name) if module in sys.modules else None
-        return str(joblib.hash((type(thing).__name__, thing, named and _digest(named, names, known))))
-    names = _names(thing.__code__) if isinstance(thing, FunctionType) else names
-    key = id(thing), names
-    if key not in known:
-        # Kept, so that no other thing gets its identity meanwhile. In a circle it counts as such.
-        known[key] = thing, "circle"
+        module, _, name = str(value).partition(":")
+        member = vars(sys.modules[module]).get(name) if module in sys.modules else None
+        return str(joblib.hash((type(value).__name__, value, member and _digest(member, names, digests))))
+    names = _names(value.__code__) if isinstance(value, FunctionType) else names
+    key = id(value), names
+    if key not in digests:
+        # The value is stored so that its identity is not reused; a value that contains itself counts as "circle".
+        digests[key] = value, "circle"
         try:
-            parts = _parts(thing, names)
+            parts = _parts(value, names)
         except (TypeError, ValueError):
-            raise UnknownDependency(f"an object of type {type(thing).__name__}") from None
-        # joblib tells one thing twice from two equal ones, but not so for texts, and orders sets by their seed.
-        digests = [_digest(part, names, known) for part in parts]
-        digests = sorted(digests) if isinstance(thing, dict | set | frozenset) else digests
-        known[key] = thing, str(joblib.hash([type(thing).__qualname__, *digests]))
-    return known[key][1]
+            raise UnknownDependency(f"an object of type {type(value).__name__}") from None
+        # joblib distinguishes one object twice from two equal ones, except for texts, and orders sets by their seed.
+        part_digests = [_digest(part, names, digests) for part in parts]
+        part_digests = sorted(part_digests) if isinstance(value, dict | set | frozenset) else part_digests
+        digests[key] = value, str(joblib.hash([type(value).__qualname__, *part_digests]))
+    return digests[key][1]
 
 
-def _parts(thing: Any, names: frozenset[str]) -> list[Any]:
-    """Return the parts that determine a thing, of which code uses some names."""
-    module = getattr(thing, "__module__", None)
-    match thing:
+def _parts(value: Any, names: frozenset[str]) -> list[Any]:
+    """Return the parts that determine a value, of a namespace the members with some names."""
+    module = getattr(value, "__module__", None)
+    match value:
         case dict():
-            return [*thing.items()]
+            return [*value.items()]
         case tuple() | list() | set() | frozenset():
-            return [*thing]
+            return [*value]
         case CodeType():
-            return [thing.co_code, thing.co_exceptiontable, thing.co_varnames, thing.co_names, thing.co_consts]
+            return [value.co_code, value.co_exceptiontable, value.co_varnames, value.co_names, value.co_consts]
         case ModuleType():
-            used = {} if _is_installed(thing.__name__) else _chosen(vars(thing), names)
-            return [thing.__name__, vars(thing).get("__version__"), used]
+            members = {} if _is_installed(value.__name__) else _select(vars(value), names)
+            return [value.__name__, vars(value).get("__version__"), members]
         case FunctionType():
-            seat = module if _is_installed(module) else _chosen(thing.__globals__, names)
-            cells = [each.cell_contents for each in thing.__closure__ or ()]
-            return [seat, thing.__code__, thing.__defaults__, thing.__kwdefaults__, cells]
+            namespace = module if _is_installed(module) else _select(value.__globals__, names)
+            cells = [name.cell_contents for name in value.__closure__ or ()]
+            return [namespace, value.__code__, value.__defaults__, value.__kwdefaults__, cells]
         case type() if _is_installed(module):
-            return [module, thing.__qualname__]
+            return [module, value.__qualname__]
         case type():
-            written = {each: value for each, value in vars(thing).items() if callable(value) or each[:2] != "__"}
-            return [thing.__bases__, written]
-        case _ if isinstance(thing, _WRAPPERS) or _is_compiled(thing):
-            return [getattr(thing, each, None) for each in _WRAPPED]
+            attributes = {name: value for name, value in vars(value).items() if callable(value) or name[:2] != "__"}
+            return [value.__bases__, attributes]
+        case _ if isinstance(value, _WRAPPERS) or _is_compiled(value):
+            return [getattr(value, name, None) for name in _WRAPPED_ATTRIBUTES]
         case Finger():
-            return [thing.description, thing.constructor_args]
+            return [value.description, value.constructor_args]
         case BaseModel():
-            return [type(thing), thing.model_dump()]
-    known = copyreg.dispatch_table.get(type(thing))
-    reduced = known(thing) if known else thing.__reduce_ex__(4)
+            return [type(value), value.model_dump()]
+    reducer = copyreg.dispatch_table.get(type(value))
+    reduced = reducer(value) if reducer else value.__reduce_ex__(4)
     if not isinstance(reduced, str):
         return [*reduced]
     # By name, as builtin functions; one that NumPy makes of a user's has none.
-    if not (reduced.isidentifier() and _is_installed(module or type(thing).__module__)):
+    if not (reduced.isidentifier() and _is_installed(module or type(value).__module__)):
         raise TypeError
     return [module, reduced]
 
 
-def _chosen(space: dict[str, Any], names: frozenset[str]) -> dict[str, Any]:
+def _select(space: dict[str, Any], names: frozenset[str]) -> dict[str, Any]:
     return {name: space[name] for name in names & space.keys()}
 
 
@@ -128,6 +128,6 @@ def _names(code: CodeType) -> frozenset[str]:
 def _is_installed(module: str | None) -> bool:
     """Return true for modules of this package, of Python and of installed packages, not the user's."""
     top = (module or "").partition(".")[0]
-    file = getattr(sys.modules.get(top), "__file__", None) or ""
-    known = top == "finger_pin" or top in sys.stdlib_module_names
-    return known or not {"site-packages", "dist-packages"}.isdisjoint(Path(file).parts)
+    path = getattr(sys.modules.get(top), "__file__", None) or ""
+    in_library = top == "finger_pin" or top in sys.stdlib_module_names
+    return in_library or not {"site-packages", "dist-packages"}.isdisjoint(Path(path).parts)

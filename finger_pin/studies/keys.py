@@ -50,9 +50,9 @@ class BaseScenario:
         return cls(with_finger(scenario, custom_finger), custom_finger)
 
     def at(self, point: Point) -> Scenario:
-        """Return the scenario with other numbers or names at some keys.
+        """Return the scenario with other values at some keys.
 
-        What a file leaves to its default, such as a mass centre at half a link's length, follows the numbers.
+        Entries left to their defaults, such as a mass centre at half a link's length, follow the values.
 
         Raises:
             InputError: Naming the entry that is wrong.
@@ -76,16 +76,16 @@ class BaseScenario:
         Raises:
             InputError: If there is no such key, it holds something else, or allows none of the values.
         """
-        entry = self._entry(key)
+        entry = _look_up(self.scenario, key)
         numbers = _is_number(values[0])
-        # Of the finger nothing may come into being by a misspelt name, as an entry that is overridden otherwise may.
+        # A misspelt name in the finger must not create an entry, as an override elsewhere may.
         if (
             key.startswith("finger.")
             and split(key)[1] is None
             and not (_is_number(entry) if numbers else entry is not None)
-            and not self._left_out(key)
+            and not self._is_omitted(key)
         ):
-            raise self._nothing(key, numbers)
+            raise self._unknown_key(key, numbers)
         problem: InputError | None = None
         for value in values:
             try:
@@ -96,53 +96,50 @@ class BaseScenario:
                 elif alone:
                     problem = problem or InputError(key, f"no value of it can be simulated: {error}")
                 else:
-                    # The value is right as such.
+                    # The value itself is right.
                     return
                 continue
             if numbers and not _is_number(_look_up(scenario, key)):
-                raise self._nothing(key, numbers)
+                raise self._unknown_key(key, numbers)
             return
         if problem is not None:
             raise problem
 
     def number(self, key: str) -> float:
-        """Return the scenario's own number at a key.
+        """Return the scenario's number at a key.
 
         Raises:
             InputError: If it has none.
         """
-        entry = self._entry(key)
-        if self._left_out(key):
+        entry = _look_up(self.scenario, key)
+        if self._is_omitted(key):
             raise InputError(key, "is left out of the scenario, so that there is no number to start from: state it")
         if not _is_number(entry):
-            raise self._nothing(key, True)
+            raise self._unknown_key(key, True)
         return float(entry)
 
-    def _nothing(self, key: str, numbers: bool) -> InputError:
+    def _unknown_key(self, key: str, numbers: bool) -> InputError:
         hint = suggestion(key, _leaves(self.scenario.model_dump(mode="python"), "", numbers))
         return InputError(key, f"the scenario has no such {'number' if numbers else 'entry'}{hint}")
 
-    def _left_out(self, key: str) -> bool:
+    def _is_omitted(self, key: str) -> bool:
         """Return whether a key names an entry that may be left out, and is."""
         parent, _, name = key.rpartition(".")
-        below = _look_up(self.scenario, parent)
-        return isinstance(below, dict) and below.get(name, 0) is None
-
-    def _entry(self, key: str) -> Any:
-        return _look_up(self.scenario, key)
+        table = _look_up(self.scenario, parent)
+        return isinstance(table, dict) and table.get(name, 0) is None
 
 
 def describe(key: str) -> dict[str, str]:
     """Return ``units`` and ``long_name`` of the value at a key, from its description."""
     name, index = split(key)
-    first, *rest = parts = name.split(".")
-    # In a hand the joints of a finger stand in a table of its own.
-    field = find_field(Scenario, parts) or find_field(Scenario, [first, *rest[:1], *rest[2:]])
+    root, *path = parts = name.split(".")
+    # In a hand, each finger has a table of joints.
+    field = find_field(Scenario, parts) or find_field(Scenario, [root, *path[:1], *path[2:]])
     extra = field.json_schema_extra if field is not None else None
     unit = extra.get("unit", "1") if isinstance(extra, dict) else "1"
     text = (field.description or "").rstrip(".") if field is not None else ""
-    where = "" if index is None else str([*index])
-    return {"units": str(unit), "long_name": f"{text}{where}" if text else key}
+    suffix = "" if index is None else str([*index])
+    return {"units": str(unit), "long_name": f"{text}{suffix}" if text else key}
 
 
 def _is_number(entry: Any) -> bool:
@@ -152,11 +149,11 @@ def _is_number(entry: Any) -> bool:
 def _leaves(entry: Any, key: str, numbers: bool) -> Iterator[str]:
     """Yield the keys below one, those of numbers or all."""
     if isinstance(entry, Mapping):
-        for name, below in entry.items():
-            yield from _leaves(below, f"{key}.{name}" if key else name, numbers)
+        for name, child in entry.items():
+            yield from _leaves(child, f"{key}.{name}" if key else name, numbers)
     elif isinstance(entry, list | tuple):
-        for index, below in enumerate(entry):
-            yield from _leaves(below, f"{key}[{index}]", numbers)
+        for index, child in enumerate(entry):
+            yield from _leaves(child, f"{key}[{index}]", numbers)
     elif _is_number(entry) or not numbers:
         yield key
 
@@ -166,9 +163,9 @@ def _look_up(scenario: Scenario, key: str) -> Any:
     name, index = split(key)
     entry: Any = scenario.model_dump(mode="python")
     for part in name.split("."):
-        below = entry if isinstance(entry, dict) else {}
-        first = part.strip("{}").split(",")[0]
-        entry = next(iter(below.values()), None) if part == "*" else below.get(first)
+        table = entry if isinstance(entry, dict) else {}
+        child_name = part.strip("{}").split(",")[0]
+        entry = next(iter(table.values()), None) if part == "*" else table.get(child_name)
     if index is None:
         return entry
     return entry[index[0]] if isinstance(entry, list | tuple | Series) and max(index) < len(entry) else None

@@ -21,7 +21,7 @@ from finger_pin.mechanism import joints, tendons
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rows import LOST
 from finger_pin.references.reference import SignalReference
-from finger_pin.simulation.energy import entries
+from finger_pin.simulation.energy import account_entries
 from finger_pin.studies.response import (
     Run,
     fingertip_hysteresis,
@@ -48,22 +48,22 @@ class Metric:
         unit: SI unit.
         long_name: Its name in words.
         measure: Takes a run and returns the number. Other processes call it.
-        of_reference: Whether it has no meaning without a reference of the joints.
-        of_tendons: Whether it has no meaning without tendons that ideal sources pull, or passive ones.
+        needs_reference: Whether it has no meaning without a reference of the joints.
+        needs_tendons: Whether it has no meaning without tendons that ideal sources pull, or passive ones.
     """
 
     name: str
     unit: str
     long_name: str
     measure: Callable[[Run], float]
-    of_reference: bool = False
-    of_tendons: bool = False
+    needs_reference: bool = False
+    needs_tendons: bool = False
 
-    def lacks(self, scenario: Scenario) -> str:
-        """Return what the metric needs and a scenario does not have, or nothing."""
-        if self.of_reference and not has_reference(scenario):
+    def missing_part(self, scenario: Scenario) -> str:
+        """Return a message on the part that the metric needs and a scenario lacks; empty if there is none."""
+        if self.needs_reference and not has_reference(scenario):
             return _NO_REFERENCE
-        return _NO_TENDONS if self.of_tendons and not scenario.finger.tendons else ""
+        return _NO_TENDONS if self.needs_tendons and not scenario.finger.tendons else ""
 
 
 def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
@@ -81,8 +81,8 @@ def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
         try:
             cloudpickle.dumps(metric)
         except Exception as error:
-            what = f"cannot be sent to other processes: {type(error).__name__}: {error}"
-            raise InputError("metric", what, metric.name) from None
+            problem = f"cannot be sent to other processes: {type(error).__name__}: {error}"
+            raise InputError("metric", problem, metric.name) from None
         if metric.name in chosen:
             raise InputError("metric", "must not come twice", metric.name)
         chosen[metric.name] = metric
@@ -91,7 +91,7 @@ def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
     return tuple(chosen.values())
 
 
-def metrics_of(scenario: Scenario, names: Iterable[str | Metric] | None = None) -> tuple[Metric, ...]:
+def scenario_metrics(scenario: Scenario, names: Iterable[str | Metric] | None = None) -> tuple[Metric, ...]:
     """Return metrics by name, or those of `DEFAULT_METRICS` that mean something for a scenario.
 
     Raises:
@@ -99,10 +99,10 @@ def metrics_of(scenario: Scenario, names: Iterable[str | Metric] | None = None) 
     """
     chosen = resolve_metrics(DEFAULT_METRICS if names is None else names)
     if names is None:
-        return tuple(metric for metric in chosen if not metric.lacks(scenario))
+        return tuple(metric for metric in chosen if not metric.missing_part(scenario))
     for metric in chosen:
-        if lacking := metric.lacks(scenario):
-            raise InputError("metric", lacking, metric.name)
+        if missing := metric.missing_part(scenario):
+            raise InputError("metric", missing, metric.name)
     return chosen
 
 
@@ -125,43 +125,43 @@ def _errors(run: Run) -> Array:
 
 def tension_peak(run: Run) -> float:
     """Return the largest tension at either end of any tendon, N: f^a or f^m, f, f5_3 or f5_4."""
-    return float(max(np.max(ends) for ends in _ends(run) if ends.size))
+    return float(max(np.max(ends) for ends in _end_tensions(run) if ends.size))
 
 
 def tension_mean(run: Run) -> float:
     """Return the mean over time and tendons of the delivered tension f, N; of passive tendons f5_4."""
-    return _time_mean(run.result, np.mean(_delivered(run), axis=1))
+    return _time_mean(run.result, np.mean(_delivered_tension(run), axis=1))
 
 
 def losses(run: Run) -> float:
     """Return the energy lost, J, without the heat in the windings."""
-    return sum(float(each[-1]) for each in entries(run.result, LOST).values()) - heat(run)
+    return sum(float(each[-1]) for each in account_entries(run.result, LOST).values()) - heat(run)
 
 
 def losses_tendons(run: Run) -> float:
     """Return the energy lost to the friction of the tendons, J."""
-    return sum(_final(run.result, each.name) for each in tendons.LOSSES)
+    return sum(_final_value(run.result, each.name) for each in tendons.LOSSES)
 
 
 def losses_joints(run: Run) -> float:
     """Return the energy lost to the friction of the joints, J."""
-    return sum(_final(run.result, each.name) for each in joints.LOSSES)
+    return sum(_final_value(run.result, each.name) for each in joints.LOSSES)
 
 
 def slack_time(run: Run) -> float:
     """Return the time with a tendon, or half of a passive one, without tension at an end, s."""
-    delivered = [np.min(_delivered(run), axis=1)]
+    delivered = [np.min(_delivered_tension(run), axis=1)]
     if "spool_tension" in run.result:
         delivered.append(rows(run.result, "spool_tension", "tendon").min(axis=1))
     if "passive_tension_proximal" in run.result:
-        delivered.append(_proximal(run.result).min(axis=1))
+        delivered.append(_proximal_tension(run.result).min(axis=1))
     slack = (np.min(delivered, axis=0) <= 0.0).astype(float)
     return float(np.trapezoid(slack, run.result["time"].values))
 
 
 def heat(run: Run) -> float:
     """Return the heat in the windings of the motors, J; 0 for a finger without motors."""
-    return _final(run.result, "motor_heat") if "motor_current" in run.result else 0.0
+    return _final_value(run.result, "motor_heat") if "motor_current" in run.result else 0.0
 
 
 def current_peak(run: Run) -> float:
@@ -197,27 +197,27 @@ def _fingertip_force(scenario: Scenario, finger: Finger) -> float:
     return min(float(np.min(offsets)) if offsets.size else 0.0 for offsets in sets)
 
 
-def _proximal(result: xr.Dataset) -> Array:
+def _proximal_tension(result: xr.Dataset) -> Array:
     values = np.asarray(result["passive_tension_proximal"].transpose("time", ...).values)
     return values.reshape(len(values), -1)
 
 
-def _delivered(run: Run) -> Array:
+def _delivered_tension(run: Run) -> Array:
     """Return f, shape (m, t), N, of a run that has tendons."""
     if not run.result.sizes["tendon"]:
         raise InputError("metric", _NO_TENDONS, "tension")
     return rows(run.result, "tendon_tension", "tendon")
 
 
-def _ends(run: Run) -> list[Array]:
+def _end_tensions(run: Run) -> list[Array]:
     """Return the tensions at both ends of all tendons; planned ones of passive tendons are no commands."""
-    result, delivered = run.result, _delivered(run)
+    result, delivered = run.result, _delivered_tension(run)
     if "spool_tension" in result:
         return [delivered, rows(result, "spool_tension", "tendon")]
     command = rows(result, "tendon_command", "tendon")
     if "passive_tension_proximal" not in result:
         return [delivered, command]
-    proximal = _proximal(result)
+    proximal = _proximal_tension(result)
     return [delivered, proximal, command[:, : command.shape[1] - proximal.shape[1]]]
 
 
@@ -226,7 +226,7 @@ def _time_mean(result: xr.Dataset, values: Array) -> float:
     return float(np.trapezoid(values, time) / (time[-1] - time[0]))
 
 
-def _final(result: xr.Dataset, name: str) -> float:
+def _final_value(result: xr.Dataset, name: str) -> float:
     return float(result[f"energy_exchanged_{name}"][-1])
 
 
@@ -236,12 +236,12 @@ METRICS = {
     for metric in (
         Metric("tracking_rms", "rad", "tracking error, rms over time and joints", tracking_rms, True),
         Metric("tracking_peak", "rad", "largest tracking error of any joint", tracking_peak, True),
-        Metric("tension_peak", "N", "largest tension at either end of any tendon", tension_peak, of_tendons=True),
-        Metric("tension_mean", "N", "delivered tension, mean over time and tendons", tension_mean, of_tendons=True),
+        Metric("tension_peak", "N", "largest tension at either end of any tendon", tension_peak, needs_tendons=True),
+        Metric("tension_mean", "N", "delivered tension, mean over time and tendons", tension_mean, needs_tendons=True),
         Metric("losses", "J", "energy lost, but for the heat in windings", losses),
         Metric("losses_tendons", "J", "energy lost to the friction of the tendons", losses_tendons),
         Metric("losses_joints", "J", "energy lost to the friction of the joints", losses_joints),
-        Metric("slack_time", "s", "time with a slack tendon", slack_time, of_tendons=True),
+        Metric("slack_time", "s", "time with a slack tendon", slack_time, needs_tendons=True),
         Metric("heat", "J", "heat in the windings of the motors", heat),
         Metric("winding_temperature", "degC", "highest temperature of a winding", winding_temperature),
         Metric("fingertip_hysteresis", "m", "fingertip on the way out and back, apart at most", fingertip_hysteresis),

@@ -1,4 +1,4 @@
-"""Runs of a study: a line of JSON each, written as soon as they end, and recognised by a digest of their inputs."""
+"""Records of a study's runs: a line of JSON each, written at once, identified by a digest of the inputs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.studies.executor import compile_for, one_line, open_executor, run_tasks
+from finger_pin.studies.executor import compile_for, error_line, open_executor, run_tasks
 from finger_pin.studies.fingerprint import UnknownDependency, digest, source_digest
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric
@@ -33,7 +33,7 @@ from finger_pin.version import __version__
 #: Called with the numbers of finished, failed and all runs.
 Progress = Callable[[int, int, int], None]
 DONE, FAILED = "done", "failed"
-_RUNS, _LOCK, _FIRST = "runs.jsonl", ".lock", b'{"key": '
+_RECORDS_FILE, _LOCK_FILE, _RECORD_START = "runs.jsonl", ".lock", b'{"key": '
 
 
 class ExecutorError(FingerPinError):
@@ -42,7 +42,7 @@ class ExecutorError(FingerPinError):
 
 @dataclass(frozen=True)
 class RunRecord:
-    """Record of a run: its key, varied values, `DONE` or `FAILED` and why, metrics by name, and wall time, s."""
+    """Record of a run: its key, varied values, status, reason of a failure, metrics by name, and wall time, s."""
 
     key: str
     point: Point
@@ -77,11 +77,11 @@ class Study:
     def evaluate(
         self, points: Sequence[Point], progress: Progress | None = None, *, retry_failed: bool = False
     ) -> list[RunRecord | None]:
-        """Do the runs that are missing, and return the records of all, None where the study was ended before.
+        """Execute the missing runs, and return the records of all, None where the study was stopped before.
 
         Args:
             points: Points of the study.
-            progress: Called with the numbers of finished, failed and all runs, first with those found.
+            progress: Called with the numbers of finished, failed and all runs, first with those of earlier studies.
             retry_failed: Whether runs that failed before count as missing.
 
         Raises:
@@ -96,15 +96,15 @@ class Study:
 
         def report() -> None:
             if progress is not None:
-                done = [records[key] for key in keys if key in records]
-                progress(len(done), sum(record.status == FAILED for record in done), len(points))
+                finished = [records[key] for key in keys if key in records]
+                progress(len(finished), sum(record.status == FAILED for record in finished), len(points))
 
         report()
         if tasks:
             compile_for(self.executor, lambda: self.base.at(tasks[0][1]))
-        work = partial(execute, base=self.base, metrics=self.metrics, source=source_digest())
-        for index, outcome in run_tasks(self.executor, work, tasks, self.token):
-            record = _failed(*tasks[index], outcome) if isinstance(outcome, BaseException) else outcome
+        task_function = partial(execute, base=self.base, metrics=self.metrics, source=source_digest())
+        for index, outcome in run_tasks(self.executor, task_function, tasks, self.token):
+            record = _failed_record(*tasks[index], outcome) if isinstance(outcome, BaseException) else outcome
             self.append(record)
             records[record.key] = record
             report()
@@ -112,17 +112,17 @@ class Study:
 
     def _key(self, point: Point) -> str:
         """Return the digest of everything that determines a run."""
-        named = [each for each in point.values() if isinstance(each, str)]
-        if any(":" in each and each.partition(":")[0] not in sys.modules for each in named):
+        names = [name for name in point.values() if isinstance(name, str)]
+        if any(":" in name and name.partition(":")[0] not in sys.modules for name in names):
             _import_laws(lambda: self.base.at(point))
-        content = [_lasting_digest(f"the value {each}", each, warn=self.path is not None) for each in named]
-        return str(joblib.hash((self.digest, dict(point), content)))
+        digests = [_content_digest(f"the value {name}", name, warn=self.path is not None) for name in names]
+        return str(joblib.hash((self.digest, dict(point), digests)))
 
     def append(self, record: RunRecord) -> None:
         """Keep a record, also on disk if there is a folder."""
         if self.path is not None:
-            with filelock.FileLock(self.path.with_name(_LOCK)), self.path.open("ab+") as file:
-                _cut_off_half_line(file)
+            with filelock.FileLock(self.path.with_name(_LOCK_FILE)), self.path.open("ab+") as file:
+                _remove_unfinished_line(file)
                 file.write(json.dumps(vars(record)).encode() + b"\n")
                 file.flush()
                 os.fsync(file.fileno())
@@ -157,20 +157,20 @@ def open_study(
 
 
 def _open_folder(folder: Path, products: Sequence[str], restart: bool) -> tuple[Path, dict[str, RunRecord]]:
-    path, records = folder / _RUNS, dict[str, RunRecord]()
+    path, records = folder / _RECORDS_FILE, dict[str, RunRecord]()
     try:
-        present = [each for pattern in (*products, _RUNS) for each in folder.glob(pattern)]
-        foreign = [each.name for each in folder.glob("study.toml")]
-        if present and not (path.exists() and _FIRST.startswith(path.read_bytes()[: len(_FIRST)])):
-            foreign.append(present[0].name)
-        if foreign:
-            what = f"holds a {foreign[0]} of an earlier version or of something else; name another folder"
-            raise InputError("output", what, str(folder))
-        for stale in present if restart else ():
-            stale.unlink()
+        existing = [file_path for pattern in (*products, _RECORDS_FILE) for file_path in folder.glob(pattern)]
+        foreign_names = [file_path.name for file_path in folder.glob("study.toml")]
+        if existing and not (path.exists() and _RECORD_START.startswith(path.read_bytes()[: len(_RECORD_START)])):
+            foreign_names.append(existing[0].name)
+        if foreign_names:
+            problem = f"holds a {foreign_names[0]} of an earlier version or of something else; name another folder"
+            raise InputError("output", problem, str(folder))
+        for stale_file in existing if restart else ():
+            stale_file.unlink()
         folder.mkdir(parents=True, exist_ok=True)
-        with filelock.FileLock(folder / _LOCK), path.open("ab+") as file:
-            dropped = _cut_off_half_line(file)
+        with filelock.FileLock(folder / _LOCK_FILE), path.open("ab+") as file:
+            dropped_count = _remove_unfinished_line(file)
             file.seek(0)
             lines = file.read().splitlines()
     except OSError as error:
@@ -180,14 +180,14 @@ def _open_folder(folder: Path, products: Sequence[str], restart: bool) -> tuple[
             record = RunRecord(**json.loads(line))
             records[record.key] = record
         except (TypeError, ValueError):
-            dropped += 1
-    if dropped:
-        message = f"{path}: lines that are not whole, or no records: {dropped}; their runs are done again"
+            dropped_count += 1
+    if dropped_count:
+        message = f"{path}: lines that are not whole, or no records: {dropped_count}; their runs are done again"
         warnings.warn(message, stacklevel=5)
     return path, records
 
 
-def _cut_off_half_line(file: BinaryIO) -> int:
+def _remove_unfinished_line(file: BinaryIO) -> int:
     """Cut off a line that a killed process has left unfinished; return the number of such lines."""
     file.seek(max(file.seek(0, os.SEEK_END) - 1, 0))
     if file.read() in (b"", b"\n"):
@@ -200,19 +200,19 @@ def _cut_off_half_line(file: BinaryIO) -> int:
 def _common_digest(base: BaseScenario, metrics: Sequence[Metric], warn: bool) -> str:
     """Return a digest of the inputs that all runs share."""
     _import_laws(lambda: base.scenario)
-    parts: dict[str, Any] = {f"the metric {each.name}": each for each in metrics}
+    parts: dict[str, Any] = {f"the metric {metric.name}": metric for metric in metrics}
     parts |= {"the scenario": base.scenario, "the finger": base.finger}
-    return str(joblib.hash([source_digest(), *(_lasting_digest(name, part, warn) for name, part in parts.items())]))
+    return str(joblib.hash([source_digest(), *(_content_digest(name, part, warn) for name, part in parts.items())]))
 
 
 def _import_laws(scenario: Callable[[], Scenario]) -> None:
     """Import the laws that a scenario names, so that their content is known."""
-    # Its run reports why a scenario cannot be simulated.
+    # The run itself reports why a scenario cannot be simulated.
     with suppress(FingerPinError):
         Finger(scenario().finger)
 
 
-def _lasting_digest(name: str, part: Any, warn: bool) -> str:
+def _content_digest(name: str, part: Any, warn: bool) -> str:
     """Return the digest of a part of a study, a unique one if its content cannot be known."""
     try:
         return digest(part)
@@ -222,11 +222,11 @@ def _lasting_digest(name: str, part: Any, warn: bool) -> str:
         return uuid.uuid4().hex
 
 
-def _failed(key: str, point: Point, error: BaseException) -> RunRecord:
+def _failed_record(key: str, point: Point, error: BaseException) -> RunRecord:
     """Return the record of a run that killed its workers, or raise if the executor failed."""
     if type(error).__name__ == "KilledWorker":
         return RunRecord(key, dict(point), FAILED, f"the workers that ran it died: {error}", {}, 0.0)
-    raise ExecutorError(f"the executor cannot go on: {one_line(error)}; give an output to keep what it has finished")
+    raise ExecutorError(f"the executor cannot go on: {error_line(error)}; give an output to keep what it has finished")
 
 
 def execute(
@@ -235,12 +235,12 @@ def execute(
     """Simulate a point and measure it; an exception becomes the reason of a failed run.
 
     Raises:
-        ExecutorError: If this package is not the one that asked.
-        Interrupted: If it was told to stop.
+        ExecutorError: If this package differs from that of the study.
+        Interrupted: If the study was stopped.
     """
     if source != source_digest():
-        other = f"{__version__}, source {source_digest()}"
-        raise ExecutorError(f"a worker has another finger_pin ({other}), not that of source {source}")
+        own_version = f"{__version__}, source {source_digest()}"
+        raise ExecutorError(f"a worker has another finger_pin ({own_version}), not that of source {source}")
     key, point = task
     start, values, reason = time.perf_counter(), dict[str, float](), ""
     try:
@@ -248,5 +248,5 @@ def execute(
         run = Run(scenario, stop, base.finger_at(scenario))
         values = {metric.name: float(metric.measure(run)) for metric in metrics}
     except Exception as error:
-        reason = one_line(error)
+        reason = error_line(error)
     return RunRecord(key, dict(point), FAILED if reason else DONE, reason, values, time.perf_counter() - start)

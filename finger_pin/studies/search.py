@@ -18,15 +18,15 @@ from finger_pin.typing import Array
 from finger_pin.version import installing
 
 # How far out a design is that cannot be run at all: farther than any that breaks a bound within reason.
-HOPELESS = 1e6
+FAILED_EXCESS = 1e6
 # Distribution indices of simulated binary crossover and polynomial mutation.
-_CROSSOVER, _MUTATION = 15.0, 20.0
+_CROSSOVER_INDEX, _MUTATION_INDEX = 15.0, 20.0
 
 
 class Search:
     """An evolutionary search in the unit cube.
 
-    It knows of the objectives and constraints only what `tell` says, so a search with the same values takes the
+    It depends on the objectives and constraints only by `tell`, so a search with the same values takes the
     same course: one is continued by repeating it with recorded values.
     """
 
@@ -52,25 +52,25 @@ class Search:
             sampler = NSGAIISampler(
                 population_size=population,
                 seed=seed,
-                crossover=nsgaii.SBXCrossover(eta=_CROSSOVER),
-                mutation=nsgaii.PolynomialMutation(eta=_MUTATION),
+                crossover=nsgaii.SBXCrossover(eta=_CROSSOVER_INDEX),
+                mutation=nsgaii.PolynomialMutation(eta=_MUTATION_INDEX),
             )
         verbosity = optuna.logging.get_verbosity()
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         self._study = optuna.create_study(directions=["minimize"] * objectives, sampler=sampler)
         optuna.logging.set_verbosity(verbosity)
         self._range: Any = {f"{number}": optuna.distributions.FloatDistribution(0.0, 1.0) for number in range(size)}
-        first = qmc.LatinHypercube(size, rng=np.random.default_rng(seed)).random(population)
+        designs = qmc.LatinHypercube(size, rng=np.random.default_rng(seed)).random(population)
         if start is not None:
-            first[0] = start
-        for design in first:
+            designs[0] = start
+        for design in designs:
             self._study.enqueue_trial(dict(zip(self._range, design.tolist(), strict=True)))
-        self._population, self._asked = population, list[Any]()
+        self._population, self._trials = population, list[Any]()
 
     def ask(self) -> Array:
         """Return the designs of the next generation, shape (population, size), each in the unit cube."""
-        self._asked = [self._study.ask(self._range) for _ in range(self._population)]
-        return np.array([[trial.params[name] for name in self._range] for trial in self._asked])
+        self._trials = [self._study.ask(self._range) for _ in range(self._population)]
+        return np.array([[trial.params[name] for name in self._range] for trial in self._trials])
 
     def tell(self, values: Array, excesses: Array) -> None:
         """Record the objectives and excesses of designs.
@@ -79,13 +79,13 @@ class Search:
             values: Objectives, to be made small, shape (population, objectives).
             excesses: Over the constraints, above zero where broken, shape (population, constraints).
         """
-        for trial, objectives, over in zip(self._asked, values, excesses, strict=True):
-            for number, excess in enumerate(over.tolist()):
+        for trial, objectives, trial_excesses in zip(self._trials, values, excesses, strict=True):
+            for number, excess in enumerate(trial_excesses.tolist()):
                 trial.set_constraint(f"{number}", excess)
             self._study.tell(trial, objectives.tolist())
 
 
 def nondominated(values: Array) -> Any:
     """Return a mask of the nondominated designs of objectives to be minimised, shape (m, k)."""
-    better = (values[:, None] <= values[None]).all(axis=2) & (values[:, None] < values[None]).any(axis=2)
-    return ~better.any(axis=0)
+    dominates = (values[:, None] <= values[None]).all(axis=2) & (values[:, None] < values[None]).any(axis=2)
+    return ~dominates.any(axis=0)

@@ -16,7 +16,7 @@ from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.studies.designs import Range
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric, resolve_metrics
-from finger_pin.studies.parsing import parse_range
+from finger_pin.studies.parsers import parse_range
 from finger_pin.typing import Array
 
 #: Least winding radius that a search of radii tries, m: a thinner pulley bends a tendon too sharply.
@@ -53,11 +53,11 @@ def parse_variable(text: str) -> Variable:
     names, interval = parse_range(text)
     keys, signs = [], []
     for name in names.split(","):
-        spelt = re.fullmatch(r"\s*(-?)\s*(\S+)\s*", name)
-        if spelt is None:
+        match = re.fullmatch(r"\s*(-?)\s*(\S+)\s*", name)
+        if match is None:
             raise InputError("over", "must be KEY=LOW:HIGH, or KEY,KEY2,-KEY3=LOW:HIGH for keys that go together", text)
-        keys.append(spelt[2])
-        signs.append(-1 if spelt[1] else 1)
+        keys.append(match[2])
+        signs.append(-1 if match[1] else 1)
     if signs[0] < 0:
         raise InputError("over", "the range is that of the first key, which has no sign", text)
     return Variable(tuple(keys), tuple(signs), interval)
@@ -79,13 +79,13 @@ def radii(finger: FingerLike) -> list[Variable]:
                 widths[joint] = 0.5 * link.width
                 key = f"finger.tendons.{name}.crossings.{joint}.radius"
                 variables.setdefault((_shape(tendon), joint), []).append((key, crossing.radius))
-    made = []
+    result = []
     for (_, joint), members in variables.items():
         first = members[0][1]
         ends = (LEAST_RADIUS, widths[joint]) if first > 0.0 else (-widths[joint], -LEAST_RADIUS)
         signs = tuple(1 if radius * first > 0.0 else -1 for _, radius in members)
-        made.append(Variable(tuple(key for key, _ in members), signs, Range(*ends)))
-    return made
+        result.append(Variable(tuple(key for key, _ in members), signs, Range(*ends)))
+    return result
 
 
 def check_variables(variables: Sequence[Variable], base: BaseScenario) -> None:
@@ -111,8 +111,8 @@ def point_at(variables: Sequence[Variable], shares: Sequence[float]) -> Point:
     return {key: value for v, share in zip(variables, shares, strict=True) for key, value in v.at(share).items()}
 
 
-def start_of(variables: Sequence[Variable], base: BaseScenario) -> Mapping[str, float]:
-    """Return the scenario's own numbers at the keys."""
+def start_values(variables: Sequence[Variable], base: BaseScenario) -> Mapping[str, float]:
+    """Return the scenario's numbers at the keys."""
     return {key: base.number(key) for variable in variables for key in variable.keys}
 
 
@@ -192,29 +192,31 @@ class Goals:
         minimise: Iterable[str | Metric],
         maximise: Iterable[str | Metric],
         constraints: Iterable[str | Constraint],
-        further: Iterable[Metric] = (),
+        custom_metrics: Iterable[Metric] = (),
     ) -> Goals:
         """Collect goals.
 
         Args:
             minimise: Metrics to be made small, by name or as such.
             maximise: Metrics to be made large.
-            constraints: As `Constraint` or spelt as `parse_constraint` reads them.
-            further: Metrics of one's own that constraints name.
+            constraints: Instances of `Constraint`, or texts for `parse_constraint`.
+            custom_metrics: Custom metrics that constraints name.
 
         Raises:
             InputError: If there is no objective, a metric is unknown or comes twice among them.
         """
-        small, large, bounds = list(minimise), list(maximise), list(constraints)
-        chosen = resolve_metrics([*small, *large])
-        objectives = tuple(Objective(m.name, 1 if i < len(small) else -1) for i, m in enumerate(chosen))
-        limits = tuple(each if isinstance(each, Constraint) else parse_constraint(each) for each in bounds)
-        known = {metric.name: metric for metric in (*chosen, *further)}
-        needed = {name: known.get(name, name) for name in (*(o.name for o in objectives), *(c.name for c in limits))}
-        return cls(objectives, limits, resolve_metrics(needed.values()))
+        minimised, maximised, texts = list(minimise), list(maximise), list(constraints)
+        chosen = resolve_metrics([*minimised, *maximised])
+        objectives = tuple(Objective(m.name, 1 if i < len(minimised) else -1) for i, m in enumerate(chosen))
+        bounds = tuple(c if isinstance(c, Constraint) else parse_constraint(c) for c in texts)
+        metrics_by_name = {m.name: m for m in (*chosen, *custom_metrics)}
+        needed = {
+            name: metrics_by_name.get(name, name) for name in (*(o.name for o in objectives), *(c.name for c in bounds))
+        }
+        return cls(objectives, bounds, resolve_metrics(needed.values()))
 
     def values(self, metrics: Mapping[str, float]) -> Array:
-        """Return the objectives of a run, each to be made small."""
+        """Return the objectives of a run, with the signs of those to be maximised reversed."""
         return np.array([each.sign * metrics[each.name] for each in self.objectives])
 
     def excesses(self, metrics: Mapping[str, float]) -> Array:

@@ -35,9 +35,9 @@ def document(title: str, body: str, style: str = "") -> str:
     )
 
 
-def image(figure: Figure, what: str) -> str:
-    """Return a figure as an element of a page, with words for those who do not see it."""
+def image(figure: Figure, text: str) -> str:
+    """Return a figure as an element of a page, with an alternative text."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", pil_kwargs={"compress_level": 2})
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
-    return f'<img alt="{escape(what)}" src="data:image/png;base64,{data}" width="{100 * figure.get_figwidth():.0f}">'
+    return f'<img alt="{escape(text)}" src="data:image/png;base64,{data}" width="{100 * figure.get_figwidth():.0f}">'

@@ -22,7 +22,7 @@ def shown_unit(unit: str) -> tuple[float, str]:
 
 def in_shown_units(result: xr.Dataset) -> xr.Dataset:
     """Return a Dataset with all variables and coordinates in the units that figures show."""
-    for name in [name for name, each in result.variables.items() if each.attrs.get("units") in _DEGREES]:
+    for name in [name for name, variable in result.variables.items() if variable.attrs.get("units") in _DEGREES]:
         factor, unit = shown_unit(result[name].attrs["units"])
         result = result.assign({name: (factor * result[name]).assign_attrs(result[name].attrs, units=unit)})
     return result
@@ -38,8 +38,8 @@ def prefixed(values: Array, unit: str) -> tuple[float, str]:
 def joints_by_unit(result: xr.Dataset) -> dict[str, list[str]]:
     """Return the names of the joints by the unit of their positions: rad of hinges, m of slides."""
     names = [str(name) for name in result["joint"].values]
-    slides = _slides(result)
-    return _grouped(("m" if name in slides else "rad", name) for name in names)
+    slides = _slide_joints(result)
+    return _group_by_key(("m" if name in slides else "rad", name) for name in names)
 
 
 def shown_joints(result: xr.Dataset) -> dict[str, tuple[float, str]]:
@@ -55,22 +55,22 @@ def actuators_by_unit(result: xr.Dataset, group: str) -> dict[str, list[str]]:
         result: Of a hand that is given as a tree.
         group: The table of the actuators, such as ``actuator``.
     """
-    tree, slides = read_scene(result.attrs).finger.tree, _slides(result)
+    tree, slides = read_scene(result.attrs).finger.tree, _slide_joints(result)
 
     def units() -> Iterator[tuple[str, str]]:
         for name in map(str, result[group].values):
             joint = tree.actuators[name].joint
             yield ("N" if joint is None or joint in slides else "N m"), name
 
-    return _grouped(units())
+    return _group_by_key(units())
 
 
-def _slides(result: xr.Dataset) -> set[str]:
+def _slide_joints(result: xr.Dataset) -> set[str]:
     joints = read_scene(result.attrs).finger.tree.joints
     return {name for name, joint in joints.items() if joint.kind == "slide"}
 
 
-def _grouped(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+def _group_by_key(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
     groups: dict[str, list[str]] = {}
     for key, value in pairs:
         groups.setdefault(key, []).append(value)

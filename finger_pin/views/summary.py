@@ -11,18 +11,18 @@ import xarray as xr
 from finger_pin.mechanism.canals import WRAPS, is_canal
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.tree_mechanism import MUSCLES, STATEFUL, STATELESS
-from finger_pin.simulation.energy import entries
+from finger_pin.simulation.energy import account_entries
 from finger_pin.simulation.frames import read_scene
 from finger_pin.simulation.netcdf import require_samples
-from finger_pin.simulation.recording import custom_of, is_tracking
+from finger_pin.simulation.recording import is_tracking, recorded_custom_parts
 from finger_pin.typing import Array
 from finger_pin.views.shown_units import actuators_by_unit, joints_by_unit
 
-_SETTLING = 1.0
-_LONG = 2.0
+_SETTLING_TIME = 1.0
+_LONG_RUN = 2.0
 _WARNINGS = ("interrupted", "self_locking", "micro_damping", "accuracy", "account", "ringing")
 # The least speed of sliding, m/s.
-_CREEP = 1e-6
+_LEAST_SLIDING_SPEED = 1e-6
 
 
 def summarize(result: xr.Dataset) -> str:
@@ -32,14 +32,14 @@ def summarize(result: xr.Dataset) -> str:
         result: Dataset of `simulate`, or the partial one that its exception carries.
     """
     require_samples(result)
-    head = [*_head(result), *_custom(result), *_warnings(result)]
-    tracks = read_scene(result.attrs).finger.links and is_tracking(result)
-    motion = [_tracking(result)] if tracks else [*_joints(result), *_actuators(result)]
-    pulled = [_tension(result)] if result.sizes["tendon"] else []
+    heading = [*_heading(result), *_custom(result), *_warnings(result)]
+    is_tracking_run = read_scene(result.attrs).finger.links and is_tracking(result)
+    motion = [_tracking(result)] if is_tracking_run else [*_joints(result), *_actuators(result)]
+    tendon_names = [_tension(result)] if result.sizes["tendon"] else []
     blocks = [
-        head,
+        heading,
         *motion,
-        *pulled,
+        *tendon_names,
         *_motors(result),
         *_contacts(result),
         _energy(result),
@@ -49,7 +49,7 @@ def summarize(result: xr.Dataset) -> str:
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
-def _head(result: xr.Dataset) -> list[str]:
+def _heading(result: xr.Dataset) -> list[str]:
     attributes = result.attrs
     title = " ".join(str(attributes["title"]).split())
     tolerances = f"rtol {attributes['rtol']:g}, atol_scale {attributes['atol_scale']:g}"
@@ -58,7 +58,7 @@ def _head(result: xr.Dataset) -> list[str]:
 
 
 def _custom(result: xr.Dataset) -> list[str]:
-    custom = custom_of(result)
+    custom = recorded_custom_parts(result)
     return [f"Not what the scenario alone gives: {custom} of one's own"] if custom else []
 
 
@@ -69,8 +69,8 @@ def _warnings(result: xr.Dataset) -> list[str]:
 
 def _tracking(result: xr.Dataset) -> list[str]:
     error, span = result["tracking_error"], "whole run"
-    if result.attrs["end_time"] > _LONG:
-        error, span = error.sel(time=slice(_SETTLING, None)), f"after the first {_SETTLING:g} s"
+    if result.attrs["end_time"] > _LONG_RUN:
+        error, span = error.sel(time=slice(_SETTLING_TIME, None)), f"after the first {_SETTLING_TIME:g} s"
     degrees = np.rad2deg(np.asarray(error.transpose("time", "joint")))
     rows = [
         (str(joint), f"{np.sqrt(np.mean(column**2)):.4f}", f"{np.max(np.abs(column)):.4f}")
@@ -82,25 +82,25 @@ def _tracking(result: xr.Dataset) -> list[str]:
 def _contacts(result: xr.Dataset) -> list[list[str]]:
     if "contact_force" not in result:
         return []
-    most = result["contact_normal_force"].max("time")
-    closed = [str(name) for name in result["contact"].values if float(most.sel(contact=name)) > 0.0]
+    largest_forces = result["contact_normal_force"].max("time")
+    closed = [str(name) for name in result["contact"].values if float(largest_forces.sel(contact=name)) > 0.0]
     if not closed:
         return [["Contacts: nothing touched"]]
     rows = []
     for name in closed:
         contact = result.sel(contact=name)
-        touching = np.asarray(contact["contact_normal_force"]) > 0.0
-        sliding = touching & (np.asarray(contact["contact_slip"]) > _CREEP)
-        shares = (f"{100.0 * np.mean(each):.1f} %" for each in (touching, sliding))
+        is_closed = np.asarray(contact["contact_normal_force"]) > 0.0
+        is_sliding = is_closed & (np.asarray(contact["contact_slip"]) > _LEAST_SLIDING_SPEED)
+        shares = (f"{100.0 * np.mean(mask):.1f} %" for mask in (is_closed, is_sliding))
         greatest = (float(contact[f"contact_{force}"].max()) for force in ("normal_force", "friction"))
-        rows.append((name, *(f"{each:.3f}" for each in greatest), *shares))
+        rows.append((name, *(f"{mask:.3f}" for mask in greatest), *shares))
     return [["Contacts, N, and parts of the time", *table(("", "normal", "friction", "touching", "sliding"), rows)]]
 
 
 def _joints(result: xr.Dataset) -> list[list[str]]:
     position = result["joint_position"]
     return [
-        _ranges(
+        _range_table(
             f"Positions of the joints, {unit}",
             {name: np.asarray(position.sel(joint=name)) for name in names},
             digits=3 if unit == "rad" else 6,
@@ -118,7 +118,7 @@ def _actuators(result: xr.Dataset) -> list[list[str]]:
                     {name: np.asarray(result[f"{group}_force"].sel({group: name})) for name in names}
                 )
     blocks = [
-        _ranges(f"{'Torques' if unit == 'N m' else 'Forces'} of the actuators, {unit}", values)
+        _range_table(f"{'Torques' if unit == 'N m' else 'Forces'} of the actuators, {unit}", values)
         for unit, values in forces.items()
     ]
     canals = [name for name in map(str, result.dims) if is_canal(name) and not name.startswith(WRAPS)]
@@ -129,13 +129,13 @@ def _actuators(result: xr.Dataset) -> list[list[str]]:
         for name in result[each].values
     }
     if frictions:
-        blocks.append(_ranges("Friction of tendons that they and springs pull, N", frictions))
+        blocks.append(_range_table("Friction of tendons that they and springs pull, N", frictions))
     return blocks
 
 
 def _tension(result: xr.Dataset) -> list[str]:
     tension = result["tendon_tension"]
-    rows = [_range(str(name), np.asarray(tension.sel(tendon=name))) for name in result["tendon"].values]
+    rows = [_range_row(str(name), np.asarray(tension.sel(tendon=name))) for name in result["tendon"].values]
     if "passive_tension_proximal" in result:
         proximal = result["passive_tension_proximal"]
         halves = np.asarray(proximal.transpose("time", ...)).reshape(proximal.sizes["time"], -1)
@@ -144,7 +144,7 @@ def _tension(result: xr.Dataset) -> list[str]:
         rows[passive:] = [
             row
             for distal, half in pairs
-            for row in (_range(f"{distal[0]}, proximal half", half), (f"{distal[0]}, distal half", *distal[1:]))
+            for row in (_range_row(f"{distal[0]}, proximal half", half), (f"{distal[0]}, distal half", *distal[1:]))
         ]
     return ["Tension, N", *table(("", "least", "greatest"), rows)]
 
@@ -158,17 +158,17 @@ def _motors(result: xr.Dataset) -> list[list[str]]:
     rows = [
         (
             str(name),
-            f"{np.max(np.abs(i)):.3f}",
-            f"{np.sqrt(np.mean(i**2)):.3f}",
-            f"{np.max(p):.3f}",
-            f"{np.mean(p):.3f}",
+            f"{np.max(np.abs(motor_current)):.3f}",
+            f"{np.sqrt(np.mean(motor_current**2)):.3f}",
+            f"{np.max(tendon_power):.3f}",
+            f"{np.mean(tendon_power):.3f}",
         )
-        for name, i, p in zip(result["motor"].values, current.T, power.T, strict=True)
+        for name, motor_current, tendon_power in zip(result["motor"].values, current.T, power.T, strict=True)
     ]
     slack = slack_time(result)
-    listed = ", ".join(f"{name} {time:.3g} s" for name, time in slack.items() if time > 0.0) or "none"
-    head = ("", "peak A", "rms A", "peak W", "mean W")
-    return [["Motors, at their terminals", *table(head, rows), f"  slack at the spools: {listed}"]]
+    slack_tendons = ", ".join(f"{name} {time:.3g} s" for name, time in slack.items() if time > 0.0) or "none"
+    heading = ("", "peak A", "rms A", "peak W", "mean W")
+    return [["Motors, at their terminals", *table(heading, rows), f"  slack at the spools: {slack_tendons}"]]
 
 
 def slack_time(result: xr.Dataset) -> dict[str, float]:
@@ -185,15 +185,15 @@ def slack_time(result: xr.Dataset) -> dict[str, float]:
 
 
 def _energy(result: xr.Dataset) -> list[str]:
-    stored = sum(_final(each) - float(each[0]) for each in entries(result, STORED).values())
-    came_in = sum(max(value, 0.0) for value in (*map(_final, entries(result, SUPPLIED).values()), -stored))
+    stored = sum(_final(each) - float(each[0]) for each in account_entries(result, STORED).values())
+    supplied = sum(max(value, 0.0) for value in (*map(_final, account_entries(result, SUPPLIED).values()), -stored))
     named = [
         (f"{kind}: {each.attrs['label']}", _final(each))
         for kind in (SUPPLIED, LOST)
-        for each in entries(result, kind).values()
+        for each in account_entries(result, kind).values()
     ]
     named += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
-    rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in named]
+    rows = [(label, f"{1e3 * value:.4g}", _share(value, supplied)) for label, value in named]
     return ["Energy, and its share of what was supplied or drawn from store", *table(("", "mJ", "share"), rows)]
 
 
@@ -225,12 +225,12 @@ def _final(values: xr.DataArray | xr.Variable) -> float:
     return float(values[-1])
 
 
-def _ranges(head: str, signals: Mapping[str, Array], digits: int = 3) -> list[str]:
+def _range_table(head: str, signals: Mapping[str, Array], digits: int = 3) -> list[str]:
     """Return a head and a table of the least and the greatest value of signals by name."""
-    return [head, *table(("", "least", "greatest"), [_range(*each, digits) for each in signals.items()])]
+    return [head, *table(("", "least", "greatest"), [_range_row(*each, digits) for each in signals.items()])]
 
 
-def _range(name: str, values: Array, digits: int = 3) -> tuple[str, str, str]:
+def _range_row(name: str, values: Array, digits: int = 3) -> tuple[str, str, str]:
     # Adding zero turns what rounds to -0.0 into 0.0.
     least, greatest = (round(float(each), digits) + 0.0 for each in (values.min(), values.max()))
     return name, f"{least:.{digits}f}", f"{greatest:.{digits}f}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from finger_pin.commands.console import count_bar, noted, print_text, talks
+from finger_pin.commands.console import count_bar, error_note, print_text, shows_progress
 from finger_pin.commands.options import Format, Output, Quiet, ScenarioName
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def conclusions(
     quiet: Quiet = False,
 ) -> None:
     """Put the paper's three conclusions to the test: figures, and a table of claims, measurements and verdicts."""
-    shown = talks(quiet)
+    shown = shows_progress(quiet)
     from finger_pin.description.loading import load_scenario
     from finger_pin.mechanism.coerce import one_finger
     from finger_pin.views.plots import save_figure
@@ -55,7 +55,10 @@ def conclusions(
     chosen = experiments(only or "abc")
     for each in chosen:
         each.check(loaded)
-    with count_bar(shown, sum(each.runs for each in chosen)) as progress, noted(f"what was complete is in {output}"):
+    with (
+        count_bar(shown, sum(each.runs for each in chosen)) as progress,
+        error_note(f"what was complete is in {output}"),
+    ):
         for each in chosen:
             found = each.measure(loaded, progress=progress)
             findings += each.judge(found)

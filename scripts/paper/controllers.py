@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from finger_pin.commands.console import count_bar, noted, print_text, talks
+from finger_pin.commands.console import count_bar, error_note, print_text, shows_progress
 from finger_pin.commands.options import Format, Output
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ DRAWN = ("paper", "all friction", "all friction, f5d 4 N, loop")
 
 def controllers(output: Output = Path("results/controllers"), format: Format = None) -> None:
     """Compare controllers on reversals: tracking, tension and losses, as a table, a CSV file and a figure."""
-    shown = talks(quiet=False)
+    shown = shows_progress(quiet=False)
     from rich.console import Console
 
     from finger_pin.description.loading import load_scenario
@@ -37,7 +37,7 @@ def controllers(output: Output = Path("results/controllers"), format: Format = N
     drawn: dict[str, xr.Dataset] = {}
     output.mkdir(parents=True, exist_ok=True)
     coupling = Routing.from_description(load_scenario("reversals").finger).coupling
-    with noted(f"the rows so far are in {output}"):
+    with error_note(f"the rows so far are in {output}"):
         for name, result in runs(shown):
             rows.append(compare(name, result, coupling))
             joints = [str(each) for each in result["joint"].values]

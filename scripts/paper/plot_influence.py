@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.typing import Array
-from finger_pin.views.plots.panels import grid, plain, title
+from finger_pin.views.plots.panels import grid, plain_ticks, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, colour, limit_line, styled
 from paper.influence import FrictionInfluence, Sweep
 from paper.runs import Measures
@@ -67,13 +67,13 @@ def _line(axes: Axes, sweep: Sweep, value: Callable[[Measures], Array], label: s
 def _logarithmic(axes: Axes, label: str) -> None:
     axes.set_yscale("log")
     axes.set_ylabel(label)
-    plain(axes.yaxis)
+    plain_ticks(axes.yaxis)
 
 
 def _tensions(axes: Axes) -> None:
     axes.set_xscale("log")
     axes.set_xlabel(r"least tension $f_0$ (N)")
-    plain(axes.xaxis)
+    plain_ticks(axes.xaxis)
 
 
 def _same_work(axes: Axes, found: FrictionInfluence) -> None:

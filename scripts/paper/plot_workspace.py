@@ -13,7 +13,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger
 from finger_pin.typing import Array
-from finger_pin.views.plots.axes_3d import AXES, space
+from finger_pin.views.plots.axes_3d import AXES, axes_around
 from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, colour, styled, thin
 from paper.workspace_surfaces import fingertip_surface, flexion_section
@@ -51,7 +51,7 @@ def plot_workspace(finger: FingerLike, *, width: Width = None, titles: bool = Tr
 def _surface(part: SubFigure, patches: Array, poses: Array) -> Axes3D:
     quads = _quads(patches)
     corners = np.concatenate([quads.reshape(-1, 3), poses[0]])
-    solid = space(part, corners, "cm")
+    solid = axes_around(part, corners, "cm")
     colours = _lit(quads)
     solid.add_collection3d(Poly3DCollection(quads, facecolors=colours, edgecolors=0.88 * colours, linewidths=0.3))
     solid.plot(*poses[0].T, color=colour(BLACK), marker="o", markersize=3.5, linewidth=thin(1.4))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from finger_pin.commands.console import count_bar, noted, print_text, talks
+from finger_pin.commands.console import count_bar, error_note, print_text, shows_progress
 from finger_pin.commands.options import Format, Output, Quiet, ScenarioName, Settings, numbers, overrides
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def reaction(
     quiet: Quiet = False,
 ) -> None:
     """Measure the error of the joint reaction (17) along a scenario: weight, inertia and tendons' real paths."""
-    changed, shown = overrides(settings), talks(quiet)
+    changed, shown = overrides(settings), shows_progress(quiet)
     sizes = numbers("--forces", forces) if forces else []
     import numpy as np
 
@@ -55,7 +55,7 @@ def reaction(
     cases = {AS_IT_IS: loaded.environment.fingertip_force} | fingertip_loads(sizes)
     studies: dict[str, JointReactions] = {}
     motions: dict[str, list[float]] = {}
-    with count_bar(shown, len(cases)) as advance, noted("nothing was written"):
+    with count_bar(shown, len(cases)) as advance, error_note("nothing was written"):
         for label, force in cases.items():
             entries = changed | {FORCE: list(force)}
             result = simulate(load_scenario(scenario, entries))

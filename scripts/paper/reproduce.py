@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger_pin.commands.console import print_text, progress_bar, talks
+from finger_pin.commands.console import print_text, progress_bar, shows_progress
 from finger_pin.commands.options import Format, Output
 
 
 def reproduce(output: Output = Path("results/paper"), format: Format = None) -> None:
     """Simulate the scenario fig6, draw the paper's Figs. 2, 3 and 6, and say how far each printed curve is met."""
-    shown = talks(quiet=False)
+    shown = shows_progress(quiet=False)
     from finger_pin.description.loading import load_scenario
     from finger_pin.simulation.simulate import simulate
     from finger_pin.views.plots import draw_all, save_figure

@@ -37,4 +37,4 @@ def quick(monkeypatch):
         Path(path).write_text("animation")
 
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", write_animation)
-    monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", quick_figures)
+    monkeypatch.setattr("finger_pin.views.plots.figure_files.draw_all", quick_figures)

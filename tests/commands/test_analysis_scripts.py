@@ -97,7 +97,7 @@ def test_one_conclusion_is_written_as_figure_and_table_and_shown(run, tmp_path):
 
 @pytest.mark.slow
 def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_figures(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("finger_pin.commands.self_locking.SHARES", (0.5,))
+    monkeypatch.setattr("finger_pin.commands.self_locking.FRICTION_FACTORS", (0.5,))
     scenario = tmp_path / "short.toml"
     scenario.write_text('extends = "reversals"\n[simulation]\nduration = 0.1\n')
     code, out, lines = run("self_locking", scenario, "--output", "out")

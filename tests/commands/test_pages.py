@@ -87,9 +87,9 @@ def shown(tmp_path_factory):
             patch.setattr(module, "resources", SimpleNamespace(files=lambda package: shipped))
         forget_what_ships()
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
-        patch.setattr("finger_pin.views.viewer.viewing.PageHandle.wait", lambda viewing: viewing.close())
-        patch.setattr("finger_pin.views.playground.playing.Playground.wait", lambda playing: playing.close())
-        patch.setattr("finger_pin.views.plots.saving.save_figure", not_painted)
+        patch.setattr("finger_pin.views.viewer.page_server.PageHandle.wait", lambda viewing: viewing.close())
+        patch.setattr("finger_pin.views.playground.player.Playground.wait", lambda playing: playing.close())
+        patch.setattr("finger_pin.views.plots.figure_files.save_figure", not_painted)
         # The comparison of controllers leaves out the start.
         patch.setattr("paper.comparison.SETTLED", 0.0)
         meshcat = importlib.import_module("meshcat")
@@ -147,7 +147,7 @@ def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, ca
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", not_moved)
     # The package keeps what it has found once: its own is put back as well.
     monkeypatch.setattr("finger_pin.views.plots.draw_all", quick_figures)
-    monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", quick_figures)
+    monkeypatch.setattr("finger_pin.views.plots.figure_files.draw_all", quick_figures)
     text, names, file = page.read_text("utf-8"), {"__name__": "__main__", "fp": fp}, ""
     for found in SHOWN.finditer(text):
         kind, block, code = found.groups(default="")

@@ -23,7 +23,7 @@ def test_of_a_failed_integration_what_was_computed_is_saved(run, here, quick, mo
     def fail(scenario, **options):
         raise IntegrationError(0.002, "the step size became too small", "a smaller simulation.rtol", partial)
 
-    monkeypatch.setattr("finger_pin.simulation.running.run", fail)
+    monkeypatch.setattr("finger_pin.simulation.run.run", fail)
     code, out, lines = run("s.toml", "--output", "out")
     assert code == 3
     assert len(lines) == 1
@@ -77,7 +77,7 @@ def test_where_nothing_was_computed_earlier_results_stay(run, here, quick, monke
     def fail(scenario, **options):
         raise IntegrationError(0.0, "not finite", "another method", None)
 
-    monkeypatch.setattr("finger_pin.simulation.running.run", fail)
+    monkeypatch.setattr("finger_pin.simulation.run.run", fail)
     code, out, lines = run("s.toml", "--output", "out")
     assert (code, out, len(lines)) == (3, "", 1)
     assert "nothing was computed" in lines[0]
@@ -90,7 +90,7 @@ def test_a_failed_run_leaves_no_figures_of_an_earlier_one(run, here, quick, monk
     def fail(*arguments, **options):
         raise ValueError("axis limits cannot be NaN")
 
-    monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", fail)
+    monkeypatch.setattr("finger_pin.views.plots.figure_files.draw_all", fail)
     code, _, lines = run("s.toml", "--output", "out", "--duration", "0.003")
     assert code == 1
     assert len(lines) == 1
@@ -115,7 +115,7 @@ def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, mon
 
         return simulate(scenario, stop=counted, **options)
 
-    monkeypatch.setattr("finger_pin.simulation.running.run", interrupted)
+    monkeypatch.setattr("finger_pin.simulation.run.run", interrupted)
     handler = signal.getsignal(number)
     code, out, lines = run("s.toml", "--output", "out", "--duration", "5")
     assert signal.getsignal(number) is handler
@@ -138,7 +138,7 @@ def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quic
         time.sleep(1.0)
         pytest.fail("went on")
 
-    monkeypatch.setattr("finger_pin.simulation.running.run", stubborn)
+    monkeypatch.setattr("finger_pin.simulation.run.run", stubborn)
     code, out, lines = run("s.toml", "--output", "out")
     assert (code, out, lines) == (130, "", ["simulate.py: interrupted"])
     assert contents(here) == before
@@ -150,7 +150,7 @@ def test_a_signal_while_drawing_keeps_the_trajectory_and_no_half_drawn_figures(r
         time.sleep(1.0)
         pytest.fail("went on")
 
-    monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", slow)
+    monkeypatch.setattr("finger_pin.views.plots.figure_files.draw_all", slow)
     code, _, lines = run("s.toml", "--output", "out")
     assert code == 130
     assert lines == ["simulate.py: interrupted; what was computed is in out"]
@@ -168,7 +168,7 @@ def test_a_full_disk_ends_with_one_line_and_earlier_results_stay(run, here, quic
     if broken == "saving":
         monkeypatch.setattr("finger_pin.simulation.result_folder.save", fail)
     else:
-        monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", fail)
+        monkeypatch.setattr("finger_pin.views.plots.figure_files.draw_all", fail)
     code, out, lines = run("s.toml", "--output", "out", "--duration", "0.003")
     assert (code, out, len(lines)) == (1, "", 1)
     assert "No space left on device; earlier results are as they were" in lines[0]

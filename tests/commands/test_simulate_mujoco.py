@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from finger_pin.commands.application import run_function
-from finger_pin.commands.simulate import simulate
+from finger_pin.commands.simulate_command import simulate
 
 HAND = """<mujoco><compiler angle="radian"/><worldbody><site name="base" pos="0 0 0.02"/>
 <body><joint name="finger:joint" axis="0 1 0" range="-0.2 1.5" damping="0.01"/>

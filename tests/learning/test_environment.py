@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.learning import Choice, Environment, LogUniform, Normal, Sensor, Uniform, VectorEnvironment, per_world
-from finger_pin.learning.snapshot import known_variables
+from finger_pin.learning.snapshot import instant_variables
 
 COARSE = {"simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
 FIG6 = fp.load_scenario("reversals", COARSE)
@@ -124,7 +124,7 @@ SERVOS = {
 )
 def test_all_that_worlds_tell_is_what_one_tells_and_its_result(name, action, drawn):
     scenario = fp.load_scenario(name if action != "tension" or drawn else "reversals", COARSE)
-    known = [each for each in known_variables(ClosedLoop.from_scenario(scenario)) if each != "contact_gap"]
+    known = [each for each in instant_variables(ClosedLoop.from_scenario(scenario)) if each != "contact_gap"]
     task = dict(reward=nothing, privileged=known, action=action, randomise=drawn)
     worlds = VectorEnvironment(3, scenario, **task)
     worlds.reset(seed=5)

@@ -95,7 +95,7 @@ def test_one_time_is_a_row_of_many():
 def test_a_later_start_shifts_the_clock():
     times = np.linspace(0.0, 2.0, 40)
     signal = Signal.from_settings(ALL)
-    np.testing.assert_allclose(signal.later(0.37).at(times)[0], signal.at(times + 0.37)[0], atol=1e-12)
+    np.testing.assert_allclose(signal.starting_at(0.37).at(times)[0], signal.at(times + 0.37)[0], atol=1e-12)
 
 
 def test_a_faster_signal_is_the_same_in_less_time():
@@ -119,14 +119,14 @@ def test_a_sinusoid_is_never_below_offset_less_amplitude():
 
 
 def test_a_step_ends_where_a_signal_jumps_or_bends_and_so_many_times_however_many_samples_it_has():
-    assert Signal.from_settings([STEP]).bends(1e-6).tolist() == [0.5]
-    assert Signal.from_settings([RAMP]).bends(1e-6).tolist() == [1.0, 1.5]
+    assert Signal.from_settings([STEP]).step_ends(1e-6).tolist() == [0.5]
+    assert Signal.from_settings([RAMP]).step_ends(1e-6).tolist() == [1.0, 1.5]
     ends = []
     for count in (11, 2_001, 200_001):
         times = np.linspace(0.0, 4.0, count)
         # Half a millisecond of pulse in four seconds of rest.
         pulse = np.exp(-(((times - 2.0) / 1e-4) ** 2))
-        ends.append(Signal.from_samples("x", (times, np.transpose([np.sin(times), 0.1 * pulse])), "ab").bends(1e-6))
+        ends.append(Signal.from_samples("x", (times, np.transpose([np.sin(times), 0.1 * pulse])), "ab").step_ends(1e-6))
     assert len(ends[0]) <= 11 < len(ends[1]) < len(ends[2]) < 500
     assert np.count_nonzero(np.abs(ends[2] - 2.0) < 3e-4) > 20
 
@@ -140,7 +140,7 @@ def test_rounding_within_the_tolerance_adds_no_ends_of_steps(count, digits):
     closed = (
         4.0 * math.sqrt(math.pi) * math.gamma(0.75) / math.gamma(1.25) / math.sqrt(2.0 * 2.0 * math.sqrt(tolerance))
     )
-    assert len(Signal.from_samples("x", samples, "a").bends(tolerance)) == pytest.approx(closed, rel=0.02)
+    assert len(Signal.from_samples("x", samples, "a").step_ends(tolerance)) == pytest.approx(closed, rel=0.02)
 
 
 def test_the_compiled_search_finds_the_piece_of_any_time_on_uneven_knots():
@@ -169,7 +169,7 @@ def test_a_delayed_signal_is_the_same_later_and_zero_before(delays):
         values, rates = (np.array([each[n][k] for k, each in enumerate(before)]) * begun for n in (0, 1))
         np.testing.assert_allclose(delayed.at(time), (values, rates), atol=1e-12)
         np.testing.assert_allclose(delayed.derivative(time, 1), rates, atol=1e-12)
-    assert set(np.array(delays)[np.array(delays) > 0.0]) <= set(delayed.bends(1e-6))
+    assert set(np.array(delays)[np.array(delays) > 0.0]) <= set(delayed.step_ends(1e-6))
     np.testing.assert_allclose(delayed.delayed(-np.array(delays)).at(1.1), signal.at(1.1), atol=1e-12)
 
 

@@ -64,7 +64,7 @@ def test_a_loop_that_diverges_is_stopped_with_the_speed_that_says_so():
 
 
 def test_what_rings_in_a_slow_run_is_named_with_its_frequency(monkeypatch):
-    monkeypatch.setattr(accuracy, "_MANY", 100)
+    monkeypatch.setattr(accuracy, "_SLOW_STEPS", 100)
     overrides = {
         "simulation.duration": 1e-3,
         "finger.passive_tendon.mass": 1e-7,

@@ -16,7 +16,7 @@ import finger_pin as fp
 from finger_pin.commands import application
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.result_folder import ResultFolder
-from finger_pin.views.plots.saving import draw_all, figures_of
+from finger_pin.views.plots.figure_files import draw_all, figures_by_name
 from finger_pin.views.summary import summarize
 from finger_pin.views.viewer import write_animation, write_video
 
@@ -160,7 +160,7 @@ def test_every_pair_of_features_runs_to_the_end_of_what_is_done_with_a_result(
     result = fp.load(folder)
     assert ("motor" in result.dims) == bool(features & {"servo", "position drive"})
     assert fp.load_scenario(folder / "scenario.toml") == scenario
-    assert {path.stem for path in (folder / "figures").iterdir()} == set(figures_of(result))
+    assert {path.stem for path in (folder / "figures").iterdir()} == set(figures_by_name(result))
     assert (folder / "animation.html").stat().st_size > 100_000
     assert write_video(result, tmp_path / "film.gif", speed=0.1).read_bytes().startswith(b"GIF8")
     assert application.run("export", [str(folder), str(tmp_path / "signals.csv")]) == 0

@@ -11,7 +11,7 @@ from wrong_inputs import PLANAR
 import finger_pin as fp
 from finger_pin.commands.application import run as run_command
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
-from finger_pin.simulation.convergence import tightened
+from finger_pin.simulation.convergence import scenario_to_repeat
 from finger_pin.views import plots
 from finger_pin.views.summary import summarize
 
@@ -95,9 +95,9 @@ def test_a_coarse_run_is_told_from_a_fine_one():
 
 def test_tolerances_are_divided_as_far_as_they_go():
     scenario = fp.load_scenario("reversals", {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-9})
-    settings = tightened(scenario).simulation
+    settings = scenario_to_repeat(scenario).simulation
     assert (settings.rtol, settings.atol_scale) == (1e-12, pytest.approx(1e-11))
-    assert tightened(scenario, 10.0).simulation.atol_scale == pytest.approx(1e-10)
+    assert scenario_to_repeat(scenario, 10.0).simulation.atol_scale == pytest.approx(1e-10)
     assert settings.duration == scenario.simulation.duration
 
 

@@ -155,7 +155,7 @@ class Acts:
         wound = spool_windings(scenario, loop.finger)
         given, supplies = (voltage_signals(scenario, loop.finger, f"{name}_voltage") for name in ("motor", "supply"))
         yield spool_goals(loop.finger, loop.controller, times, loop.reference.at(times), wound, start)
-        yield from (signal.later(start).at(times)[0] for signal in given.values())
+        yield from (signal.starting_at(start).at(times)[0] for signal in given.values())
         # The first samples alone, as the paths of a tree take long for thousands of goals.
         short = FEW * loop_period(loop.finger)
         planned = loop.finger, loop.controller, loop.reference, short, start, wound, given, supplies

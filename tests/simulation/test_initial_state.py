@@ -8,7 +8,7 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.tables import list_scenarios
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.initial_state import started
+from finger_pin.simulation.initial_state import with_initial_state
 from finger_pin.simulation.motor_variables import LOOP_VARIABLES
 from finger_pin.simulation.setup import Setup
 
@@ -94,7 +94,7 @@ def test_every_number_of_the_state_is_read_from_a_result(name, overrides, block)
     setup = Setup.from_scenario(begin)
     x = setup.integrate().interpolate(begin.sample_times()[-1:])[0]
     assert np.any(getattr(setup.loop.finger.layout.unpack(x), block))
-    found = started(ClosedLoop.from_scenario(middle), fp.simulate(begin)).initial_state()
+    found = with_initial_state(ClosedLoop.from_scenario(middle), fp.simulate(begin)).initial_state()
     np.testing.assert_allclose(found, x, rtol=1e-9, atol=1e-15)
 
 

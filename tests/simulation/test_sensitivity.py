@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.simulation.sensitivity import nearby
+from finger_pin.simulation.sensitivity import repeat_steps
 from finger_pin.simulation.setup import Setup
 
 VARIABLES = ("joint_position", "tendon_tension")
@@ -81,7 +81,7 @@ def test_differences_on_the_same_steps_and_branches_do_not_depend_on_the_change(
     changes = value * np.array([0.0, -1e-6, -1e-7, 1e-7])
     setups = [Setup.from_scenario(prepared.scenario([value + change])) for change in changes]
     times = np.linspace(0.0, 0.7, 701)
-    same, *moved = (each.interpolate(times)[:, :4] for each in nearby(trajectory, setups))
+    same, *moved = (each.interpolate(times)[:, :4] for each in repeat_steps(trajectory, setups))
     np.testing.assert_allclose(same, trajectory.interpolate(times)[:, :4], atol=1e-12)
     slopes = [(each - same) / change for each, change in zip(moved, changes[1:], strict=True)]
     for each in slopes[1:]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.parsing import parse_range, parse_values
+from finger_pin.studies.parsers import parse_range, parse_values
 
 
 def test_a_grid_is_every_combination_with_the_last_key_fastest():

@@ -16,7 +16,7 @@ import planted
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.executor import one_line, open_executor, run_tasks
+from finger_pin.studies.executor import error_line, open_executor, run_tasks
 
 
 def never():
@@ -52,7 +52,7 @@ def test_every_item_is_done_once_and_comes_with_its_index_by_any_executor(execut
 def test_what_raises_is_told_in_one_line_and_the_others_go_on():
     with open_executor(workers=2) as executor:
         (failed,) = dict(run_tasks(executor, planted.raises, [7], never)).values()
-        assert isinstance(failed, ArithmeticError) and one_line(failed) == "ArithmeticError: planted 7"
+        assert isinstance(failed, ArithmeticError) and error_line(failed) == "ArithmeticError: planted 7"
         assert dict(run_tasks(executor, planted.tripled, [7], never)) == {0: 21}
 
 

@@ -7,7 +7,7 @@ import xarray as xr
 import finger_pin as fp
 from finger_pin.analysis import largest_force
 from finger_pin.description.actuators import Winding
-from finger_pin.studies.metrics import FORCE_TENSION, METRICS, Metric, Run, metrics_of, resolve_metrics
+from finger_pin.studies.metrics import FORCE_TENSION, METRICS, Metric, Run, resolve_metrics, scenario_metrics
 
 # Uneven times: means over samples would be others.
 TIME = np.array([0.0, 1.0, 2.0, 6.0])
@@ -160,11 +160,11 @@ def test_without_a_reference_the_hysteresis_is_that_over_the_command():
 def test_what_needs_a_reference_says_so_where_there_is_none():
     """No metric of joints' errors is a number, by name or by default, of a search as of a sweep."""
     run = open_loop(lambda time: 3.0 - np.cos(np.pi * time))
-    lacking = [name for name, metric in METRICS.items() if metric.of_reference]
+    lacking = [name for name, metric in METRICS.items() if metric.needs_reference]
     assert {"tracking_rms", "tracking_peak"} <= set(lacking)
     for name in lacking:
         with pytest.raises(fp.InputError, match="needs a reference"):
-            metrics_of(run.scenario, [name])
+            scenario_metrics(run.scenario, [name])
     for name in ("tracking_rms", "tracking_peak"):
         with pytest.raises(fp.InputError, match="needs a reference"):
             METRICS[name].measure(run)

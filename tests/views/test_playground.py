@@ -9,7 +9,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.views.playground.input_sliders import JOINTS, SCENARIO, TENDONS
-from finger_pin.views.playground.pacing import Pacer
+from finger_pin.views.playground.pacer import Pacer
 from finger_pin.views.playground.session import Session, save_pieces
 
 STIFFNESS, DAMPING, RADIUS = 0.05, 2e-3, 0.008
@@ -198,14 +198,14 @@ def test_time_runs_as_fast_as_asked_or_slower_and_says_so(cost, rate):
     clock = Clock()
     pacer = Pacer(clock)
     for _ in range(300):
-        clock.now += pacer.rest()
-        due, done = pacer.due(), 0.0
-        while done + 1e-3 <= due and not pacer.late:
+        clock.now += pacer.idle_time()
+        due, done = pacer.start_frame(), 0.0
+        while done + 1e-3 <= due and not pacer.is_late:
             clock.now += cost * 1e-3
             done += 1e-3
-        pacer.stepped(done)
+        pacer.finish_frame(done)
     assert pacer.rate == pytest.approx(rate, rel=0.05)
-    assert pacer.slow == (rate < 1.0)
+    assert pacer.is_slow == (rate < 1.0)
 
 
 def test_what_cannot_be_played_is_refused_in_one_line():

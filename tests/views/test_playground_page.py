@@ -130,12 +130,12 @@ def test_a_message_with_a_wrong_value_does_not_end_the_playing(playground):
             for value in (math.nan, 1e300):
                 send("TransformControlsUpdateMessage", name=name, wxyz=[1.0, 0, 0, 0], position=[value] * 3, owner="")
         list(received(page, 1.0))
-        playground.later(lambda: playground.press("Reset"))
-        playground.later(lambda: playground.press("Play"))
+        playground.schedule(lambda: playground.press("Reset"))
+        playground.schedule(lambda: playground.press("Play"))
         list(received(page, 0.5))
         before = session.simulator.time
         until(lambda: list(received(page, 0.1)) is not None and session.simulator.time > before + 0.05)
         assert session.stiffness == 20.0 and not any(handle is not None for handle in session.handles)
         # A right value still acts, and what is wrong is told.
-        playground.later(lambda: {}["nonsense"])
+        playground.schedule(lambda: {}["nonsense"])
         until(lambda: list(received(page, 0.1)) is not None and "nonsense" in playground.message)

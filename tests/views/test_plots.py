@@ -9,10 +9,10 @@ from paper.plot_friction_law import plot_friction_law
 import finger_pin as fp
 from finger_pin.exceptions import InputError
 from finger_pin.views import plots
+from finger_pin.views.plots.figure_files import figures_by_name
 from finger_pin.views.plots.hand_motion import plot_hand_motion
 from finger_pin.views.plots.lines import BINS, extremes
 from finger_pin.views.plots.panels import labelled
-from finger_pin.views.plots.saving import figures_of
 
 A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
 UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(\N{MICRO SIGN}J)", "(J)", "(s)", "(mm)", "(mm/s)", "/ intake")
@@ -156,7 +156,7 @@ def test_the_shortest_results_can_be_drawn(samples, tmp_path):
     assert all(path.exists() for path in plots.draw_all(still, tmp_path))
 
 
-@pytest.mark.parametrize("draw", figures_of(synthetic(*SIZES["paper"])).values())
+@pytest.mark.parametrize("draw", figures_by_name(synthetic(*SIZES["paper"])).values())
 def test_a_result_without_time_is_refused_in_one_line(draw, result):
     for timeless in (result.drop_vars("time"), result.isel(time=-1)):
         with pytest.raises(InputError, match=r"^result\.time: is missing; give a result of simulate"):

@@ -66,7 +66,7 @@ def signal_values(signal: SignalTable, time: float, out: Vector) -> None:
     """Fill the values of the functions."""
     table = signal.harmonics
     for j in range(table.shape[0]):
-        begun = time >= table[j, HARMONIC.begin]
+        begun = time >= table[j, HARMONIC.start]
         out[j] = table[j, HARMONIC.offset] if begun else 0.0
         if begun and table[j, HARMONIC.amplitude] != 0.0:
             out[j] += (
@@ -92,7 +92,7 @@ def signal_derivative(signal: SignalTable, j: int, time: float, order: int) -> f
     )
     if order == 0:
         value += table[j, HARMONIC.offset]
-    if time < table[j, HARMONIC.begin]:
+    if time < table[j, HARMONIC.start]:
         value = 0.0
     if knots.size > 0 and (order == 0 or knots[0] <= time < knots[knots.size - 1]):
         piece, since = _piece(signal, time)

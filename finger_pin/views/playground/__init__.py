@@ -1,7 +1,7 @@
 """A scenario played in the browser in real time, on viser: pull tendons, drag the tip, change friction as it moves.
 
 `session.py` is all of it without a page; `stage.py` draws the viewer's scene with viser, `panel.py` and `charts.py` are
-the controls, `playing.py` is the loop.
+the controls, `player.py` is the loop.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from finger_pin.exceptions import FingerPinError
 from finger_pin.version import installing
 
 if TYPE_CHECKING:
-    from finger_pin.views.playground.playing import Playground
+    from finger_pin.views.playground.player import Playground
 
 __all__ = ["play"]
 
@@ -54,7 +54,7 @@ def play(
     """
     if find_spec("viser") is None:
         raise FingerPinError(f"the playground needs viser: {installing('play')}")
-    from finger_pin.views.playground.playing import serve
+    from finger_pin.views.playground.player import serve
     from finger_pin.views.playground.session import Session
 
     return serve(Session(scenario, keys=keys, rtol=rtol), host, port, Path(folder), open_browser, block)

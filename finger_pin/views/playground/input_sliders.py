@@ -23,7 +23,7 @@ from finger_pin.typing import Array
 #: Kinds of inputs.
 SCENARIO, JOINTS, TENDONS = "the scenario", "joint references", "tendons and servos"
 # Period of controllers, s, and the time in which a goal follows its slider, so that a click is no blow, s.
-_PERIOD, _FOLLOWING = 1e-3, 0.05
+_CONTROL_PERIOD, _FILTER_TIME = 1e-3, 0.05
 
 
 @dataclass(frozen=True)
@@ -35,21 +35,21 @@ class Slider:
         unit: SI.
         low: Least value.
         high: Largest value.
-        follows: Whether its value is a goal that is approached, not one that acts at once.
+        is_filtered: Whether its value is a goal that is approached gradually.
     """
 
     name: str
     unit: str
     low: float
     high: float
-    follows: bool = False
+    is_filtered: bool = False
 
 
 class Inputs:
     """The inputs of a scenario's finger over time.
 
     Attributes:
-        kinds: Of `SCENARIO`, `JOINTS` and `TENDONS` those that there are.
+        kinds: The available ones of `SCENARIO`, `JOINTS` and `TENDONS`.
         kind: The present one.
         sliders: By kind.
         values: Values of the sliders, by kind.
@@ -68,36 +68,36 @@ class Inputs:
             )
         if scenario.simulation.start_time:
             raise InputError("simulation.start_time", "must be 0 to be played", scenario.simulation.start_time)
-        self.adopt(scenario, loop)
+        self.set_scenario(scenario, loop)
         finger = loop.finger
         self._drives = SteppedDrives(finger) if finger.actuators.holds.any() else None
-        self.period = _PERIOD if self._drives is None else self._drives.period
-        self._pulled = np.setdiff1d(np.arange(finger.mechanism.channels), finger.actuators.voltages)
+        self.period = _CONTROL_PERIOD if self._drives is None else self._drives.period
+        self._channels = np.setdiff1d(np.arange(finger.mechanism.channels), finger.actuators.voltages)
         self.sliders = {SCENARIO: (), TENDONS: self._tendon_sliders()}
         if not isinstance(loop.controller, OpenLoopTensions):
             self.sliders[JOINTS] = self._joint_sliders()
         self.kinds = tuple(kind for kind in (SCENARIO, JOINTS, TENDONS) if kind in self.sliders)
-        self.values = {kind: np.array([max(each.low, 0.0) for each in own]) for kind, own in self.sliders.items()}
+        self.values = {kind: np.array([max(each.low, 0.0) for each in group]) for kind, group in self.sliders.items()}
         self.reset()
 
-    def adopt(self, scenario: Scenario, loop: ClosedLoop) -> None:
-        """Go on with other numbers of the same scenario."""
+    def set_scenario(self, scenario: Scenario, loop: ClosedLoop) -> None:
+        """Continue with other parameters of the same scenario."""
         if isinstance(loop.controller, OpenLoopTensions):
-            # The simulator delays what it is given.
+            # The simulator delays its inputs.
             loop = replace(loop, controller=loop.controller.without_delays(scenario.finger))
         self._scenario, self._loop = scenario, loop
         self._coupling = scenario.coupling(loop.finger.routing)
-        self._wound = spool_windings(scenario, loop.finger)
-        self._voltages = voltage_signals(scenario, loop.finger, "motor_voltage")
-        self._supplies = voltage_signals(scenario, loop.finger, "supply_voltage")
+        self._winding_signals = spool_windings(scenario, loop.finger)
+        self._voltage_signals = voltage_signals(scenario, loop.finger, "motor_voltage")
+        self._supply_signals = voltage_signals(scenario, loop.finger, "supply_voltage")
         parts = scenario.parts().values()
         self._damping = np.concatenate([expand(each.controller.damping, len(each.finger.joints)) for each in parts])
 
     def reset(self) -> None:
-        """Go back to the scenario's own motion."""
-        self.kind, self._last = SCENARIO, np.zeros(self._loop.finger.mechanism.channels)
+        """Return to the motion of the scenario."""
+        self.kind, self._command = SCENARIO, np.zeros(self._loop.finger.mechanism.channels)
         self._goals = np.zeros(int(self._loop.finger.actuators.holds.sum()))
-        self._shown = self.values[SCENARIO]
+        self._filtered = self.values[SCENARIO]
         if self._drives is not None:
             self._drives.reset()
 
@@ -105,16 +105,16 @@ class Inputs:
         finger = self._loop.finger
         low, high = input_ranges(finger)
         winched, sliders = finger.routing.winched, []
-        for channel in self._pulled.tolist():
-            tendon = channel < finger.routing.actuated
+        for channel in self._channels.tolist():
+            is_tendon = channel < finger.routing.actuated
             name = finger.input_names[channel].removeprefix("tendon_winding.")
-            unit = "" if not tendon else "m" if winched[channel] else "N"
+            unit = "" if not is_tendon else "m" if winched[channel] else "N"
             sliders.append(Slider(name, unit, float(low[channel]), float(high[channel]), unit != "N"))
         holds = finger.actuators.holds
         if holds.any():
-            names = [name for name, held in zip(finger.actuators.names, holds, strict=True) if held]
-            ends = zip(names, *(each[holds] for each in spool_ranges(finger)), strict=True)
-            sliders += [Slider(name, "rad", float(least), float(most), True) for name, least, most in ends]
+            names = [name for name, positioned in zip(finger.actuators.names, holds, strict=True) if positioned]
+            ranges = zip(names, *(bound[holds] for bound in spool_ranges(finger)), strict=True)
+            sliders += [Slider(name, "rad", float(least), float(most), True) for name, least, most in ranges]
         return tuple(sliders)
 
     def _joint_sliders(self) -> tuple[Slider, ...]:
@@ -135,16 +135,18 @@ class Inputs:
         if kind not in self.kinds:
             raise InputError("kind", f"must be one of {', '.join(self.kinds)}", kind)
         if kind != SCENARIO:
-            self.values[kind] = self.present(kind, position)
-        self.kind, self._shown = kind, self.values[kind].copy()
+            self.values[kind] = self.slider_values(kind, position)
+        self.kind, self._filtered = kind, self.values[kind].copy()
 
-    def present(self, kind: str, position: Array) -> Array:
-        """Return the values that the sliders of a kind have to have for the present posture, tensions and angles."""
-        values = position[self._free] if kind == JOINTS else np.concatenate([self._last[self._pulled], self._goals])
-        low, high = np.array([(each.low, each.high) for each in self.sliders[kind]]).T
+    def slider_values(self, kind: str, position: Array) -> Array:
+        """Return the values of the sliders of a kind at the present posture, tensions and angles."""
+        values = (
+            position[self._free] if kind == JOINTS else np.concatenate([self._command[self._channels], self._goals])
+        )
+        low, high = np.array([(slider.low, slider.high) for slider in self.sliders[kind]]).T
         return np.asarray(np.clip(values, low, high))
 
-    def set(self, kind: str, index: int, value: float, position: Array) -> None:
+    def set_value(self, kind: str, index: int, value: float, position: Array) -> None:
         """Move a slider, and let its kind move the finger."""
         if kind != self.kind:
             self.choose(kind, position)
@@ -161,33 +163,33 @@ class Inputs:
             x: The packed state, shape (size,).
         """
         loop, finger, targets = self._loop, self._loop.finger, self.values[self.kind]
-        share = 1.0 - math.exp(-self.period / _FOLLOWING)
-        at_once = np.array([not each.follows for each in self.sliders[self.kind]], dtype=bool)
-        rate = (targets - self._shown) / _FOLLOWING
-        self._shown = np.where(at_once, targets, self._shown + share * (targets - self._shown))
+        share = 1.0 - math.exp(-self.period / _FILTER_TIME)
+        is_immediate = np.array([not slider.is_filtered for slider in self.sliders[self.kind]], dtype=bool)
+        rate = (targets - self._filtered) / _FILTER_TIME
+        self._filtered = np.where(is_immediate, targets, self._filtered + share * (targets - self._filtered))
         desired = self._desired(rate) if self.kind == JOINTS else loop.reference.at(time)
         command = np.zeros(finger.mechanism.channels)
         if self.kind == TENDONS:
-            command[self._pulled], self._goals = self._shown[: len(self._pulled)], self._shown[len(self._pulled) :]
+            command[self._channels], self._goals = np.split(self._filtered, [len(self._channels)])
         else:
             command, self._goals = self._planned(time, x, desired)
         if self._drives is not None:
-            command[finger.actuators.voltages] = self._drives.voltages(time, x, self._goals, self._supplies)
-        for motor, signal in self._voltages.items() if self.kind == SCENARIO else ():
+            command[finger.actuators.voltages] = self._drives.voltages(time, x, self._goals, self._supply_signals)
+        for motor, signal in self._voltage_signals.items() if self.kind == SCENARIO else ():
             command[finger.actuators.channels[motor]] = signal.at(time)[0][0]
-        self._last = command
+        self._command = command
         return command
 
     def _desired(self, rate: Array) -> ReferenceSignals:
-        base, velocity = np.zeros((2, len(self._loop.finger.routing.joints)))
-        base[self._free], velocity[self._free] = self._shown, rate
+        position, velocity = np.zeros((2, len(self._loop.finger.routing.joints)))
+        position[self._free], velocity[self._free] = self._filtered, rate
         matrix = self._coupling.matrix
-        return ReferenceSignals(matrix @ base + self._coupling.offset, matrix @ velocity)
+        return ReferenceSignals(matrix @ position + self._coupling.offset, matrix @ velocity)
 
     def _damping_velocity(self, state: State, desired: Array) -> Array:
-        """Return the velocity that the damping of a sampled controller is given, shape (n,), rad/s.
+        """Return the velocity for the damping of a sampled controller, shape (n,), rad/s.
 
-        Held over a period h, damping D of a light link, D h > 2 J, would throw it to and fro. It acts on the velocity
+        Constant over a period h, damping D of a light link, D h > 2 J, would make it oscillate. It acts on the velocity
         at the period's end instead, (M + h D) v' = M v, as in Tan, Liu and Turk, IEEE CG&A 31(4), 2011. Rotors of
         servos are heavy enough.
         """
@@ -195,8 +197,8 @@ class Inputs:
         if finger.actuators.names or not self._damping.any():
             return state.velocity
         mass = finger.rigid_body.mass_matrix(state.position)
-        ahead = np.linalg.solve(mass + np.diag(self.period * self._damping), mass @ (state.velocity - desired))
-        return np.asarray(desired + ahead)
+        difference = np.linalg.solve(mass + np.diag(self.period * self._damping), mass @ (state.velocity - desired))
+        return np.asarray(desired + difference)
 
     def _planned(self, time: float, x: Array, desired: ReferenceSignals) -> tuple[Array, Array]:
         """Return the commands of the scenario's controller, and the goals of spools."""
@@ -204,27 +206,27 @@ class Inputs:
         velocity = self._damping_velocity(state, desired.velocity)
         plan = self._loop.controller.command(time, desired, state.position, velocity)
         command = np.array(plan.tension[: finger.routing.actuated])
-        # Rounding may take what is at zero below it.
-        pulling = ~finger.routing.winched
-        command[pulling] = np.maximum(command[pulling], 0.0)
+        # Rounding may make a zero tension negative.
+        is_tension = ~finger.routing.winched
+        command[is_tension] = np.maximum(command[is_tension], 0.0)
         if plan.inputs is not None:
             command = np.concatenate([command, plan.inputs])
         if self._drives is None:
             return command, self._goals
-        wanted = ReferenceSignals(desired.position[None], desired.velocity[None])
-        wound = self._wound if self.kind == SCENARIO else {}
-        return command, spool_goals(finger, self._loop.controller, np.array([time]), wanted, wound)[
+        reference = ReferenceSignals(desired.position[None], desired.velocity[None])
+        winding = self._winding_signals if self.kind == SCENARIO else {}
+        return command, spool_goals(finger, self._loop.controller, np.array([time]), reference, winding)[
             0, finger.actuators.holds
         ]
 
 
-def position_of(sliders: Sequence[Slider], name: str) -> int:
-    """Return the place of a slider by its name.
+def slider_index(sliders: Sequence[Slider], name: str) -> int:
+    """Return the index of a slider by its name.
 
     Raises:
         InputError: If there is none.
     """
-    names = [each.name for each in sliders]
+    names = [slider.name for slider in sliders]
     if name not in names:
         raise InputError("slider", f"must be one of {', '.join(names)}", name)
     return names.index(name)

@@ -15,7 +15,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 
 #: Rooms of keys that a finger which moves can take up, and those of its controller.
-OF_FINGER, OF_CONTROLLER = ("finger", "hand"), "controller"
+FINGER, CONTROLLER_KEY = ("finger", "hand"), "controller"
 
 
 @dataclass(frozen=True)
@@ -41,19 +41,19 @@ class Parameter:
         """Value of the slider for the scenario as it is."""
         return 1.0 if self.factor else float(self.values[0])
 
-    def at(self, chosen: float) -> dict[str, Any]:
+    def entries(self, number: float) -> dict[str, Any]:
         """Return the entries for a value of the slider.
 
         Raises:
             InputError: If it is beyond the range.
         """
-        if not 0.0 <= chosen <= self.high:
-            raise InputError(self.label, f"must be from 0 to {self.high:.6g}", chosen)
-        scaled = ((chosen * np.asarray(each, dtype=float)).tolist() if self.factor else chosen for each in self.values)
+        if not 0.0 <= number <= self.high:
+            raise InputError(self.label, f"must be from 0 to {self.high:.6g}", number)
+        scaled = ((number * np.asarray(each, dtype=float)).tolist() if self.factor else number for each in self.values)
         return dict(zip(self.keys, scaled, strict=True))
 
 
-def parameters(scenario: Scenario, controller: LoopController, further: Sequence[str] = ()) -> tuple[Parameter, ...]:
+def parameters(scenario: Scenario, controller: LoopController, extra_keys: Sequence[str] = ()) -> tuple[Parameter, ...]:
     """Return the parameters of a scenario that can be changed as it is played, and those of further keys.
 
     Raises:
@@ -64,17 +64,17 @@ def parameters(scenario: Scenario, controller: LoopController, further: Sequence
         try:
             values = ParametrisedScenario(scenario, keys).values
         except InputError:
-            # A finger whose law of friction has other numbers.
+            # The friction law of this finger has other parameters.
             continue
-        factor = factor or not all(isinstance(each, int | float) for each in values)
-        if any(each is None for each in values) or (
-            factor and not np.any(np.concatenate([np.ravel(v) for v in values]))
+        factor = factor or not all(isinstance(value, int | float) for value in values)
+        if any(value is None for value in values) or (
+            factor and not np.any(np.concatenate([np.ravel(value) for value in values]))
         ):
             continue
         high = high if not factor else 3.0 if label == "gain" else 2.0 if label == "gravity" else 10.0
         name = f"{label.partition(',')[0]} ×" if factor else label
         sliders.append(Parameter(name, keys, values, max(high, 1.0 if factor else 2.0 * float(values[0])), factor))
-    return (*sliders, *(_of_key(scenario, key) for key in further))
+    return (*sliders, *(_parameter_of(scenario, key) for key in extra_keys))
 
 
 def _candidates(scenario: Scenario, controller: LoopController) -> Iterator[tuple[str, tuple[str, ...], float, bool]]:
@@ -93,11 +93,11 @@ def _candidates(scenario: Scenario, controller: LoopController) -> Iterator[tupl
         yield "passive tension, N", ("controller.passive_tension",), 10.0, False
 
 
-def _of_key(scenario: Scenario, key: str) -> Parameter:
-    if key.partition(".")[0] not in (*OF_FINGER, OF_CONTROLLER):
+def _parameter_of(scenario: Scenario, key: str) -> Parameter:
+    if key.partition(".")[0] not in (*FINGER, CONTROLLER_KEY):
         raise InputError(key, "cannot change while it is played; finger., hand. and controller. can")
     value = ParametrisedScenario(scenario, [key]).values[0]
-    plain = isinstance(value, int | float) and not isinstance(value, bool)
-    if value is None or not (plain or np.asarray(value).dtype.kind == "f") or not np.any(value):
+    scalar = isinstance(value, int | float) and not isinstance(value, bool)
+    if value is None or not (scalar or np.asarray(value).dtype.kind == "f") or not np.any(value):
         raise InputError(key, "must have a number other than 0 in the scenario for a slider", value)
-    return Parameter(key if plain else f"{key} ×", (key,), (value,), 3.0 * (value if plain else 1.0), not plain)
+    return Parameter(key if scalar else f"{key} ×", (key,), (value,), 3.0 * (value if scalar else 1.0), not scalar)

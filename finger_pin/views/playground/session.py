@@ -1,4 +1,4 @@
-"""A scenario that is played, without a page: its simulator, what moves it, springs at the tips, the record."""
+"""A played scenario without its page: simulator, inputs, springs at the tips, record."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.typing import Array
 from finger_pin.views.playground.input_sliders import Inputs, Slider
-from finger_pin.views.playground.parameter_sliders import OF_FINGER, parameters
+from finger_pin.views.playground.parameter_sliders import FINGER, parameters
 
 # Of what is not recorded this much is kept, s.
-_KEPT = 60.0
+_LOG_DURATION = 60.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +61,12 @@ class Session:
         inputs: Inputs that move it.
         parameters: Sliders of its parameters.
         handles: Place to which the spring of every tip pulls it, shape (3,), m, base frame; None for none.
-        stiffness: Of the springs, N/m.
-        recording: Whether what is played is recorded.
+        stiffness: Stiffness of the springs, N/m.
+        recording: Whether the motion is recorded.
     """
 
     def __init__(self, scenario: ScenarioLike, *, keys: Sequence[str] = (), rtol: float = 1e-3) -> None:
-        """Begin a scenario.
+        """Start a scenario.
 
         Args:
             scenario: The scenario, its name, or the path of a file.
@@ -80,7 +80,7 @@ class Session:
         loop = ClosedLoop.from_scenario(self.scenario)
         self.inputs = Inputs(self.scenario, loop)
         self.parameters = parameters(self.scenario, loop.controller, keys)
-        self._chosen = [each.start for each in self.parameters]
+        self._slider_values = [each.start for each in self.parameters]
         self._family = ParametrisedScenario(self.scenario, [key for each in self.parameters for key in each.keys])
         start = loop.initial_state()
         posture = loop.finger.layout.unpack(start).position
@@ -99,12 +99,12 @@ class Session:
         """Go back to the start of the scenario, with the present parameters; a record goes on in a new piece."""
         self._end_piece()
         self.simulator.reset(self._loop.initial_state())
-        self._since = 0.0
+        self._log_start = 0.0
         self.inputs.reset()
         self.handles = [None] * len(self.handles)
 
     def postures(self, times: Array) -> Array:
-        """Return the postures that the scenario wants at times (m,), s, shape (m, n), rad."""
+        """Return the desired postures of the scenario at times (m,), s, shape (m, n), rad."""
         return self._loop.reference.at(times).position
 
     @property
@@ -129,8 +129,8 @@ class Session:
             IntegrationError: If the integrator cannot go on.
         """
         simulator = self.simulator
-        if not self.recording and simulator.time - self._since > _KEPT:
-            self._forget()
+        if not self.recording and simulator.time - self._log_start > _LOG_DURATION:
+            self._restart_log()
         command, force = self.inputs.command(simulator.time, simulator.x), self.force()
         simulator.step(command, self.inputs.period, force[0] if len(force) == 1 else force)
 
@@ -140,7 +140,7 @@ class Session:
         Raises:
             InputError: If there is none, or the value is beyond its range.
         """
-        self.inputs.set(kind, index, value, self.simulator.state.position)
+        self.inputs.set_value(kind, index, value, self.simulator.state.position)
 
     def choose(self, kind: str) -> tuple[Slider, ...]:
         """Let another kind of input move the finger; return its sliders."""
@@ -153,33 +153,33 @@ class Session:
         Raises:
             InputError: If the value is not allowed, or would make another structure; nothing has changed then.
         """
-        chosen = [*self._chosen[:index], value, *self._chosen[index + 1 :]]
+        values = [*self._slider_values[:index], value, *self._slider_values[index + 1 :]]
         entries: dict[str, object] = {}
-        for parameter, number in zip(self.parameters, chosen, strict=True):
-            entries |= parameter.at(number)
+        for parameter, slider_value in zip(self.parameters, values, strict=True):
+            entries |= parameter.entries(slider_value)
         scenario = self._family.with_values([*entries.values()])
         loop = ClosedLoop.from_scenario(scenario)
-        if self.parameters[index].keys[0].partition(".")[0] in OF_FINGER:
-            before = self.simulator.clone()
-            self.simulator.set_parameters({key: entries[key] for key in entries if key.partition(".")[0] in OF_FINGER})
-            self._end_piece(before)
-            self._since = self.simulator.time
-        self.inputs.adopt(scenario, loop)
-        self.scenario, self._loop, self._chosen = scenario, loop, chosen
+        if self.parameters[index].keys[0].partition(".")[0] in FINGER:
+            previous = self.simulator.clone()
+            self.simulator.set_parameters({key: entries[key] for key in entries if key.partition(".")[0] in FINGER})
+            self._end_piece(previous)
+            self._log_start = self.simulator.time
+        self.inputs.set_scenario(scenario, loop)
+        self.scenario, self._loop, self._slider_values = scenario, loop, values
 
-    def _forget(self) -> None:
-        """Begin a new record at the present state."""
+    def _restart_log(self) -> None:
+        """Start a new log at the present state."""
         self.simulator.x = self.simulator.x
-        self._since = self.simulator.time
+        self._log_start = self.simulator.time
 
     def _end_piece(self, piece: Simulator | None = None) -> None:
-        if self.recording and self.simulator.time > self._since:
+        if self.recording and self.simulator.time > self._log_start:
             self._pieces.append(piece or self.simulator.clone())
 
     def record(self) -> None:
         """Record from now on."""
         self._pieces = []
-        self._forget()
+        self._restart_log()
         self.recording = True
 
     def stop(self) -> list[Simulator]:
@@ -191,7 +191,7 @@ class Session:
         self._end_piece()
         self.recording = False
         pieces, self._pieces = self._pieces, []
-        self._forget()
+        self._restart_log()
         if not pieces:
             raise InputError("record", "is empty: play first")
         return pieces
@@ -204,7 +204,7 @@ class Session:
         """Return the signals of this instant that a page shows."""
         finger, signals = self.finger, self.signals()
         state, tendons = signals.state, signals.tendons
-        around, pins = finger.scene, signals.mechanism.rows["joint_friction"]
+        scene, joints = finger.scene, signals.mechanism.rows["joint_friction"]
         bristles = bool(finger.layout.names_of("joint_stiction"))
         return Reading(
             time=self.simulator.time,
@@ -212,21 +212,21 @@ class Session:
             strands=np.concatenate([tendons.strands, signals.cord_tension]),
             tension=finger.routing.tendon_tension(tendons.strands),
             tendon_use=_tendon_use(signals),
-            joint_use=np.abs(pins.row.state) / pins["level"] if bristles else np.zeros(0),
+            joint_use=np.abs(joints.row.state) / joints["level"] if bristles else np.zeros(0),
             force=np.reshape(signals.fingertip_force, (-1, 3)),
             objects=state.object_pose.reshape(-1, 7),
-            contacts=None if around is None else signals.mechanism.touching,
+            contacts=None if scene is None else signals.mechanism.touching,
         )
 
 
 def _tendon_use(signals: FingerSignals) -> Array:
-    """Return the bristle force of every tendon over its level; of several bends the largest."""
+    """Return the bristle force of every tendon over its friction limit; of several bends the largest."""
     tables = [signals.mechanism.rows[name] for name in ("driven_tendons", "passive_tendons")]
-    use = np.concatenate([np.abs(each.row.state) / each["level"] for each in tables])
+    use = np.concatenate([np.abs(rows.row.state) / rows["level"] for rows in tables])
     for name, weights in signals.wraps.items():
         wraps = signals.mechanism.rows[name]
-        at_bends = np.abs(wraps.row.state) / wraps["level"]
-        use = np.maximum(use, np.max((weights != 0.0) * at_bends, axis=1, initial=0.0))
+        bend_use = np.abs(wraps.row.state) / wraps["level"]
+        use = np.maximum(use, np.max((weights != 0.0) * bend_use, axis=1, initial=0.0))
     return use
 
 
@@ -236,7 +236,7 @@ def save_pieces(pieces: Sequence[Simulator], folder: Path, name: str) -> list[Pa
     Raises:
         OSError: If they cannot be written.
     """
-    results: list[xr.Dataset] = [each.result() for each in pieces]
+    results: list[xr.Dataset] = [piece.result() for piece in pieces]
     folder.mkdir(parents=True, exist_ok=True)
     number = 1
     while list(folder.glob(f"{name}-{number}*.nc")):

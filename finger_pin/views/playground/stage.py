@@ -15,23 +15,23 @@ from finger_pin.typing import Array
 from finger_pin.views.playground.session import Reading, Session
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, strand_colours
 from finger_pin.views.viewer.meshcat_solids import ROOT, Command, link_names, newton_length, solid_commands
-from finger_pin.views.viewer.scene import Scene, scale_above
+from finger_pin.views.viewer.scene import Scene, tension_scale
 from finger_pin.views.viewer.scene_objects import SceneObjects
 
 # Shares of the finger's length: the longest arrow of a force, the cross to drag the tip.
-_ARROW, _CROSS = 0.22, 0.16
+_ARROW_LENGTH, _CROSS_SIZE = 0.22, 0.16
 # Largest force that an arrow shows in full length, N; tension that the colours reach at first, N.
-_STRONG, _TENSION = 5.0, 4.0
+_LARGE_FORCE, _SCALE = 5.0, 4.0
 # The camera, from the middle of what it sees, and how far away, in parts of its extent.
-_AWAY, _DISTANCE, _ASIDE = np.array([0.42, -1.0, 0.5]), 1.5, 0.16
+_CAMERA, _CAMERA_DISTANCE, _CAMERA_SHIFT = np.array([0.42, -1.0, 0.5]), 1.5, 0.16
 # Instants of the scenario's own motion that are in view.
-_LOOKED_AT = 25
+_VIEW_SAMPLES = 25
 # Largest opacity to which links are raised from that of the viewer's page, whose ground is brighter.
-_CLEAR = 0.42
+_MAX_OPACITY = 0.42
 # Share that is left after a frame of the largest tension, to which the colours reach.
-_FADING = 0.995
+_PEAK_DECAY = 0.995
 _SPRING_COLOUR = (255, 134, 180)
-_NONE = np.zeros((0, 2, 3))
+_NO_LINES = np.zeros((0, 2, 3))
 
 
 class Stage:
@@ -45,8 +45,8 @@ class Stage:
 
     def __init__(self, server: viser.ViserServer, session: Session) -> None:
         """Draw all bodies."""
-        self.scene, self._session, self._peak = Scene(session.finger, session.finger.cord_names), session, _TENSION
-        self.scale = _TENSION
+        self.scene, self._session, self._peak = (Scene(session.finger, session.finger.cord_names), session, _SCALE)
+        self.scale = _SCALE
         self._viser, self._turn = server.scene, self.scene.view()
         self._viser.set_up_direction("+z")
         self._palm = PalmPath.from_hand(session.scenario.hand, 0.0, session.finger)
@@ -54,30 +54,32 @@ class Stage:
         self._root = self._viser.add_frame(ROOT, show_axes=False)
         self._links = [self._viser.add_frame(f"{ROOT}/{name}", show_axes=False) for name in link_names(geometry)]
         for command in solid_commands(geometry, self.scene.tube_radius):
-            self._add(command)
+            self._add_solid(command)
         tips = self.scene.tips(geometry.poses(session.simulator.state.position))
         self._objects = self._add_objects(tips.mean(axis=0))
         self._strands = [tendon["strand"] for tendon in self.scene.tendons]
-        wide = 2.0 * self.scene.tube_radius
-        self._taut, self._loose = (
-            self._viser.add_line_segments(f"{ROOT}/{name}", _NONE, (200, 200, 200), thickness=width)
-            for name, width in (("taut", wide), ("slack", 0.45 * wide))
+        width = 2.0 * self.scene.tube_radius
+        self._taut_lines, self._slack_lines = (
+            self._viser.add_line_segments(f"{ROOT}/{name}", _NO_LINES, (200, 200, 200), thickness=line_width)
+            for name, line_width in (("taut", width), ("slack", 0.45 * width))
         )
-        self._newton = newton_length(_ARROW * self.scene.size, _STRONG)
-        arrow = 0.6 * self.scene.tube_radius
+        self._force_scale = newton_length(_ARROW_LENGTH * self.scene.size, _LARGE_FORCE)
+        arrow_radius = 0.6 * self.scene.tube_radius
         self._contacts = self._viser.add_arrows(
             f"{ROOT}/contacts",
-            _NONE,
+            _NO_LINES,
             np.array(255.0 * FORCE_COLOUR[0], dtype=np.uint8),
-            shaft_radius=arrow,
-            head_radius=2.5 * arrow,
-            head_length=6.0 * arrow,
+            shaft_radius=arrow_radius,
+            head_radius=2.5 * arrow_radius,
+            head_length=6.0 * arrow_radius,
         )
-        self._springs = self._viser.add_line_segments(f"{ROOT}/springs", _NONE, _SPRING_COLOUR, thickness=0.5 * wide)
+        self._springs = self._viser.add_line_segments(
+            f"{ROOT}/springs", _NO_LINES, _SPRING_COLOUR, thickness=0.5 * width
+        )
         self.crosses = [
             self._viser.add_transform_controls(
                 f"{ROOT}/tip{index}",
-                _CROSS * self.scene.size,
+                _CROSS_SIZE * self.scene.size,
                 disable_rotations=True,
                 depth_test=False,
                 position=tip,
@@ -85,19 +87,19 @@ class Stage:
             )
             for index, tip in enumerate(tips)
         ]
-        self._look(server)
+        self._set_camera(server)
 
-    def _add(self, command: Command) -> Any:
+    def _add_solid(self, command: Command) -> Any:
         """Add a solid of the viewer's scene."""
-        whole = command["object"]
-        shape, material, matrix = whole["geometries"][0], whole["materials"][0], whole["object"]["matrix"]
-        placed = np.reshape(matrix, (4, 4)).T
-        rotation, colour = placed[:3, :3], material["color"]
-        look = {
+        solid = command["object"]
+        shape, material, matrix = (solid["geometries"][0], solid["materials"][0], solid["object"]["matrix"])
+        pose = np.reshape(matrix, (4, 4)).T
+        rotation, colour = pose[:3, :3], material["color"]
+        options = {
             "color": (colour >> 16, colour >> 8 & 255, colour & 255),
-            "opacity": max(material["opacity"], min(_CLEAR, 1.5 * material["opacity"])),
+            "opacity": max(material["opacity"], min(_MAX_OPACITY, 1.5 * material["opacity"])),
             "flat_shading": material["flatShading"],
-            "position": placed[:3, 3],
+            "position": pose[:3, 3],
             "wxyz": _wxyz(rotation),
             "cast_shadow": False,
             "receive_shadow": False,
@@ -105,66 +107,66 @@ class Stage:
         path, kind = command["path"], shape["type"]
         if kind == "BoxGeometry":
             sides = (shape["width"], shape["height"], shape["depth"])
-            return self._viser.add_box(path, dimensions=sides, **{**look, "flat_shading": True})
+            return self._viser.add_box(path, dimensions=sides, **{**options, "flat_shading": True})
         if kind == "SphereGeometry":
-            return self._viser.add_icosphere(path, shape["radius"], **look)
+            return self._viser.add_icosphere(path, shape["radius"], **options)
         if kind == "CylinderGeometry":
             # Three.js runs its cylinders along y, viser along z.
-            look["wxyz"] = _wxyz(rotation @ Rotation.from_euler("x", -90.0, degrees=True).as_matrix())
-            return self._viser.add_cylinder(path, shape["radiusTop"], shape["height"], **look)
+            options["wxyz"] = _wxyz(rotation @ Rotation.from_euler("x", -90.0, degrees=True).as_matrix())
+            return self._viser.add_cylinder(path, shape["radiusTop"], shape["height"], **options)
         data = shape["data"]
         corners = np.reshape(data["attributes"]["position"]["array"], (-1, 3))
-        return self._viser.add_mesh_simple(path, corners, np.reshape(data["index"]["array"], (-1, 3)), **look)
+        return self._viser.add_mesh_simple(path, corners, np.reshape(data["index"]["array"], (-1, 3)), **options)
 
     def _add_objects(self, middle: Array) -> list[Any]:
         """Draw the objects around the finger; return the frames of the free ones."""
-        around = self._session.finger.scene
-        if around is None:
+        scene = self._session.finger.scene
+        if scene is None:
             return []
         by_name = self._by_name
-        free, nothing = tuple(around.free), np.zeros((1, 0, 9))
-        drawn = SceneObjects(by_name, free, np.zeros((1, 0, 7)), nothing, np.zeros(0), self.scene.size, middle)
+        free, contacts = tuple(scene.free), np.zeros((1, 0, 9))
+        drawn = SceneObjects(by_name, free, np.zeros((1, 0, 7)), contacts, np.zeros(0), self.scene.size, middle)
         frames = {name: self._viser.add_frame(self._path(name), show_axes=False) for name in by_name}
         for command in drawn.commands():
             name, _, part = command["path"].removeprefix(f"{ROOT}/object_").partition("/")
             if command["type"] == "set_object":
-                self._add({**command, "path": f"{self._path(name)}/{part}"})
+                self._add_solid({**command, "path": f"{self._path(name)}/{part}"})
                 continue
-            placed = np.reshape(command["matrix"], (4, 4)).T
-            turn = self._turn if self._stands(name) else np.eye(3)
-            frames[name].position, frames[name].wxyz = turn @ placed[:3, 3], _wxyz(turn @ placed[:3, :3])
+            pose = np.reshape(command["matrix"], (4, 4)).T
+            rotation = self._turn if self._is_in_world(name) else np.eye(3)
+            frames[name].position, frames[name].wxyz = rotation @ pose[:3, 3], _wxyz(rotation @ pose[:3, :3])
         return [frames[name] for name in free]
 
-    def _stands(self, name: str) -> bool:
-        """Return whether an object stands in the world, and does not go with the palm."""
+    def _is_in_world(self, name: str) -> bool:
+        """Return whether an object is placed in the world, not on the palm."""
         return self._by_name[name].frame == "world"
 
     def _path(self, name: str) -> str:
-        return f"/world/{name}" if self._stands(name) else f"{ROOT}/object_{name}"
+        return f"/world/{name}" if self._is_in_world(name) else f"{ROOT}/object_{name}"
 
-    def _look(self, server: viser.ViserServer) -> None:
+    def _set_camera(self, server: viser.ViserServer) -> None:
         """Point the camera at the finger."""
-        times = np.linspace(0.0, self._session.scenario.simulation.duration, _LOOKED_AT)
-        header = self.scene.header("", self._session.postures(times), self.scale, palm=self._placed(times))
+        times = np.linspace(0.0, self._session.scenario.simulation.duration, _VIEW_SAMPLES)
+        header = self.scene.header("", self._session.postures(times), self.scale, palm=self._palm_poses(times))
         points = np.array(header["inView"])
         low, high = points.min(axis=0), points.max(axis=0)
         middle, extent = 0.5 * (low + high), float(np.linalg.norm(high - low))
-        away, right = _AWAY / np.linalg.norm(_AWAY), np.cross([0.0, 0.0, 1.0], _AWAY)
+        direction, right = (_CAMERA / np.linalg.norm(_CAMERA), np.cross([0.0, 0.0, 1.0], _CAMERA))
         camera = server.initial_camera
         camera.near, camera.far, camera.fov = 0.02 * extent, 50.0 * extent, 0.8
         # The controls stand at the right.
-        camera.look_at = middle + _ASIDE * extent * right
-        camera.position = camera.look_at + _DISTANCE * extent * away
+        camera.look_at = middle + _CAMERA_SHIFT * extent * right
+        camera.position = camera.look_at + _CAMERA_DISTANCE * extent * direction
 
         @server.on_client_connect
         def _(client: viser.ClientHandle) -> None:
             if client.camera.aspect < 1.0:
                 # On a phone they stand below.
-                distance = _DISTANCE * extent / client.camera.aspect**0.85
-                lower = middle - [0.0, 0.0, 0.25 * distance]
-                # Whoever moves a camera of viser takes along what it looks at.
-                client.camera.position = lower + distance * away
-                client.camera.look_at = lower
+                distance = _CAMERA_DISTANCE * extent / client.camera.aspect**0.85
+                target = middle - [0.0, 0.0, 0.25 * distance]
+                # Moving a viser camera also moves its target, which is therefore set last.
+                client.camera.position = target + distance * direction
+                client.camera.look_at = target
 
         floor = (middle[0], middle[1], low[2] - header["margin"])
         cell = float(header["grid"])
@@ -180,62 +182,62 @@ class Stage:
             section_color=(70, 78, 90),
         )
 
-    def _placed(self, times: Array) -> LinkPoses | None:
+    def _palm_poses(self, times: Array) -> LinkPoses | None:
         """Return the poses of a palm that moves at times (m,), s."""
         if self._palm is None:
             return None
         place, rotation = self._palm.place(times)
         return LinkPoses(rotation, place)
 
-    def show(self, now: Reading) -> None:
+    def show(self, reading: Reading) -> None:
         """Move all bodies and tendons to a state."""
         geometry = self.scene.geometry
-        root, palm = self._turn, self._placed(np.array([now.time]))
-        poses = geometry.poses(now.position)
+        root, palm = self._turn, self._palm_poses(np.array([reading.time]))
+        poses = geometry.poses(reading.position)
         for frame, rotation, place in zip(self._links, poses.rotation, poses.translation, strict=True):
             frame.wxyz, frame.position = _wxyz(rotation), place
         if palm is not None:
             root = root @ palm.rotation[0]
         self._root.wxyz = _wxyz(root)
         self._root.position = np.zeros(3) if palm is None else self._turn @ palm.translation[0]
-        for frame, pose in zip(self._objects, now.objects, strict=True):
+        for frame, pose in zip(self._objects, reading.objects, strict=True):
             frame.position, frame.wxyz = pose[:3], pose[[6, 3, 4, 5]]
-        self._show_tendons(now, poses)
-        self._show_forces(now, poses)
+        self._show_tendons(reading, poses)
+        self._show_forces(reading, poses)
 
-    def _show_tendons(self, now: Reading, poses: LinkPoses) -> None:
+    def _show_tendons(self, reading: Reading, poses: LinkPoses) -> None:
         scene = self.scene
-        self._peak = max(_TENSION, _FADING * self._peak, float(now.strands.max(initial=0.0)))
-        self.scale = scale_above(self._peak)
-        loose = scene.looseness(now.strands)
-        paths = scene.geometry.paths(now.position, loose, poses)
-        # Lines take the light's intensity, which a screen does not show in proportion.
-        colours = (255.0 * strand_colours(now.strands, self.scale) ** 2.2).astype(np.uint8)
+        self._peak = max(_SCALE, _PEAK_DECAY * self._peak, float(reading.strands.max(initial=0.0)))
+        self.scale = tension_scale(self._peak)
+        looseness = scene.looseness(reading.strands)
+        paths = scene.geometry.paths(reading.position, looseness, poses)
+        # Line colours are linear light intensities, screen colours are not.
+        colours = (255.0 * strand_colours(reading.strands, self.scale) ** 2.2).astype(np.uint8)
         lines: tuple[list[Array], list[Array]] = ([], [])
         shades: tuple[list[Array], list[Array]] = ([], [])
-        for path, strands, slack in zip(paths, self._strands, loose, strict=True):
-            of = int(slack > 0.5)
-            lines[of].append(np.stack([path.points[:-1], path.points[1:]], axis=1))
+        for path, strands, slack in zip(paths, self._strands, looseness, strict=True):
+            index = int(slack > 0.5)
+            lines[index].append(np.stack([path.points[:-1], path.points[1:]], axis=1))
             shade = colours[strands]
-            shades[of].append(np.stack([shade[:-1], shade[1:]], axis=1))
-        for handle, points, shade in zip((self._taut, self._loose), lines, shades, strict=True):
-            handle.points = np.concatenate([_NONE, *points]).astype(np.float32)
-            handle.colors = np.concatenate([_NONE.astype(np.uint8), *shade])
+            shades[index].append(np.stack([shade[:-1], shade[1:]], axis=1))
+        for handle, points, shade in zip((self._taut_lines, self._slack_lines), lines, shades, strict=True):
+            handle.points = np.concatenate([_NO_LINES, *points]).astype(np.float32)
+            handle.colors = np.concatenate([_NO_LINES.astype(np.uint8), *shade])
 
-    def _show_forces(self, now: Reading, poses: LinkPoses) -> None:
-        session, pulled = self._session, []
+    def _show_forces(self, reading: Reading, poses: LinkPoses) -> None:
+        session, springs = self._session, []
         tips = self.scene.tips(poses)
         for cross, handle, tip in zip(self.crosses, session.handles, tips, strict=True):
             if handle is not None:
-                pulled.append([tip, handle])
+                springs.append([tip, handle])
             elif cross.visible:
                 cross.position = tip
-        self._springs.points = np.reshape(np.array(pulled, dtype=np.float32), (-1, 2, 3))
-        self._springs.colors = np.tile(np.array(_SPRING_COLOUR, dtype=np.uint8), (len(pulled), 2, 1))
-        if now.contacts is not None:
-            acting = np.any(now.contacts.force != 0.0, axis=-1)
-            points, force = now.contacts.point[acting], now.contacts.force[acting]
-            self._contacts.points = np.stack([points, points + self._newton * force], axis=1).astype(np.float32)
+        self._springs.points = np.reshape(np.array(springs, dtype=np.float32), (-1, 2, 3))
+        self._springs.colors = np.tile(np.array(_SPRING_COLOUR, dtype=np.uint8), (len(springs), 2, 1))
+        if reading.contacts is not None:
+            closed = np.any(reading.contacts.force != 0.0, axis=-1)
+            points, force = reading.contacts.point[closed], reading.contacts.force[closed]
+            self._contacts.points = np.stack([points, points + self._force_scale * force], axis=1).astype(np.float32)
 
 
 def _wxyz(rotation: Array) -> Array:

@@ -1,5 +1,4 @@
 from .bends import plot_bends as plot_bends
-from .comparing import compare as compare
 from .contact_forces import plot_contact as plot_contact
 from .convergence_check import plot_convergence as plot_convergence
 from .critical_friction import plot_critical_friction as plot_critical_friction
@@ -7,6 +6,8 @@ from .critical_friction import plot_runaway as plot_runaway
 from .critical_friction import plot_self_locking_map as plot_self_locking_map
 from .energy_account import plot_energy as plot_energy
 from .fig6 import plot_fig6 as plot_fig6
+from .figure_files import draw_all as draw_all
+from .figure_files import save_figure as save_figure
 from .fingertip_forces import plot_force_polytope as plot_force_polytope
 from .fingertip_forces import plot_radius_sensitivity as plot_radius_sensitivity
 from .hand_motion import plot_hand_motion as plot_hand_motion
@@ -15,7 +16,6 @@ from .identification import plot_predictions as plot_predictions
 from .identification import plot_profiles as plot_profiles
 from .losses import plot_losses as plot_losses
 from .pareto import plot_pareto as plot_pareto
-from .saving import draw_all as draw_all
-from .saving import save_figure as save_figure
 from .servo import plot_servo as plot_servo
 from .sweep_metrics import plot_sweep as plot_sweep
+from .two_results import compare as compare

@@ -13,12 +13,12 @@ from finger_pin.typing import Array
 
 AXES = "xyz"
 # Least extent of a side, in parts of the largest, so that flat things have a box.
-_THINNEST = 0.2
+_LEAST_EXTENT = 0.2
 # Points that labels stand away from their axis, so that they clear the ticks'.
-_LABEL = 8.0
+_LABEL_DISTANCE = 8.0
 
 
-def space(part: SubFigure, corners: Array, unit: str) -> Axes3D:
+def axes_around(part: SubFigure, corners: Array, unit: str) -> Axes3D:
     """Return oblique axes around points.
 
     Args:
@@ -29,20 +29,20 @@ def space(part: SubFigure, corners: Array, unit: str) -> Axes3D:
     axes = part.add_subplot(projection="3d")
     assert isinstance(axes, Axes3D)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    most = float(np.max(high - low)) or 1.0
-    span = np.maximum(high - low, _THINNEST * most)
+    longest = float(np.max(high - low)) or 1.0
+    span = np.maximum(high - low, _LEAST_EXTENT * longest)
     for index, name in enumerate(AXES):
         middle = 0.5 * (low + high)[index]
         getattr(axes, f"set_{name}lim")(middle - 0.52 * span[index], middle + 0.52 * span[index])
-        getattr(axes, f"set_{name}label")(f"{name} ({unit})", labelpad=_LABEL)
+        getattr(axes, f"set_{name}label")(f"{name} ({unit})", labelpad=_LABEL_DISTANCE)
         axis = getattr(axes, f"{name}axis")
-        if high[index] - low[index] < 1e-6 * most:
+        if high[index] - low[index] < 1e-6 * longest:
             axis.set_ticks([round(middle, 9) + 0.0])
         else:
-            axis.set_major_locator(MaxNLocator(2 if span[index] < 0.5 * most else 5, steps=[1, 2, 5, 10]))
+            axis.set_major_locator(MaxNLocator(2 if span[index] < 0.5 * longest else 5, steps=[1, 2, 5, 10]))
     axes.set_box_aspect(tuple(span), zoom=0.75)
-    # Onto what lies flat one looks from higher up.
-    axes.view_init(elev=20 if span[2] > 1.01 * _THINNEST * most else 40, azim=-55)
+    # Flat bodies are seen from higher up.
+    axes.view_init(elev=20 if span[2] > 1.01 * _LEAST_EXTENT * longest else 40, azim=-55)
     return axes
 
 

@@ -32,7 +32,7 @@ def plot_bends(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     if "wrap_tension" not in result:
         raise InputError("result", 'has no tendon that rubs at several places, as with tendon_friction.place = "bends"')
     bends, time = names(result, "wrap"), times(result)
-    tendons = [name for name in names(result, "tendon") if any(each.startswith(f"{name}.") for each in bends)]
+    tendons = [name for name in names(result, "tendon") if any(bend.startswith(f"{name}.") for bend in bends)]
     height = max(4.2, 1.9 * len(tendons))
     figure, (left, right) = sheet([(6.4, height), (5.2, height)], width, titles)
     panels = stack(left, [labelled(name, "N") for name in tendons])
@@ -40,16 +40,16 @@ def plot_bends(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     loops: list[Axes] = list(right.subplots(len(tendons), 1, squeeze=False)[:, 0])
     title(loops[0], "(b) joints against the tension that enters")
     for axes, loop, name in zip(panels, loops, tendons, strict=True):
-        entering = result["spool_tension" if "spool_tension" in result else "tendon_command"].sel(tendon=name).values
-        trace(axes, time, entering, color=BLACK, label="entrance", linewidth=thin())
-        places = [each for each in bends if each.startswith(f"{name}.")]
-        for k, place in enumerate(places):
-            joint = place.removeprefix(f"{name}.")
-            behind = result["wrap_tension"].sel(wrap=place).values
-            trace(axes, time, behind, label=f"behind {joint}", linewidth=thin(), **series(k))
+        entry = result["spool_tension" if "spool_tension" in result else "tendon_command"].sel(tendon=name).values
+        trace(axes, time, entry, color=BLACK, label="entrance", linewidth=thin())
+        tendon_bends = [bend for bend in bends if bend.startswith(f"{name}.")]
+        for index, bend in enumerate(tendon_bends):
+            joint = bend.removeprefix(f"{name}.")
+            tension = result["wrap_tension"].sel(wrap=bend).values
+            trace(axes, time, tension, label=f"behind {joint}", linewidth=thin(), **series(index))
             if joint in names(result, "joint"):
                 angle = np.rad2deg(result["joint_position"].sel(joint=joint).values)
-                loop.plot(entering, angle, label=joint, linewidth=thin(), **series(k))
+                loop.plot(entry, angle, label=joint, linewidth=thin(), **series(index))
         loop.set_ylabel(f"{name}: joints (°)")
     legend(left, panels[0].get_lines())
     legend(right, loops[0].get_lines())

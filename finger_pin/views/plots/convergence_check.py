@@ -15,7 +15,7 @@ from finger_pin.views.shown_units import shown_joints
 # A difference changes sign all the time: on a logarithmic axis only its greatest values show something.
 _BINS = 400
 # Below this runs agree to rounding, deg.
-_LEAST = 1e-12
+_ROUNDING = 1e-12
 
 
 @styled
@@ -28,11 +28,11 @@ def plot_convergence(result: xr.Dataset, *, width: Width = None, titles: bool = 
         titles: Whether panels have titles.
     """
     figure, (part,) = sheet([(8.0, 4.2)], width, titles)
-    factors, shown = zip(*shown_joints(result).values(), strict=True)
-    (axes,) = stack(part, [f"greatest difference ({' or '.join(dict.fromkeys(shown))})"])
+    factors, deviation = zip(*shown_joints(result).values(), strict=True)
+    (axes,) = stack(part, [f"greatest difference ({' or '.join(dict.fromkeys(deviation))})"])
     values = np.abs(np.array(factors) * result["convergence_difference"].transpose("time", "joint").values)
     reached = np.isfinite(values).all(axis=1)
-    time, values = times(result)[reached], np.maximum(values[reached], _LEAST)
+    time, values = times(result)[reached], np.maximum(values[reached], _ROUNDING)
     for index, name in enumerate(names(result, "joint")):
         axes.plot(*_envelope(time, values[:, index]), label=name, **series(index))
     logarithmic(axes)
@@ -50,6 +50,6 @@ def plot_convergence(result: xr.Dataset, *, width: Width = None, titles: bool = 
 
 def _envelope(time: Array, values: Array) -> tuple[Array, Array]:
     """Return the greatest value of every bin, and when it is reached."""
-    parts = np.array_split(np.arange(len(time)), min(_BINS, len(time)))
-    kept = np.array([part[np.argmax(values[part])] for part in parts])
-    return time[kept], values[kept]
+    bins = np.array_split(np.arange(len(time)), min(_BINS, len(time)))
+    indices = np.array([bin_indices[np.argmax(values[bin_indices])] for bin_indices in bins])
+    return time[indices], values[indices]

@@ -12,10 +12,10 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import series, times
-from finger_pin.views.plots.panels import grid, heading, legend, plain, sheet, title
+from finger_pin.views.plots.panels import grid, heading, legend, plain_ticks, sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin
 
-_MILLI = 1e3
+_PER_MILLE = 1e3
 
 
 @styled
@@ -34,10 +34,10 @@ def plot_critical_friction(finger: FingerLike, *, width: Width = None, titles: b
     figure, (part,) = sheet([(7.5, 0.9 + 0.42 * len(entries))], width, titles)
     axes = part.subplots()
     for row, (name, critical) in enumerate(entries.items()):
-        value = _MILLI * critical.coefficient
+        value = _PER_MILLE * critical.coefficient
         axes.barh(row, value, height=0.6, color=colour(VERMILLION if name == "all joints" else BLUE))
         axes.text(value, row, f" {value:.2f}", va="center", fontsize="small")
-    actual = _MILLI * float(np.max(description.joint_friction.break_away))
+    actual = _PER_MILLE * float(np.max(description.joint_friction.break_away))
     axes.axvline(actual, color=colour(BLACK), linewidth=thin(), label=rf"$M^c$ of the finger, {actual:.2g} mm")
     axes.set_yticks(range(len(entries)), list(entries))
     axes.invert_yaxis()
@@ -59,7 +59,7 @@ def plot_self_locking_map(locking_map: SelfLockingMap, *, width: Width = None, t
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
-    coefficient = _MILLI * locking_map.coefficient
+    coefficient = _PER_MILLE * locking_map.coefficient
     panels = [(locking_map.tension, "largest tension (N)", "tension that slow motion needs")]
     note = f"critical coefficient {coefficient.flat[0]:.3g} mm at every posture"
     if not np.isfinite(coefficient).any():
@@ -68,10 +68,10 @@ def plot_self_locking_map(locking_map: SelfLockingMap, *, width: Width = None, t
         panels.append((coefficient, "critical coefficient (mm)", "joint friction at which it locks"))
         note = f"critical coefficient from {coefficient.min():.3g} to {coefficient.max():.3g} mm"
     figure, places = grid(len(panels), 2, (5.8, 4.8), width, titles)
-    heading(figure, f"{note}; the finger has {_MILLI * locking_map.actual:.3g} mm")
+    heading(figure, f"{note}; the finger has {_PER_MILLE * locking_map.actual:.3g} mm")
     for axes, (values, label, text) in zip(places, panels, strict=True):
         title(axes, text)
-        _map(figure, axes, locking_map, values, label)
+        _draw_map(figure, axes, locking_map, values, label)
     return figure
 
 
@@ -98,7 +98,7 @@ def plot_runaway(results: dict[str, xr.Dataset], *, width: Width = None, titles:
         error = np.rad2deg(np.max(np.abs(result["tracking_error"].transpose("time", "joint").values), axis=1))
         bottom.plot(time, error, label=label, **series(index))
     top.set_yscale("log")
-    plain(top.yaxis)
+    plain_ticks(top.yaxis)
     top.set_ylabel("largest command (N)")
     title(top, "tension: settles below the critical coefficient, grows above it")
     bottom.set_ylabel("largest error (°)")
@@ -108,22 +108,22 @@ def plot_runaway(results: dict[str, xr.Dataset], *, width: Width = None, titles:
     return figure
 
 
-def _map(figure: Figure, axes: Axes, locking_map: SelfLockingMap, values: Array, label: str) -> None:
-    angles = [np.rad2deg(each) for each in locking_map.angles]
-    shown = np.ma.masked_invalid(values)
+def _draw_map(figure: Figure, axes: Axes, locking_map: SelfLockingMap, values: Array, label: str) -> None:
+    angles = [np.rad2deg(axis_angles) for axis_angles in locking_map.angles]
+    limited = np.ma.masked_invalid(values)
     axes.set_xlabel(f"{locking_map.joints[0]} (°)")
-    if not shown.count():
+    if not limited.count():
         axes.set(xlim=angles[0][[0, -1]], yticks=[])
         axes.text(0.5, 0.5, "locked everywhere", transform=axes.transAxes, ha="center", color=colour(GREY))
     elif len(angles) == 1:
-        axes.plot(angles[0], shown, color=colour(BLUE))
+        axes.plot(angles[0], limited, color=colour(BLUE))
         axes.set_ylabel(label)
         axes.margins(x=0.0)
     else:
         axes.grid(visible=False)
         axes.set_ylabel(f"{locking_map.joints[1]} (°)")
-        drawn = axes.contourf(*angles, shown.T, levels=12, cmap="cividis")
-        figure.colorbar(drawn, ax=axes, label=label)
-        if shown.count() < values.size:
+        image = axes.contourf(*angles, limited.T, levels=12, cmap="cividis")
+        figure.colorbar(image, ax=axes, label=label)
+        if limited.count() < values.size:
             axes.set_facecolor("#DDDDDD")
             axes.text(0.02, 0.02, "grey: locked", transform=axes.transAxes)

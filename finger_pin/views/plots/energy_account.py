@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
-from finger_pin.simulation.energy import entries
+from finger_pin.simulation.energy import account_entries
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import shade, times, trace
 from finger_pin.views.plots.panels import labelled, legend, logarithmic, sheet, stack, title
@@ -39,7 +39,7 @@ _COLOURS = (
     *("yellowgreen", "darkolivegreen", "sienna", "mediumpurple", "rosybrown"),
 )
 # Parts of the intake: less is stored as good as never, and less of a loss is thinner than a line.
-_STORED, _LOST = 1e-9, 1e-3
+_LEAST_STORED, _LEAST_LOSS = 1e-9, 1e-3
 
 
 @styled
@@ -56,41 +56,41 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
         titles: Whether panels have titles.
     """
     time = times(result)
-    stored, coming, lost = (entries(result, kind) for kind in (STORED, SUPPLIED, LOST))
-    supplied, total = (np.sum([each.values for each in kind.values()], axis=0) for kind in (coming, stored))
-    intake = float(np.max(np.abs(supplied) + np.maximum(total[0] - total, 0.0)))
+    stored, supplies, losses = (account_entries(result, kind) for kind in (STORED, SUPPLIED, LOST))
+    supplied, total = (np.sum([energy.values for energy in kind.values()], axis=0) for kind in (supplies, stored))
+    supplied_energy = float(np.max(np.abs(supplied) + np.maximum(total[0] - total, 0.0)))
     # There is always one panel: that of the kinetic energy, which comes first.
-    traces = [np.max(np.abs(each.values)) <= _STORED * intake for each in stored.values()]
-    shown = [each for index, each in enumerate(stored.values()) if not (index and traces[index])]
-    figure, (left, right) = sheet([(5.1, max(6.6, 1.35 * len(shown))), (5.9, 6.6)], width, titles)
-    scales = [prefixed(each.values, "J") for each in shown]
-    labels = [labelled(each.attrs["label"], unit) for each, (_, unit) in zip(shown, scales, strict=True)]
+    traces = [np.max(np.abs(energy.values)) <= _LEAST_STORED * supplied_energy for energy in stored.values()]
+    stored_terms = [energy for index, energy in enumerate(stored.values()) if not (index and traces[index])]
+    figure, (left, right) = sheet([(5.1, max(6.6, 1.35 * len(stored_terms))), (5.9, 6.6)], width, titles)
+    scales = [prefixed(energy.values, "J") for energy in stored_terms]
+    labels = [labelled(energy.attrs["label"], unit) for energy, (_, unit) in zip(stored_terms, scales, strict=True)]
     strips = stack(left, labels)
     title(strips[0], "(a) stored energy")
-    for axes, energy, (factor, _) in zip(strips, shown, scales, strict=True):
+    for axes, energy, (factor, _) in zip(strips, stored_terms, scales, strict=True):
         trace(axes, time, factor * energy.values, color=BLUE, linewidth=thin())
-    factor, unit = prefixed(np.array([intake]), "J")
+    factor, unit = prefixed(np.array([supplied_energy]), "J")
     above, below = stack(right, [f"energy ({unit})", "|residual| / intake"], heights=[2.2, 1.0])
-    _balance(above, time, supplied, lost, total, _LOST * intake, factor)
+    _draw_balance(above, time, supplied, losses, total, _LEAST_LOSS * supplied_energy, factor)
     handles = above.get_legend_handles_labels()[0]
     legend(right, [handles[-1], *handles[-2::-1]])
-    _residual(below, result, intake)
+    _draw_residual(below, result, supplied_energy)
     return figure
 
 
-def _balance(
-    axes: Axes, time: Array, supplied: Array, lost: dict[str, xr.Variable], stored: Array, least: float, factor: float
+def _draw_balance(
+    axes: Axes, time: Array, supplied: Array, losses: dict[str, xr.Variable], stored: Array, limit: float, factor: float
 ) -> None:
     level = np.zeros(len(time))
-    for loss, look in zip(lost.values(), cycle(_COLOURS), strict=False):
+    for loss, options in zip(losses.values(), cycle(_COLOURS), strict=False):
         if np.any(loss.values):
-            above = level + factor * loss.values
-            named = {"label": loss.attrs["label"]} if np.max(np.abs(loss.values)) > least else {}
-            shade(axes, time, level, above, color=look, alpha=0.8, **named)
-            level = above
+            upper = level + factor * loss.values
+            label = {"label": loss.attrs["label"]} if np.max(np.abs(loss.values)) > limit else {}
+            shade(axes, time, level, upper, color=options, alpha=0.8, **label)
+            level = upper
     change = factor * (stored - stored[0])
     shade(axes, time, level, level + np.maximum(change, 0.0), color=GREY, alpha=0.35, label="put into store")
-    if np.min(change) < -factor * least:
+    if np.min(change) < -factor * limit:
         hatching = {"facecolor": "none", "edgecolor": colour(BLACK), "hatch": "////", "alpha": 0.5}
         shade(axes, time, level + np.minimum(change, 0.0), level, label="taken from store", **hatching)
     trace(axes, time, factor * supplied, label="supplied", color=BLACK, linewidth=thin(1.15))
@@ -99,12 +99,12 @@ def _balance(
     title(axes, "(b) supplied energy and its uses")
 
 
-def _residual(axes: Axes, result: xr.Dataset, scale: float) -> None:
+def _draw_residual(axes: Axes, result: xr.Dataset, scale: float) -> None:
     time, residual = times(result), result["energy_residual"].values
     share = np.abs(residual) / (scale or 1.0)
     worst = float(np.max(share))
     if worst > 0.0:
-        # Zeros have no place on a logarithmic axis: they go below its end.
+        # Zeros are moved below the end of the logarithmic axis.
         logarithmic(axes)
         axes.set_ylim(1e-4 * worst, 10.0 * worst)
         share = np.maximum(share, 1e-6 * worst)

@@ -13,7 +13,7 @@ from finger_pin.analysis import Friction, force_polytope, largest_force, tension
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
-from finger_pin.views.plots.axes_3d import AXES, flexion_plane, space
+from finger_pin.views.plots.axes_3d import AXES, axes_around, flexion_plane
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, Width, colour, styled, thin
@@ -25,7 +25,7 @@ _LABELS = {
 }
 _DIRECTIONS = 120
 # Angle beside a direction at which a joint's torque changes its sign, rad.
-_BESIDE = 0.02
+_SIDE = 0.02
 
 
 @styled
@@ -51,7 +51,7 @@ def plot_force_polytope(
     finger = as_finger(finger)
     figure, (left, right) = sheet([(5.5, 5.2), (5.5, 5.2)], width, titles)
     polytope = force_polytope(finger, position, limit)
-    axes = space(left, np.vstack([polytope.vertices, np.zeros(3)]), "N")
+    axes = axes_around(left, np.vstack([polytope.vertices, np.zeros(3)]), "N")
     triangles = polytope.vertices[polytope.triangles()]
     axes.add_collection3d(Poly3DCollection(triangles, facecolors=colour(BLUE), alpha=0.18, edgecolors="none"))
     for first, second in polytope.ridges():
@@ -61,7 +61,7 @@ def plot_force_polytope(
     axes.scatter(0.0, 0.0, 0.0, color=colour(BLACK), s=14)
     title(axes, "(a) forces within the tension limits, without friction")
     plane = right.subplots()
-    _section(plane, finger, position, limit)
+    _draw_slice(plane, finger, position, limit)
     title(plane, "(b) section in the flexion plane")
     return figure
 
@@ -85,9 +85,9 @@ def plot_radius_sensitivity(
         titles: Whether panels have titles.
     """
     finger = as_finger(finger)
-    needed = tension_for_force(finger, position, force)
+    tension = tension_for_force(finger, position, force)
     names = [
-        (f"{name}, {joint}", 1e-3 * needed.by_radius[row, finger.routing.joints.index(joint)])
+        (f"{name}, {joint}", 1e-3 * tension.by_radius[row, finger.routing.joints.index(joint)])
         for row, (name, tendon) in enumerate(finger.description.tendons.items())
         for joint in tendon.crossings
     ]
@@ -99,19 +99,21 @@ def plot_radius_sensitivity(
     axes.axvline(0.0, color=colour(GREY), linewidth=thin(0.6))
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("change of the largest tension with the signed radius (N/mm)", wrap=True)
-    along = ", ".join(f"{each:.3g}" for each in force)
-    title(axes, f"largest tension {needed.largest:.3g} N for the force ({along}) N")
+    components = ", ".join(f"{value:.3g}" for value in force)
+    title(axes, f"largest tension {tension.largest:.3g} N for the force ({components}) N")
     return figure
 
 
-def _section(axes: Axes, finger: Finger, position: Sequence[float] | Array, limit: float | tuple[float, ...]) -> None:
+def _draw_slice(
+    axes: Axes, finger: Finger, position: Sequence[float] | Array, limit: float | tuple[float, ...]
+) -> None:
     plane = flexion_plane(finger)
-    across = finger.rigid_body.jacobian(np.asarray(position, dtype=float))[plane, :]
+    normal = finger.rigid_body.jacobian(np.asarray(position, dtype=float))[plane, :]
     # The joint's torque changes its sign where the force points at its axis: on either side of it, within its friction
     # circle, lies a step of what the finger can push.
-    towards = np.arctan2(-across[0], across[1])
-    beside = towards[:, None] + np.array([-_BESIDE, _BESIDE, np.pi - _BESIDE, np.pi + _BESIDE])
-    angles = np.unique(np.concatenate([np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1), beside.ravel() % (2.0 * np.pi)]))
+    axis = np.arctan2(-normal[0], normal[1])
+    sides = axis[:, None] + np.array([-_SIDE, _SIDE, np.pi - _SIDE, np.pi + _SIDE])
+    angles = np.unique(np.concatenate([np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1), sides.ravel() % (2.0 * np.pi)]))
     directions = np.zeros((len(angles), 3))
     directions[:, plane] = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     for index, (friction, label) in enumerate(_LABELS.items()):

@@ -18,7 +18,7 @@ from finger_pin.views.shown_units import actuators_by_unit, joints_by_unit, show
 Panel: TypeAlias = tuple[str, dict[str, Array]]
 
 # Lines in a panel that can still be told apart.
-_MOST = 5
+_MAX_LINES = 5
 
 
 @styled
@@ -30,8 +30,8 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
-    moved, driven = _moved(result), _driven(result)
-    columns = ((moved, "(a) joints"), (driven, "(b) tendons and actuators"))
+    motion_panels, force_panels = _motion_panels(result), _force_panels(result)
+    columns = ((motion_panels, "(a) joints"), (force_panels, "(b) tendons and actuators"))
     sizes = [(5.5, 1.0 + 1.5 * max(len(panels), 1)) for panels, _ in columns]
     figure, parts = sheet(sizes, width, titles)
     for part, (panels, text) in zip(parts, columns, strict=True):
@@ -45,28 +45,28 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
     return figure
 
 
-def _moved(result: xr.Dataset) -> list[Panel]:
+def _motion_panels(result: xr.Dataset) -> list[Panel]:
     panels = []
     for unit, joints in joints_by_unit(result).items():
-        factor, shown = shown_unit(unit)
-        label = f"{'angle' if unit == 'rad' else 'position'} ({shown})"
-        panels += _panels(factor * result["joint_position"], "joint", joints, label)
+        factor, unit_text = shown_unit(unit)
+        label = f"{'angle' if unit == 'rad' else 'position'} ({unit_text})"
+        panels += _split_panels(factor * result["joint_position"], "joint", joints, label)
     return panels
 
 
-def _driven(result: xr.Dataset) -> list[Panel]:
-    panels = _panels(result["tendon_tension"], "tendon", names(result, "tendon"), "tension (N)")
+def _force_panels(result: xr.Dataset) -> list[Panel]:
+    panels = _split_panels(result["tendon_tension"], "tendon", names(result, "tendon"), "tension (N)")
     if "cord_tension" in result:
-        panels += _panels(result["cord_tension"], "cord", names(result, "cord"), "cord tension (N)")
+        panels += _split_panels(result["cord_tension"], "cord", names(result, "cord"), "cord tension (N)")
     for group in (STATELESS, STATEFUL, MUSCLES):
         if f"{group}_force" in result:
             for unit, actuators in actuators_by_unit(result, group).items():
                 label = f"{'torque' if unit == 'N m' else 'force'} ({unit})"
-                panels += _panels(result[f"{group}_force"], group, actuators, label)
+                panels += _split_panels(result[f"{group}_force"], group, actuators, label)
     return panels
 
 
-def _panels(signals: xr.DataArray, along: str, wanted: list[str], label: str) -> list[Panel]:
+def _split_panels(signals: xr.DataArray, dimension: str, line_names: list[str], label: str) -> list[Panel]:
     """Return lines by their names, a few for each panel, each with the label of its axis."""
-    lines = [(name, signals.sel({along: name}).values) for name in wanted]
-    return [(label, dict(lines[first : first + _MOST])) for first in range(0, len(lines), _MOST)]
+    lines = [(name, signals.sel({dimension: name}).values) for name in line_names]
+    return [(label, dict(lines[first : first + _MAX_LINES])) for first in range(0, len(lines), _MAX_LINES)]

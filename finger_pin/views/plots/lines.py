@@ -18,7 +18,7 @@ from finger_pin.views.plots.style import DASHES, colour, cycle_colours
 #: Bins of a decimated line, two points each: more than a panel has columns of pixels.
 BINS = 640
 # Width of a line, as a share of a panel's height.
-_LINE = 0.005
+_LINE_SHARE = 0.005
 
 
 def names(result: xr.Dataset, coordinate: str) -> list[str]:
@@ -64,23 +64,23 @@ def extremes(values: Array, bins: int = BINS) -> NDArray[np.intp]:
     if size <= 2 * bins:
         return np.arange(size)
     width = -(-size // bins)
-    filled = np.append(values, np.full(-size % width, values[-1])).reshape(-1, width)
-    start = np.arange(len(filled)) * width
-    chosen = np.concatenate([[0, size - 1], start + filled.argmin(axis=1), start + filled.argmax(axis=1)])
-    return np.unique(np.minimum(chosen, size - 1))
+    padded = np.append(values, np.full(-size % width, values[-1])).reshape(-1, width)
+    start = np.arange(len(padded)) * width
+    indices = np.concatenate([[0, size - 1], start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
+    return np.unique(np.minimum(indices, size - 1))
 
 
 def trace(axes: Axes, time: Array, values: Array, **options: Any) -> Line2D:
     """Draw a signal, shape (m,), against time, shape (m,), thinned by `extremes`; return the line."""
-    kept = extremes(values)
+    indices = extremes(values)
     if "color" in options:
         options["color"] = colour(options["color"])
     if len(values) == 1:
         options["marker"] = "."
-    return axes.plot(time[kept], values[kept], **options)[0]
+    return axes.plot(time[indices], values[indices], **options)[0]
 
 
-def bundle(axes: Axes, time: Array, values: Array, labels: Sequence[str], looks: Sequence[int]) -> list[Line2D]:
+def bundle(axes: Axes, time: Array, values: Array, labels: Sequence[str], style_indices: Sequence[int]) -> list[Line2D]:
     """Draw signals, shape (m, n), against time; return the lines, dashed if one lies on another.
 
     Args:
@@ -88,23 +88,23 @@ def bundle(axes: Axes, time: Array, values: Array, labels: Sequence[str], looks:
         time: Shape (m,).
         values: Shape (m, n).
         labels: Of the signals.
-        looks: Of every signal, the index of its `series`.
+        style_indices: Of every signal, the index of its `series`.
     """
-    near = _LINE * np.ptp(values)
+    tolerance = _LINE_SHARE * np.ptp(values)
     lines: list[Line2D] = []
-    for index, (column, label, look) in enumerate(zip(values.T, labels, looks, strict=True)):
-        hiding = sum(bool(np.abs(column - other).max() <= near) for other in values.T[:index])
-        dashes = {"dashes": (4, 4 * hiding)} if hiding else {}
-        lines.append(trace(axes, time, column, label=label, **series(look) | dashes))
+    for index, (column, label, style_index) in enumerate(zip(values.T, labels, style_indices, strict=True)):
+        hidden_count = sum(bool(np.abs(column - other).max() <= tolerance) for other in values.T[:index])
+        dashes = {"dashes": (4, 4 * hidden_count)} if hidden_count else {}
+        lines.append(trace(axes, time, column, label=label, **series(style_index) | dashes))
     return lines
 
 
 def shade(axes: Axes, time: Array, first: Array, second: Array, **options: Any) -> None:
     """Fill between two signals, thinned so that no extreme of either is lost."""
-    kept = np.union1d(extremes(first), extremes(second))
+    indices = np.union1d(extremes(first), extremes(second))
     if "color" in options:
         options["color"] = colour(options["color"])
-    axes.fill_between(time[kept], first[kept], second[kept], linewidth=0.0, **options)
+    axes.fill_between(time[indices], first[indices], second[indices], linewidth=0.0, **options)
 
 
 def series(index: int) -> dict[str, Any]:

@@ -12,10 +12,10 @@ from finger_pin.views.plots.lines import names, passive_proximal, shade, times, 
 from finger_pin.views.plots.panels import (
     NO_TENDONS,
     cut_spikes,
+    empty_panel,
     flatten_rounding,
     labelled,
     legend,
-    remark,
     sheet,
     stack,
     title,
@@ -52,29 +52,29 @@ def plot_losses(result: xr.Dataset, finger: str | None = None, *, width: Width =
         return plot_by_finger(result, _COLUMNS, width, titles)
     height = max(6.6, 1.3 * max(result.sizes["tendon"], result.sizes["joint"]))
     figure, (left, right) = sheet([(5.5, height), (5.5, height)], width, titles)
-    _tendons(left, result)
-    _joints(right, result)
+    _draw_tendons(left, result)
+    _draw_joints(right, result)
     return figure
 
 
-def _tendons(part: SubFigure, result: xr.Dataset) -> None:
+def _draw_tendons(part: SubFigure, result: xr.Dataset) -> None:
     time, tendons = times(result), names(result, "tendon")
     if not tendons:
-        return remark(part, NO_TENDONS)
-    entering = "spool_tension" if "spool_tension" in result else "tendon_command"
-    before = result[entering].transpose("time", "tendon").values
+        return empty_panel(part, NO_TENDONS)
+    entry_tension = "spool_tension" if "spool_tension" in result else "tendon_command"
+    before = result[entry_tension].transpose("time", "tendon").values
     after = result["tendon_tension"].transpose("time", "tendon").values
     proximal = passive_proximal(result)
     titles = [f"{name}, passive" if name in proximal else name for name in tendons]
     panels = stack(part, [labelled(each, "N") for each in titles])
     for index, (axes, name) in enumerate(zip(panels, tendons, strict=True)):
-        _gap(axes, time, proximal.get(name, before[:, index]), after[:, index], "before", "after tendon friction")
+        _draw_gap(axes, time, proximal.get(name, before[:, index]), after[:, index], "before", "after tendon friction")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     title(panels[0], "(a) tendon tension before and after tendon friction")
     legend(part, panels[0].get_legend_handles_labels()[0])
 
 
-def _joints(part: SubFigure, result: xr.Dataset) -> None:
+def _draw_joints(part: SubFigure, result: xr.Dataset) -> None:
     time, joints = times(result), names(result, "joint")
     command, torque, friction = (
         1e3 * result[name].transpose("time", "joint").values
@@ -85,14 +85,14 @@ def _joints(part: SubFigure, result: xr.Dataset) -> None:
     for index, axes in enumerate(panels):
         trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=thin())
         net = torque[:, index] - friction[:, index]
-        _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
+        _draw_gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
         cut_spikes(axes, command[:, index], torque[:, index], net)
         flatten_rounding(axes)
     title(panels[0], "(b) joint torque before and after joint friction")
     legend(part, panels[0].get_legend_handles_labels()[0])
 
 
-def _gap(axes: Axes, time: Array, before: Array, after: Array, first: str, second: str) -> None:
+def _draw_gap(axes: Axes, time: Array, before: Array, after: Array, first: str, second: str) -> None:
     shade(axes, time, before, after, color=ORANGE, alpha=0.35, label="friction")
     trace(axes, time, before, label=first, color=BLUE, linewidth=thin())
     trace(axes, time, after, label=second, color=VERMILLION, linewidth=thin())

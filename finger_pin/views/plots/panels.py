@@ -17,12 +17,12 @@ from finger_pin.typing import Array
 from finger_pin.views.plots.style import GREY, Width, colour, inches, new_figure, power_of_ten, settings
 
 # Panels are drawn at this share of their width before they go below each other.
-_NARROWEST = 0.62
+_LEAST_WIDTH = 0.62
 # Of the heights of panels, where a figure is for a journal.
-_LOWER = 0.82
+_JOURNAL_HEIGHT = 0.82
 
 # Most letters in a line of a strip's label.
-_LINE = 13
+_LETTERS = 13
 
 #: Said where tensions of tendons would be drawn.
 NO_TENDONS = "no tensions: no tendon is passive, or pulled by an ideal source or a motor"
@@ -31,10 +31,10 @@ NO_TENDONS = "no tensions: no tendon is passive, or pulled by an ideal source or
 _ROUNDING = 1e-9
 
 # Share of samples, at either end, that may leave a panel.
-_SPIKE = 0.001
+_SPIKE_SHARE = 0.001
 
 # Steps between ticks, times powers of ten.
-_FEW, _MANY = [1, 2, 5, 10], [1, 2, 2.5, 5, 10]
+_COARSE, _FINE = [1, 2, 5, 10], [1, 2, 2.5, 5, 10]
 
 
 def sheet(
@@ -48,11 +48,11 @@ def sheet(
         titles: Whether panels have titles.
     """
     chosen = inches(width)
-    whole = chosen or sum(w for w, _ in parts)
-    across = _across(chosen, len(parts), sum(w for w, _ in parts) / len(parts))
-    rows = [parts[k : k + across] for k in range(0, len(parts), across)]
-    heights = [(1.0 if chosen is None else _LOWER) * max(height for _, height in row) for row in rows]
-    figure = new_figure(whole, sum(heights), titles=titles)
+    figure_width = chosen or sum(w for w, _ in parts)
+    columns_per_row = _column_count(chosen, len(parts), sum(w for w, _ in parts) / len(parts))
+    rows = [parts[index : index + columns_per_row] for index in range(0, len(parts), columns_per_row)]
+    heights = [(1.0 if chosen is None else _JOURNAL_HEIGHT) * max(height for _, height in row) for row in rows]
+    figure = new_figure(figure_width, sum(heights), titles=titles)
     bands = figure.subfigures(len(rows), 1, squeeze=False, height_ratios=heights)[:, 0]
     pairs = zip(bands, rows, strict=True)
     columns = [band.subfigures(1, len(row), squeeze=False, width_ratios=[w for w, _ in row])[0] for band, row in pairs]
@@ -72,20 +72,20 @@ def grid(
         titles: Whether panels have titles.
         sharex: Whether the panels share their horizontal axis.
     """
-    chosen = inches(width)
-    across = _across(chosen, min(columns, count), cell[0])
+    whole = inches(width)
+    across = _column_count(whole, min(columns, count), cell[0])
     down = -(-count // across)
-    height = cell[1] * (1.0 if chosen is None else min(1.0, max(_NARROWEST, chosen / across / cell[0])))
-    figure = new_figure(chosen or cell[0] * across, height * down, titles=titles)
+    height = cell[1] * (1.0 if whole is None else min(1.0, max(_LEAST_WIDTH, whole / across / cell[0])))
+    figure = new_figure(whole or cell[0] * across, height * down, titles=titles)
     panels = list(figure.subplots(down, across, squeeze=False, sharex=sharex).ravel())
-    for spare in panels[count:]:
-        spare.remove()
+    for unused in panels[count:]:
+        unused.remove()
     return figure, panels[:count]
 
 
-def _across(whole: float | None, count: int, panel_width: float) -> int:
+def _column_count(figure_width: float | None, count: int, panel_width: float) -> int:
     """Return how many panels of a width fit side by side into a figure, in; at least one."""
-    return count if whole is None else max(1, min(count, int(whole / (_NARROWEST * panel_width))))
+    return count if figure_width is None else max(1, min(count, int(figure_width / (_LEAST_WIDTH * panel_width))))
 
 
 def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[float] | None = None) -> list[Axes]:
@@ -99,19 +99,19 @@ def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[flo
     panels: list[Axes] = list(part.subplots(len(labels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
     for axes, label in zip(panels, labels, strict=True):
         axes.set_ylabel(label)
-        axes.yaxis.set_major_locator(MaxNLocator(4, steps=_FEW) if len(labels) > 2 else MaxNLocator(7, steps=_MANY))
-        axes.xaxis.set_major_locator(MaxNLocator(6, steps=_FEW))
+        axes.yaxis.set_major_locator(MaxNLocator(4, steps=_COARSE) if len(labels) > 2 else MaxNLocator(7, steps=_FINE))
+        axes.xaxis.set_major_locator(MaxNLocator(6, steps=_COARSE))
         axes.margins(x=0.0)
     panels[-1].set_xlabel("time (s)")
     part.align_ylabels(panels)
     return panels
 
 
-def remark(part: Figure | SubFigure, text: str) -> None:
+def empty_panel(part: Figure | SubFigure, text: str) -> None:
     """Write in the middle of a part why nothing is drawn there."""
     axes = part.subplots()
     axes.set_axis_off()
-    axes.text(0.5, 0.5, textwrap.fill(text, 3 * _LINE), transform=axes.transAxes, ha="center", color=colour(GREY))
+    axes.text(0.5, 0.5, textwrap.fill(text, 3 * _LETTERS), transform=axes.transAxes, ha="center", color=colour(GREY))
 
 
 def title(axes: Axes, text: str) -> None:
@@ -136,7 +136,7 @@ def flatten_rounding(axes: Axes) -> None:
 def cut_spikes(axes: Axes, *signals: Array) -> None:
     """Let a spike leave a panel that would be twice as high for a thousandth of the samples."""
     values = np.concatenate(signals)
-    low, high = np.quantile(values, [_SPIKE, 1.0 - _SPIKE])
+    low, high = np.quantile(values, [_SPIKE_SHARE, 1.0 - _SPIKE_SHARE])
     if np.ptp(values) > 2.0 * (high - low) > _ROUNDING:
         axes.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
 
@@ -145,10 +145,10 @@ def legend(part: Figure | SubFigure, handles: Sequence[Artist]) -> None:
     """Write a legend below a part, in as many columns as its width holds, if there is anything to name."""
     if handles:
         # With the paddings of the style sheet, n columns are at most n times as wide as one.
-        single = part.legend(handles=handles)
-        rows = -(-len(handles) // max(1, int(part.bbox.width / single.get_window_extent().width)))
-        single.remove()
-        # As many columns as the rows need: the last one is no stump.
+        one_column = part.legend(handles=handles)
+        rows = -(-len(handles) // max(1, int(part.bbox.width / one_column.get_window_extent().width)))
+        one_column.remove()
+        # No more columns than the rows need, so that the last one is filled.
         part.legend(handles=handles, ncols=-(-len(handles) // rows), loc="outside lower center")
 
 
@@ -159,7 +159,7 @@ def logarithmic(axes: Axes) -> None:
     axes.yaxis.set_minor_locator(NullLocator())
 
 
-def plain(axis: Axis) -> None:
+def plain_ticks(axis: Axis) -> None:
     """Write 1, 2 and 5 times powers of ten as they are along a logarithmic axis."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter("{x:g}")
@@ -168,6 +168,6 @@ def plain(axis: Axis) -> None:
 
 def labelled(name: str, unit: str | None) -> str:
     """Return the label of a strip: its name and unit if any, on several lines if long."""
-    whole = name if unit is None else " ".join([name, f"({unit})".replace(" ", "\N{NO-BREAK SPACE}")])
-    lines = textwrap.wrap(whole.replace(".", ". "), _LINE, break_long_words=False)
+    label = name if unit is None else " ".join([name, f"({unit})".replace(" ", "\N{NO-BREAK SPACE}")])
+    lines = textwrap.wrap(label.replace(".", ". "), _LETTERS, break_long_words=False)
     return "\n".join(lines).replace(". ", ".")

@@ -17,7 +17,7 @@ from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, Width, colour, styled, thin
 
 # Signed: what micro-damping or a slack tendon gives back is no more than rounding here.
-_LOST = {
+_LOSSES = {
     "windings": (("motor_heat",), VERMILLION),
     "gears": (("gearbox_coulomb", "gearbox_viscous"), ORANGE),
     "tendons": (("elastic_damping", "tendon_coulomb", "tendon_viscous"), SKY),
@@ -52,14 +52,14 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     loops: list[Axes] = list(left.subplots(len(actuators), 1, squeeze=False)[:, 0])
     title(loops[0], "(a) joints against spools")
     for axes, (name, actuator) in zip(loops, actuators.items(), strict=True):
-        _loop(axes, result, name, finger, _turned(finger, actuator.tendons))
+        _draw_loop(axes, result, name, finger, _driven_joints(finger, actuator.tendons))
     loops[-1].set_xlabel("angle of the spool (°)")
-    shown = {line.get_label(): line for axes in loops for line in axes.get_lines()}
-    legend(left, list(shown.values()))
+    joints = {line.get_label(): line for axes in loops for line in axes.get_lines()}
+    legend(left, list(joints.values()))
     panels = stack(middle, [labelled(name, "N") for name in tendons])
     title(panels[0], "(b) tension at the spool and at the finger")
     for axes, name in zip(panels, tendons, strict=True):
-        _tension(axes, result, name)
+        _draw_tension(axes, result, name)
     legend(middle, panels[0].get_lines())
     current, power = stack(right, ["current (A)", "power (W)"])
     title(current, "(c) current")
@@ -67,46 +67,46 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
         values = result["motor_current"].sel(motor=name).values
         trace(current, times(result), values, label=name, linewidth=thin(), **series(index))
     current.legend(loc="upper right", ncols=4)
-    _power(power, result)
+    _draw_power(power, result)
     legend(right, power.get_legend_handles_labels()[0])
     return figure
 
 
-def _turned(finger: FingerDescription, tendons: Iterable[str]) -> set[str]:
+def _driven_joints(finger: FingerDescription, tendons: Iterable[str]) -> set[str]:
     """Return the joints that tendons turn."""
-    parts = [part for name in tendons for part in finger.cord(name).parts]
-    return {joint for part in parts for element in part.elements if element.moves for joint in element.crossed}
+    elements = [part for name in tendons for part in finger.cord(name).parts]
+    return {joint for part in elements for element in part.elements if element.moves for joint in element.crossed}
 
 
-def _loop(axes: Axes, result: xr.Dataset, motor: str, finger: FingerDescription, turned: set[str]) -> None:
+def _draw_loop(axes: Axes, result: xr.Dataset, motor: str, finger: FingerDescription, driven: set[str]) -> None:
     spool = np.rad2deg(result["motor_position"].sel(motor=motor).values)
     for index, joint in enumerate(names(result, "joint")):
-        if joint in turned:
-            of_tree = finger.tree.joints.get(joint)
-            slides = of_tree is not None and of_tree.kind == "slide"
+        if joint in driven:
+            tree_joint = finger.tree.joints.get(joint)
+            is_slide = tree_joint is not None and tree_joint.kind == "slide"
             position = result["joint_position"].sel(joint=joint).values
-            shown = 1e3 * position if slides else np.rad2deg(position)
-            label = f"{joint} (mm)" if slides else joint
-            axes.plot(spool, shown, label=label, linewidth=thin(), **series(index))
+            values = 1e3 * position if is_slide else np.rad2deg(position)
+            label = f"{joint} (mm)" if is_slide else joint
+            axes.plot(spool, values, label=label, linewidth=thin(), **series(index))
     axes.set_ylabel(f"{motor}: joints (°)")
 
 
-def _tension(axes: Axes, result: xr.Dataset, tendon: str) -> None:
+def _draw_tension(axes: Axes, result: xr.Dataset, tendon: str) -> None:
     time = times(result)
-    pulled = result["spool_tension"].sel(tendon=tendon).values
-    trace(axes, time, pulled, label="at the spool", color=BLUE, linewidth=thin())
+    spool_tension = result["spool_tension"].sel(tendon=tendon).values
+    trace(axes, time, spool_tension, label="at the spool", color=BLUE, linewidth=thin())
     delivered = result["tendon_tension"].sel(tendon=tendon).values
     trace(axes, time, delivered, label="at the finger", color=VERMILLION, linewidth=thin())
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
-def _power(axes: Axes, result: xr.Dataset) -> None:
+def _draw_power(axes: Axes, result: xr.Dataset) -> None:
     time = times(result)
     level = np.zeros(len(time))
-    for label, (lost, look) in _LOST.items():
-        above = level + sum(result[f"power_{name}"].values for name in lost)
-        shade(axes, time, level, above, color=look, alpha=0.8, label=label)
-        level = above
+    for label, (losses, options) in _LOSSES.items():
+        upper = level + sum(result[f"power_{name}"].values for name in losses)
+        shade(axes, time, level, upper, color=options, alpha=0.8, label=label)
+        level = upper
     trace(axes, time, result["power_electrical"].values, label="electrical", color=BLACK, linewidth=thin())
     axes.axhline(0.0, color=colour(GREY), linewidth=thin(0.5))
     title(axes, "(d) electrical power and its uses")

@@ -31,7 +31,7 @@ Width = float | Literal["column", "page"] | None
 #: One and two columns, in: IEEE Author Center, "Resolution and Size" (3.5 and 7.16 in).
 WIDTHS = {"column": 3.5, "page": 7.16}
 # Points: of a figure of its own size, and of one for a journal.
-_TEXT, _SMALL_TEXT = 10.5, 8.5
+_TEXT_SIZE, _JOURNAL_TEXT_SIZE = 10.5, 8.5
 
 #: The settings in force, and those of matplotlib itself.
 settings: Any = matplotlib.rcParams
@@ -39,31 +39,31 @@ _DEFAULTS: Any = matplotlib.rcParamsDefault
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 
-P = ParamSpec("P")
-R = TypeVar("R")
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
 
 
-def styled(draw: Callable[P, R]) -> Callable[P, R]:
+def styled(draw: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """Return a function that draws in this style, beneath the user's own settings of matplotlib.
 
     It refuses a Dataset that lacks a variable, as one of another kind or with some variables only does.
     """
 
     @wraps(draw)
-    def drawn(*arguments: P.args, **options: P.kwargs) -> R:
-        style = {**STYLE, "font.size": _TEXT if options.get("width") is None else _SMALL_TEXT}
-        with matplotlib.rc_context({key: each for key, each in style.items() if settings[key] == _DEFAULTS[key]}):
+    def draw_with_style(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
+        style = {**STYLE, "font.size": _TEXT_SIZE if options.get("width") is None else _JOURNAL_TEXT_SIZE}
+        with matplotlib.rc_context({key: value for key, value in style.items() if settings[key] == _DEFAULTS[key]}):
             try:
                 return draw(*arguments, **options)
             except KeyError as error:
-                # xarray's; what is missing may be in `error` under no other name than in its sentence.
-                _, found, after = str(error.args[0]).partition("No variable named '")
-                if not found:
+                # xarray names the missing variable only in its message.
+                _, match, suffix = str(error.args[0]).partition("No variable named '")
+                if not match:
                     raise
-                name = after.partition("'")[0]
+                name = suffix.partition("'")[0]
                 raise InputError(f"result.{name}", f"is missing, and {draw.__name__} draws it") from None
 
-    return drawn
+    return draw_with_style
 
 
 class Figure(matplotlib.figure.Figure):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from finger_pin.views.viewer.animation import write_animation
 from finger_pin.views.viewer.drawing import draw
-from finger_pin.views.viewer.viewing import PageHandle, view, view_forces
+from finger_pin.views.viewer.page_server import PageHandle, view, view_forces
 
 if TYPE_CHECKING:
     from finger_pin.views.viewer.video import write_video

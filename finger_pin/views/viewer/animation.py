@@ -27,9 +27,9 @@ from finger_pin.views.viewer.scene_objects import SceneObjects
 Indices = NDArray[np.intp]
 
 #: Frames per second of motion, and most frames of one page: a longer motion gets fewer per second.
-FRAME_RATE, MOST_FRAMES = 60.0, 3000
+FRAME_RATE, MAX_FRAMES = 60.0, 3000
 #: Positions out of which the camera's view is found.
-_POSITIONS_IN_VIEW = 40
+_VIEW_POSTURES = 40
 
 
 def write_animation(
@@ -69,15 +69,15 @@ def animation_page(
 ) -> str:
     """Return the page that plays a result, with fingertip forces and a second result if given."""
     motion = Playback.from_result(result, finger=finger)
-    every = slice(None, None, max(1, len(motion.time) // _POSITIONS_IN_VIEW))
-    palm = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
-    beside = Playback.from_result(ghost).ghost(motion.time) if ghost is not None else None
+    stride = slice(None, None, max(1, len(motion.time) // _VIEW_POSTURES))
+    palm = motion.palm and LinkPoses(motion.palm.rotation[stride], motion.palm.translation[stride])
+    ghost_motion = Playback.from_result(ghost).ghost(motion.time) if ghost is not None else None
     header = motion.scene.header(
-        motion.title, motion.position[every], motion.largest, forces=forces, ghost=beside, palm=palm
+        motion.title, motion.position[stride], motion.largest, forces=forces, ghost=ghost_motion, palm=palm
     )
     chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
-    if beside is not None:
-        chunk["ghost"] = beside.chunk()
+    if ghost_motion is not None:
+        chunk["ghost"] = ghost_motion.chunk()
     if motion.objects is not None:
         header |= motion.objects.header(motion.scene.view())
         chunk |= motion.objects.chunk()
@@ -131,7 +131,7 @@ class Playback:
     def ghost(self, time: Array) -> Ghost:
         """Return this animation resampled at the frames of another, shape (m,), s, up to its own end."""
         position = np.stack([np.interp(time, self.time, column) for column in self.position.T], axis=-1)
-        # A palm is shown at rest beside another one.
+        # The palm of a ghost is shown at rest.
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
 
     @classmethod
@@ -149,16 +149,16 @@ class Playback:
         cords = [str(name) for name in result["cord"].values] if "cord_tension" in result else []
         scene = Scene(finger or read_scene(result.attrs).finger, cords)
         require_samples(result)
-        time = _variable(result, "time")
+        time = _read_variable(result, "time")
         frames = _frame_indices(time, rate)
-        position = _variable(result, "joint_position")[frames]
+        position = _read_variable(result, "joint_position")[frames]
         tension = _strand_tensions(scene, result, frames)
         for name, values in (("joint_position", position), ("tendon_tension", tension)):
             if not np.isfinite(values).all():
                 raise InputError(f"result.{name}", "must be finite")
         title = result.attrs.get("title") or scene.geometry.description.title or scene.geometry.description.name
-        palm, few = _palm(result, frames), slice(None, None, max(1, len(frames) // _POSITIONS_IN_VIEW))
-        tips = scene.tips(scene.geometry.poses(position[few])).reshape(-1, 3)
+        palm, stride = _palm(result, frames), slice(None, None, max(1, len(frames) // _VIEW_POSTURES))
+        tips = scene.tips(scene.geometry.poses(position[stride])).reshape(-1, 3)
         objects = SceneObjects.from_result(result, time[frames], scene.size, tips.mean(axis=0), palm)
         return cls(scene, title, time[frames], position, tension, palm, objects)
 
@@ -166,32 +166,32 @@ class Playback:
 def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
     # The proximal half of a passive tendon has the result's `passive_tension_proximal`.
     description = scene.geometry.description
-    tension = _variable(result, "tendon_tension")[frames]
+    tension = _read_variable(result, "tendon_tension")[frames]
     actuated, passive = len(description.actuated_names), len(description.passive_names)
     if passive:
-        proximal = _variable(result, "passive_tension_proximal")[frames].reshape(len(frames), passive)
+        proximal = _read_variable(result, "passive_tension_proximal")[frames].reshape(len(frames), passive)
         halves = np.stack([proximal, tension[:, actuated:]], axis=-1).reshape(len(frames), 2 * passive)
         tension = np.concatenate([tension[:, :actuated], halves], axis=1)
     if "cord_tension" in result:
-        tension = np.concatenate([tension, _variable(result, "cord_tension")[frames]], axis=1)
+        tension = np.concatenate([tension, _read_variable(result, "cord_tension")[frames]], axis=1)
     return tension
 
 
 def _palm(result: xr.Dataset, frames: Indices) -> LinkPoses | None:
     if "palm_position" not in result:
         return None
-    quaternions = _variable(result, "palm_orientation")[frames]
-    rotations = np.array([pin.Quaternion(each).toRotationMatrix() for each in quaternions])
-    return LinkPoses(rotations, _variable(result, "palm_position")[frames])
+    quaternions = _read_variable(result, "palm_orientation")[frames]
+    rotations = np.array([pin.Quaternion(quaternion).toRotationMatrix() for quaternion in quaternions])
+    return LinkPoses(rotations, _read_variable(result, "palm_position")[frames])
 
 
 def _frame_indices(time: Array, rate: float) -> Indices:
-    # Samples as they are, none between them: a frame shows what was computed.
-    wanted = int(np.clip(round((time[-1] - time[0]) * rate) + 1, 2, MOST_FRAMES))
-    return np.unique(np.searchsorted((time[1:] + time[:-1]) / 2.0, np.linspace(time[0], time[-1], wanted)))
+    # Frames are samples, without interpolation.
+    count = int(np.clip(round((time[-1] - time[0]) * rate) + 1, 2, MAX_FRAMES))
+    return np.unique(np.searchsorted((time[1:] + time[:-1]) / 2.0, np.linspace(time[0], time[-1], count)))
 
 
-def _variable(result: xr.Dataset, name: str) -> Array:
+def _read_variable(result: xr.Dataset, name: str) -> Array:
     if name not in result:
         raise InputError(f"result.{name}", "is missing; give a result of simulate")
     return np.asarray(result[name], dtype=float)

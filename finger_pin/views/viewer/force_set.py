@@ -12,9 +12,9 @@ from finger_pin.typing import Array
 from finger_pin.views.viewer.meshcat_solids import ROOT, Command, newton_length, set_object
 
 _PATH = f"{ROOT}/forces"
-_COLOUR, _RIM, _OPACITY = 0xFFB347, 0xFFD9A0, 0.22
+_COLOUR, _RIM_COLOUR, _OPACITY = 0xFFB347, 0xFFD9A0, 0.22
 #: Largest extent of the drawn set, in parts of the finger's length.
-_SHARE = 0.5
+_SIZE_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class ForceSet:
     def from_polytope(cls, polytope: ForcePolytope, length: float) -> ForceSet:
         """Choose a scale at which the set is at most half as large as a finger of some length, m."""
         extent = float(np.max(np.linalg.norm(polytope.vertices, axis=1)))
-        return cls(polytope, newton_length(_SHARE * length, extent) if extent > 0.0 else 1.0)
+        return cls(polytope, newton_length(_SIZE_SHARE * length, extent) if extent > 0.0 else 1.0)
 
     @property
     def corners(self) -> Array:
@@ -52,23 +52,23 @@ class ForceSet:
             normals = np.repeat(_normals(self.polytope.vertices[triangles]), 3, axis=0)
             body = {"position": self.corners[triangles].reshape(-1, 3), "normal": normals}
             # Both sides, without hiding what is inside.
-            look = {"type": "MeshPhongMaterial", "color": _COLOUR, "opacity": _OPACITY, "side": 2, "shininess": 20}
-            yield _object(f"{_PATH}/body", "Mesh", body, look)
+            material = {"type": "MeshPhongMaterial", "color": _COLOUR, "opacity": _OPACITY, "side": 2, "shininess": 20}
+            yield _object(f"{_PATH}/body", "Mesh", body, material)
         edges = self.corners[np.array(self.polytope.ridges(), dtype=int).reshape(-1, 2)]
-        rim = {"type": "LineBasicMaterial", "color": _RIM, "opacity": 0.9}
+        rim = {"type": "LineBasicMaterial", "color": _RIM_COLOUR, "opacity": 0.9}
         yield _object(f"{_PATH}/edges", "LineSegments", {"position": edges.reshape(-1, 3)}, rim)
 
 
 def _normals(triangles: Array) -> Array:
-    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300))
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
 
 
 def _object(path: str, kind: str, attributes: dict[str, Array], material: Command) -> Command:
     buffers = {
-        name: {"itemSize": 3, "type": "Float32Array", "array": [float(each) for each in values.ravel()]}
-        for name, values in attributes.items()
+        name: {"itemSize": 3, "type": "Float32Array", "array": [float(value) for value in array.ravel()]}
+        for name, array in attributes.items()
     }
     shape = {"type": "BufferGeometry", "data": {"attributes": buffers}}
-    look = {"transparent": True, "depthWrite": False, **material}
-    return set_object(path, kind, shape, look)
+    material = {"transparent": True, "depthWrite": False, **material}
+    return set_object(path, kind, shape, material)

@@ -48,21 +48,21 @@ def solid_commands(
     links = link_names(geometry)
     for visual in geometry.visuals:
         placement = visual.placement
-        shape, turn = primitive(visual.name, visual.shape)
+        shape, rotation = primitive(visual.name, visual.shape)
         visual_colour, opacity = visual.colour[:3], visual.colour[3] * SOLID_OPACITY
         path = f"{root}/{links[visual.link]}/{visual.name}"
-        yield mesh(path, shape, placement.rotation @ turn, placement.translation, colour or visual_colour, opacity)
+        yield mesh(path, shape, placement.rotation @ rotation, placement.translation, colour or visual_colour, opacity)
     thickness = 0.8 * geometry.lanes.spacing
     for pulley in geometry.pulleys:
         path = f"{root}/{links[pulley.joint]}/groove_{pulley.tendon}"
         shape = cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
-        turn, place = pulley.frame @ Y_TO_Z, pulley.offset * pulley.frame[:, 2]
-        yield mesh(path, shape, turn, place, colour or GROOVE_COLOUR, SOLID_OPACITY)
+        rotation, position = pulley.frame @ Y_TO_Z, pulley.offset * pulley.frame[:, 2]
+        yield mesh(path, shape, rotation, position, colour or GROOVE_COLOUR, SOLID_OPACITY)
 
 
 def root_command(rotation: Array) -> Command:
     """Return meshcat's ``set_transform`` command that turns the base frame into the frame of the scene."""
-    return {"type": "set_transform", "path": ROOT, "matrix": placed(rotation, np.zeros(3))}
+    return {"type": "set_transform", "path": ROOT, "matrix": pose_matrix(rotation, np.zeros(3))}
 
 
 def primitive(name: str, shape: Any) -> tuple[Command, Array]:
@@ -116,7 +116,7 @@ def mesh(
     path: str, shape: Command, rotation: Array, translation: Array, colour: tuple[float, ...], opacity: float
 ) -> Command:
     """Return meshcat's ``set_object`` command for a translucent solid."""
-    red, green, blue = (round(255 * float(part)) for part in colour)
+    red, green, blue = (round(255 * float(component)) for component in colour)
     material = {
         "type": "MeshPhongMaterial",
         "color": (red << 16) + (green << 8) + blue,
@@ -124,18 +124,18 @@ def mesh(
         "transparent": True,
         "opacity": float(opacity),
         "depthWrite": False,
-        # A face is lit as a whole, so that edges show where corners have no normals.
+        # Flat shading shows edges where corners have no normals.
         "flatShading": shape["type"] == "BufferGeometry",
     }
-    return set_object(path, "Mesh", shape, material, placed(rotation, translation))
+    return set_object(path, "Mesh", shape, material, pose_matrix(rotation, translation))
 
 
 def set_object(path: str, kind: str, shape: Command, material: Command, matrix: list[float] | None = None) -> Command:
     """Return meshcat's ``set_object`` command for a geometry with a material; without a matrix it is not moved."""
     shape, material = {"uuid": f"{path}:geometry", **shape}, {"uuid": f"{path}:material", **material}
-    of = {"geometry": shape["uuid"], "material": material["uuid"], "matrix": matrix or np.eye(4).ravel().tolist()}
-    whole = {"metadata": {"version": 4.5, "type": "Object"}, "geometries": [shape], "materials": [material]}
-    return {"type": "set_object", "path": path, "object": {**whole, "object": {"uuid": path, "type": kind, **of}}}
+    ids = {"geometry": shape["uuid"], "material": material["uuid"], "matrix": matrix or np.eye(4).ravel().tolist()}
+    scene = {"metadata": {"version": 4.5, "type": "Object"}, "geometries": [shape], "materials": [material]}
+    return {"type": "set_object", "path": path, "object": {**scene, "object": {"uuid": path, "type": kind, **ids}}}
 
 
 def box(x: float, y: float, z: float) -> Command:
@@ -148,7 +148,7 @@ def ball(radius: float) -> Command:
     return {"type": "SphereGeometry", "radius": radius, "widthSegments": 40, "heightSegments": 28}
 
 
-def placed(rotation: Array, translation: Array) -> list[float]:
+def pose_matrix(rotation: Array, translation: Array) -> list[float]:
     """Return a pose as meshcat has it: 16 numbers, column by column."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, translation
@@ -160,9 +160,9 @@ def newton_length(longest: float, strongest: float) -> float:
     """Return the length that stands for a newton, m: 1, 2 or 5 times a power of ten, so that no force is too long."""
     if strongest <= 0.0:
         return longest
-    wanted = longest / strongest
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= wanted * (1.0 + 1e-9))
+    limit = longest / strongest
+    decade = 10.0 ** math.floor(math.log10(limit))
+    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= limit * (1.0 + 1e-9))
 
 
 def encode(values: ArrayLike, kind: str) -> str:

@@ -26,11 +26,11 @@ SLACK_TENSION = 0.05
 #: the width of the narrowest link.
 _TUBE_IN_LANE, _TUBE_IN_LINK = 0.34, 0.032
 #: Points per span and per radian of the tendons drawn, so that sags and arcs look smooth.
-_RESOLUTION = 11
+_PATH_RESOLUTION = 11
 # Beyond so many times the hand's own extent, the camera does not follow.
-_LOST = 3.0
-_LARGEST = 32767
-_GHOST, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
+_MAX_REACH = 3.0
+_MAX_INTEGER = 32767
+_GHOST_PATH, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +50,9 @@ class Ghost:
     def header(self) -> dict[str, Any]:
         """Return its part of the page's header."""
         scene = self.scene
-        solids = solid_commands(scene.geometry, scene.tube_radius, _GHOST, _GHOST_COLOUR)
-        moving = [each for each in solids if not each["path"].startswith(f"{_GHOST}/base/")]
-        return {"title": self.title, "links": link_names(scene.geometry)[1:], "commands": moving}
+        solids = solid_commands(scene.geometry, scene.tube_radius, _GHOST_PATH, _GHOST_COLOUR)
+        commands = [command for command in solids if not command["path"].startswith(f"{_GHOST_PATH}/base/")]
+        return {"title": self.title, "links": link_names(scene.geometry)[1:], "commands": commands}
 
     def chunk(self) -> str:
         """Return the frames for the page."""
@@ -63,17 +63,17 @@ class Ghost:
         return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
 
 
-def shown(finger: FingerLike) -> TendonGeometry:
-    """Return the geometry of a finger or hand that is given in any way.
+def finger_geometry(finger: FingerLike) -> TendonGeometry:
+    """Return the geometry of a finger or hand, or of its description, name or file.
 
     Raises:
         InputError: If a joint of a description carries no link.
     """
-    built = finger if isinstance(finger, Finger) else None
+    model = finger if isinstance(finger, Finger) else None
     description = description_of(finger)
-    visuals = None if built is None else built.visuals
-    body = None if built is None or visuals is None else built.rigid_body
-    return TendonGeometry(description, resolution=_RESOLUTION, body=body, solids=visuals)
+    visuals = None if model is None else model.visuals
+    body = None if model is None or visuals is None else model.rigid_body
+    return TendonGeometry(description, resolution=_PATH_RESOLUTION, body=body, solids=visuals)
 
 
 class Scene:
@@ -94,14 +94,14 @@ class Scene:
         Raises:
             InputError: If a joint of a description carries no link.
         """
-        self.geometry = shown(finger)
+        self.geometry = finger_geometry(finger)
         description = self.geometry.description
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
         self._slides = [name for name, joint in description.tree.joints.items() if joint.kind == "slide"]
         self.strands = (*description.actuated_names, *halves, *cords)
         self._widths, self.size = self.geometry.widths, self.geometry.size
-        # Points travel as 16-bit integers; this is their unit, a few micrometres.
-        self._quantum = 1.5 * self.size / _LARGEST
+        # Points are sent as 16-bit integers; this is their unit, a few micrometres.
+        self._point_unit = 1.5 * self.size / _MAX_INTEGER
         self.tube_radius = min(_TUBE_IN_LANE * self.geometry.lanes.spacing, _TUBE_IN_LINK * min(self._widths))
         self.tendons = [
             self._tendon(path.name, path.distal.tolist())
@@ -112,10 +112,10 @@ class Scene:
     def _note_on_cords(self) -> str:
         """Return a note on what pulls the cords whose tension is not shown; empty if there are none."""
         tree = self.geometry.description.tree
-        drawn = {each["name"] for each in self.tendons if len(self.strands) in each["strand"]}
-        names = {name if name in tree.tendons else name.rpartition(".")[0] for name in drawn}
-        drives = {each.tendon: each for each in tree.actuators.values() if each.tendon in names}
-        kinds = {"muscles" if each.muscle else "actuators" for each in drives.values()}
+        path_names = {tendon["name"] for tendon in self.tendons if len(self.strands) in tendon["strand"]}
+        names = {name if name in tree.tendons else name.rpartition(".")[0] for name in path_names}
+        drives = {tendon.tendon: tendon for tendon in tree.actuators.values() if tendon.tendon in names}
+        kinds = {"muscles" if tendon.muscle else "actuators" for tendon in drives.values()}
         kinds |= {"springs"} if names - {*drives} else set()
         return f"cords that {' and '.join(sorted(kinds))} pull; their tension is not shown" if names else ""
 
@@ -129,7 +129,7 @@ class Scene:
         ghost: Ghost | None = None,
         palm: LinkPoses | None = None,
     ) -> dict[str, Any]:
-        """Return the page's header, the data of all frames alike.
+        """Return the page's header: the data that all frames share.
 
         Args:
             title: Shown above the legend.
@@ -140,16 +140,16 @@ class Scene:
             palm: Poses of the palm at those positions, if it moves.
         """
         geometry, tube = self.geometry, self.tube_radius
-        turn = self.view()
-        shown = ForceSet.from_polytope(forces, self.size) if forces is not None else None
-        beside = ([] if shown is None else [shown.corners]) + ([] if ghost is None else [ghost.points_in_view()])
-        corners = self._in_view(joint_positions, palm, beside)
-        drawn = list(shown.commands()) if shown is not None else []
+        rotation = self.view()
+        force_set = ForceSet.from_polytope(forces, self.size) if forces is not None else None
+        extra = ([] if force_set is None else [force_set.corners]) + ([] if ghost is None else [ghost.points_in_view()])
+        corners = self._in_view(joint_positions, palm, extra)
+        force_commands = list(force_set.commands()) if force_set is not None else []
         return {
             "title": title,
-            "commands": [root_command(turn), *solid_commands(geometry, tube), *drawn],
+            "commands": [root_command(rotation), *solid_commands(geometry, tube), *force_commands],
             "ghost": ghost.header() if ghost is not None else None,
-            "forces": shown.note if shown is not None else "",
+            "forces": force_set.note if force_set is not None else "",
             "cords": self._note_on_cords(),
             "links": link_names(geometry),
             "joints": list(geometry.description.joints),
@@ -157,33 +157,33 @@ class Scene:
             "strands": list(self.strands),
             "tendons": self.tendons,
             "tubeRadius": tube,
-            "quantum": self._quantum,
+            "quantum": self._point_unit,
             "grid": 10.0 ** math.floor(math.log10(float(np.ptp(corners, axis=0).max()) / 4.0)),
             "tips": len(geometry.tips),
             "inView": np.round(_outermost(corners), 5).tolist(),
             "margin": 0.55 * max(self._widths),
-            "tensionScale": scale_above(largest_tension),
+            "tensionScale": tension_scale(largest_tension),
             "slackTension": SLACK_TENSION,
             "chunks": [],
         }
 
-    def _in_view(self, joint_positions: ArrayLike, palm: LinkPoses | None, beside: list[Array]) -> Array:
+    def _in_view(self, joint_positions: ArrayLike, palm: LinkPoses | None, extra_points: list[Array]) -> Array:
         """Return the points that the camera must have in view, with some beside the finger, shape (p, 3), m."""
-        geometry, turn = self.geometry, self.view()
+        geometry, rotation = self.geometry, self.view()
         poses = geometry.poses(joint_positions, palm)
         paths = geometry.paths(joint_positions, poses=poses)
         visible = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
         framed = [visual for visual in geometry.visuals if visual.framed or is_mesh(visual.shape)]
-        visible += [*(_corners(visual, poses) for visual in framed), *beside]
-        corners: Array = np.concatenate([points.reshape(-1, 3) for points in visible]) @ turn.T
+        visible += [*(_box_corners(visual, poses) for visual in framed), *extra_points]
+        corners: Array = np.concatenate([points.reshape(-1, 3) for points in visible]) @ rotation.T
         if not self._slides:
             return corners
-        # What a hand has lost, such as a pen of a model's that falls, leaves the view.
-        first = np.concatenate([points.reshape(-1, *points.shape[-2:])[0] for points in visible]) @ turn.T
-        middle = first.mean(axis=0)
-        reach = np.linalg.norm(first - middle, axis=1).max()
-        kept: Array = corners[np.linalg.norm(corners - middle, axis=1) <= _LOST * reach]
-        return kept
+        # Links that have left the hand, such as a falling pen of an imported model, leave the view.
+        first_points = np.concatenate([points.reshape(-1, *points.shape[-2:])[0] for points in visible]) @ rotation.T
+        middle = first_points.mean(axis=0)
+        radius = np.linalg.norm(first_points - middle, axis=1).max()
+        near_points: Array = corners[np.linalg.norm(corners - middle, axis=1) <= _MAX_REACH * radius]
+        return near_points
 
     def chunk(
         self, time: ArrayLike, joint_position: ArrayLike, tension: ArrayLike, palm: LinkPoses | None = None
@@ -198,13 +198,13 @@ class Scene:
         """
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
         poses = self.geometry.poses(q, palm)
-        none = np.zeros((*q.shape[:-1], 0, 3))
-        drawn = [none, *(path.points for path in self.geometry.paths(q, self.looseness(f), poses))]
-        paths = np.concatenate(drawn, axis=-2)
+        empty = np.zeros((*q.shape[:-1], 0, 3))
+        points = [empty, *(path.points for path in self.geometry.paths(q, self.looseness(f), poses))]
+        paths = np.concatenate(points, axis=-2)
         return {
             "time": encode(time, "<f8"),
             "pose": _encode_poses(poses),
-            "path": encode(np.clip(np.rint(paths / self._quantum), -_LARGEST, _LARGEST), "<i2"),
+            "path": encode(np.clip(np.rint(paths / self._point_unit), -_MAX_INTEGER, _MAX_INTEGER), "<i2"),
             "tension": encode(f, "<f4"),
             "tip": encode(self.tips(poses), "<f4"),
             "joint": encode(q, "<f4"),
@@ -212,26 +212,26 @@ class Scene:
 
     def tips(self, poses: LinkPoses) -> Array:
         """Return the fingertips, shape (..., f, 3), m, of poses of the links."""
-        places = [
+        positions = [
             poses.rotation[..., link, :, :] @ offset + poses.translation[..., link, :]
             for link, offset in self.geometry.tips
         ]
-        return np.stack(places, axis=-2)
+        return np.stack(positions, axis=-2)
 
     def looseness(self, strand_tension: Array) -> Array:
         """Return the looseness of tendons, shape (..., t), 0 to 1, at tensions of the strands, (..., s), N."""
         # A passive tendon is drawn loose when both its halves are, and a cord without a known tension never.
-        leading = strand_tension.shape[:-1]
-        known = np.concatenate([strand_tension, np.full((*leading, 1), SLACK_TENSION)], axis=-1)
-        largest = [known[..., strands].max(axis=-1) for strands in self._strands]
-        tension = np.stack(largest, axis=-1) if largest else np.zeros((*leading, 0))
+        shape = strand_tension.shape[:-1]
+        tensions = np.concatenate([strand_tension, np.full((*shape, 1), SLACK_TENSION)], axis=-1)
+        tendon_tensions = [tensions[..., strands].max(axis=-1) for strands in self._strands]
+        tension = np.stack(tendon_tensions, axis=-1) if tendon_tensions else np.zeros((*shape, 0))
         return np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)
 
     def _tendon(self, name: str, distal: Sequence[bool]) -> dict[str, Any]:
-        first, *more = self._strands_of(name)
+        first, *others = self._strands_of(name)
         last = len(distal) - 1
         knots = {last} if first < len(self.geometry.description.actuated_names) else {0, last}
-        if more and True in distal:
+        if others and True in distal:
             knots.add(distal.index(True))
         return {"name": name, "strand": [first + int(flag) for flag in distal], "knots": sorted(knots)}
 
@@ -248,15 +248,15 @@ class Scene:
         return [len(self.strands)]
 
     def view(self) -> Array:
-        """Return the rotation from the base frame to the frame in which the finger is looked at, shape (3, 3)."""
+        """Return the rotation from the base frame to the frame of the view, shape (3, 3)."""
         # There z is up, the camera stands on the side of -y, where the axes of most
         # joints point, so that flexion is seen from the side and runs counter-clockwise.
         model, data = self.geometry.model, self.geometry.model.createData()
         pin.forwardKinematics(model, data, np.zeros(model.nq))
         joint = self.geometry.lanes.families[0][0]
         frame = np.array(data.oMi[joint].rotation)
-        turning = joint_axes(model)[joint - 1]
-        axis = turning if turning.any() else frame[:, 2]
+        joint_axis = joint_axes(model)[joint - 1]
+        axis = joint_axis if joint_axis.any() else frame[:, 2]
         gravity = np.array(self.geometry.description.gravity)
         up = -gravity / np.linalg.norm(gravity) if gravity.any() else axis
         if abs(up @ axis) > 0.9:
@@ -266,7 +266,7 @@ class Scene:
         return np.array([np.cross(back, up), back, up])
 
 
-def _corners(visual: Visual, poses: LinkPoses) -> Array:
+def _box_corners(visual: Visual, poses: LinkPoses) -> Array:
     """Return the corners of the box around a solid, in all poses of its link."""
     visual.shape.computeLocalAABB()
     low, high = visual.shape.aabb_local.min_, visual.shape.aabb_local.max_
@@ -279,14 +279,14 @@ def _outermost(points: Array) -> Array:
     # The points that are farthest out in some direction of a fan around the sphere: enough to frame them all.
     index = np.arange(200) + 0.5
     polar, azimuth = np.arccos(1.0 - index / 100.0), math.pi * (1.0 + math.sqrt(5.0)) * index
-    fan = np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)])
-    # A row of distances for each direction: to look for the greatest along columns takes five times as long.
-    return np.asarray(points[np.unique(np.argmax(fan.T @ points.T, axis=1))])
+    directions = np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)])
+    # One row of distances per direction: a maximum along columns takes five times as long.
+    return np.asarray(points[np.unique(np.argmax(directions.T @ points.T, axis=1))])
 
 
-def scale_above(tension: float) -> float:
+def tension_scale(tension: float) -> float:
     """Return the upper end of a legend of tensions, N: its quarters are short numbers."""
-    # The page goes on in the same steps.
+    # The page uses the same steps.
     if not tension > 0.0:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(tension))
@@ -294,6 +294,6 @@ def scale_above(tension: float) -> float:
 
 
 def _encode_poses(poses: LinkPoses) -> str:
-    quaternions = np.array([pin.Quaternion(r).coeffs() for r in poses.rotation.reshape(-1, 3, 3)])
-    turned = quaternions.reshape(*poses.translation.shape[:-1], 4)
-    return encode(np.concatenate([poses.translation, turned], axis=-1), "<f4")
+    quaternions = np.array([pin.Quaternion(rotation).coeffs() for rotation in poses.rotation.reshape(-1, 3, 3)])
+    orientations = quaternions.reshape(*poses.translation.shape[:-1], 4)
+    return encode(np.concatenate([poses.translation, orientations], axis=-1), "<f4")

@@ -26,16 +26,16 @@ from finger_pin.views.viewer.meshcat_solids import (
     encode,
     mesh,
     newton_length,
-    placed,
+    pose_matrix,
 )
 
-_FIXED, _FREE = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
+_FIXED_COLOUR, _FREE_COLOUR = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
 #: Thickness of the plate that is drawn for a half-space, and how far it reaches, in parts of the finger's length.
-_THICK, _WIDE = 0.015, 0.35
+_PLATE_THICKNESS, _PLATE_RADIUS = 0.015, 0.35
 #: Length of the longest arrow, in parts of the finger's length.
-_ARROW = 0.22
+_ARROW_LENGTH = 0.22
 #: Slant of the largest friction cone, in parts of the finger's length: about the width of a finger.
-_CONE = 0.05
+_CONE_SLANT = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,43 +79,45 @@ class SceneObjects:
         level, normal = np.asarray(result["contact_level"]), np.asarray(result["contact_normal_force"])
         steepness = np.max(np.divide(level, normal, out=np.zeros_like(level), where=normal > 1e-6), axis=0)
         frames, closed = np.searchsorted(np.asarray(result["time"]), time), np.flatnonzero(steepness > 0.0)
-        parts = [np.asarray(result[f"contact_{name}"])[np.ix_(frames, closed)] for name in ("point", "force", "normal")]
+        vectors = [
+            np.asarray(result[f"contact_{name}"])[np.ix_(frames, closed)] for name in ("point", "force", "normal")
+        ]
         poses_by_name = {
-            name: np.broadcast_to(each.pose, (len(time), 7)) for name, each in objects.items() if palm is not None
+            name: np.broadcast_to(item.pose, (len(time), 7)) for name, item in objects.items() if palm is not None
         }
         if "object_position" in result:
-            moved = [np.asarray(result[f"object_{name}"])[frames] for name in ("position", "orientation")]
+            free_poses = [np.asarray(result[f"object_{name}"])[frames] for name in ("position", "orientation")]
             names = np.asarray(result["object"]).tolist()
-            poses_by_name |= dict(zip(names, np.moveaxis(np.concatenate(moved, axis=-1), 1, 0), strict=True))
+            poses_by_name |= dict(zip(names, np.moveaxis(np.concatenate(free_poses, axis=-1), 1, 0), strict=True))
         poses = np.stack(list(poses_by_name.values()), axis=1) if poses_by_name else np.zeros((len(time), 0, 7))
         if palm is not None:
-            turned = [np.einsum("mij,mcj->mci", palm.rotation, each) for each in (*parts, poses[..., :3])]
-            open_ = ~np.any(parts[1], axis=-1, keepdims=True)
-            parts = [turned[0] + palm.translation[:, None] * ~open_, *turned[1:3]]
-            attitudes = [pin.Quaternion(each) for each in palm.rotation]
+            rotated = [np.einsum("mij,mcj->mci", palm.rotation, item) for item in (*vectors, poses[..., :3])]
+            is_closed = ~np.any(vectors[1], axis=-1, keepdims=True)
+            vectors = [rotated[0] + palm.translation[:, None] * ~is_closed, *rotated[1:3]]
+            palm_rotations = [pin.Quaternion(item) for item in palm.rotation]
             orientations = np.array(
                 [
-                    [(attitude * pin.Quaternion(each)).coeffs() for each in row]
-                    for attitude, row in zip(attitudes, poses[..., 3:], strict=True)
+                    [(palm_rotation * pin.Quaternion(item)).coeffs() for item in orientations_row]
+                    for palm_rotation, orientations_row in zip(palm_rotations, poses[..., 3:], strict=True)
                 ]
             ).reshape(*poses.shape[:2], 4)
-            poses = np.concatenate([turned[3] + palm.translation[:, None], orientations], axis=-1)
+            poses = np.concatenate([rotated[3] + palm.translation[:, None], orientations], axis=-1)
             for index, name in enumerate(poses_by_name):
                 if objects[name].frame == "world":
                     poses[:, index] = objects[name].pose
-        contacts = np.concatenate(parts, axis=-1)
+        contacts = np.concatenate(vectors, axis=-1)
         return cls(objects, tuple(poses_by_name), poses, contacts, steepness[steepness > 0.0], size, middle)
 
     def header(self, turn: Array) -> dict[str, Any]:
         """Return their part of the page's header; ``turn`` is the rotation of the scene."""
-        length = self._newton()
+        length = self._force_scale()
         return {
             "objects": {
                 "commands": list(self.commands()),
                 "free": [f"object_{name}" for name in self.moving],
                 "steepness": np.round(self.steepness, 4).tolist(),
                 "length": length,
-                "cone": _CONE * self.size,
+                "cone": _CONE_SLANT * self.size,
                 "note": f"contact forces, {1e3 * length:.4g} mm per N, in their friction cones",
             },
             "alsoInView": np.round(self.points_in_view() @ turn.T, 5).tolist(),
@@ -128,18 +130,18 @@ class SceneObjects:
     def points_in_view(self) -> Array:
         """Return places of free objects and contacts, and corners of fixed ones, near the finger, shape (m, 3)."""
         free = [index for index, name in enumerate(self.moving) if self.by_name[name].mass is not None]
-        places = self.poses[:, free, :3].reshape(-1, 3)
+        positions = self.poses[:, free, :3].reshape(-1, 3)
         points = self.contacts[np.any(self.contacts[..., 3:6] != 0.0, axis=-1)][:, :3]
-        corners = [_corners(each) for each in self.by_name.values() if each.mass is None and each.sizes]
-        in_view = np.concatenate([places[::10], points[::10], *corners])
-        return np.asarray(in_view[np.linalg.norm(in_view - self.middle, axis=1) < 1.2 * self.size])
+        corners = [_box_corners(each) for each in self.by_name.values() if each.mass is None and each.sizes]
+        candidates = np.concatenate([positions[::10], points[::10], *corners])
+        return np.asarray(candidates[np.linalg.norm(candidates - self.middle, axis=1) < 1.2 * self.size])
 
     def commands(self) -> Iterator[Command]:
         """Yield meshcat's commands for all objects, each at its start."""
         for name, scene_object in self.by_name.items():
             path = f"{ROOT}/object_{name}"
-            for index, (shape, turned, offset, colour) in enumerate(self.parts(name)):
-                yield mesh(f"{path}/part{index}", shape, turned, offset, colour, 1.6 * SOLID_OPACITY)
+            for index, (shape, rotation, offset, colour) in enumerate(self.parts(name)):
+                yield mesh(f"{path}/part{index}", shape, rotation, offset, colour, 1.6 * SOLID_OPACITY)
             yield self._placement(name, scene_object.pose)
 
     def frame(self, index: int) -> Iterator[Command]:
@@ -147,7 +149,7 @@ class SceneObjects:
         for name, pose in zip(self.moving, self.poses[index], strict=True):
             yield self._placement(name, pose)
 
-    def placed(self, name: str) -> Array:
+    def object_poses(self, name: str) -> Array:
         """Return poses of an object in all frames, shape (m, 7)."""
         if name in self.moving:
             return np.asarray(self.poses[:, self.moving.index(name)])
@@ -157,29 +159,29 @@ class SceneObjects:
     def arrows(self) -> Array:
         """Return both ends of the arrow of every contact's force in all frames, shape (m, c, 2, 3), m."""
         points, force = self.contacts[..., :3], self.contacts[..., 3:6]
-        return np.stack([points, points + self._newton() * force], axis=-2)
+        return np.stack([points, points + self._force_scale() * force], axis=-2)
 
-    def _newton(self) -> float:
+    def _force_scale(self) -> float:
         return newton_length(
-            _ARROW * self.size, float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0))
+            _ARROW_LENGTH * self.size, float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0))
         )
 
     @staticmethod
     def _placement(name: str, pose: Array) -> Command:
         rotation = pin.Quaternion(pose[3:]).toRotationMatrix()
-        return {"type": "set_transform", "path": f"{ROOT}/object_{name}", "matrix": placed(rotation, pose[:3])}
+        return {"type": "set_transform", "path": f"{ROOT}/object_{name}", "matrix": pose_matrix(rotation, pose[:3])}
 
     def parts(self, name: str) -> Iterator[tuple[Command, Array, Array, tuple[float, float, float]]]:
         """Yield the solids of an object: meshcat's geometry, its rotation or stretch, its place there, its colour."""
         scene_object = self.by_name[name]
-        sizes, colour = scene_object.sizes, _FIXED if scene_object.mass is None else _FREE
+        sizes, colour = scene_object.sizes, _FIXED_COLOUR if scene_object.mass is None else _FREE_COLOUR
         rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
-        place = np.array(scene_object.position)
+        position = np.array(scene_object.position)
         if scene_object.shape == "half_space":
-            # The part of it that is nearest to the finger.
-            side, thick = 2.0 * _WIDE * self.size, _THICK * self.size
-            below = rotation.T @ (self.middle - place) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thick]
-            parts = [(box(side, side, thick), np.eye(3), below)]
+            # The part of the plane nearest to the finger.
+            side, thickness = 2.0 * _PLATE_RADIUS * self.size, _PLATE_THICKNESS * self.size
+            centre = rotation.T @ (self.middle - position) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thickness]
+            parts = [(box(side, side, thickness), np.eye(3), centre)]
         elif scene_object.shape == "box":
             parts = [(box(*sizes), np.eye(3), np.zeros(3))]
         elif scene_object.shape == "ellipsoid":
@@ -194,7 +196,7 @@ class SceneObjects:
         yield from ((*part, colour) for part in parts)
 
 
-def _corners(scene_object: Object) -> Array:
+def _box_corners(scene_object: Object) -> Array:
     """Return the corners of the box around a fixed object, shape (8, 3), m."""
     radius = scene_object.radius or 0.0
     round_ends = 0.0 if scene_object.shape == "cylinder" else 2.0 * radius

@@ -31,19 +31,19 @@ from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, strand_colours, tension_colours
 from finger_pin.views.viewer.meshcat_solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, primitive
-from finger_pin.views.viewer.scene import Scene, scale_above
+from finger_pin.views.viewer.scene import Scene, tension_scale
 from finger_pin.views.viewer.scene_objects import SceneObjects
 
-_BACKGROUND, _INK, _DIM, _TRACE = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
+_BACKGROUND, _INK, _DIM_INK, _TRACE_COLOUR = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
-_AWAY = (0.42, -1.0, 0.5)
-_ROUND = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+_CAMERA_DIRECTION = (0.42, -1.0, 0.5)
+_CIRCLE_ANGLES = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 #: Pixels of a film's width, and of that of a GIF, which is large for its size.
 _WIDTH, _GIF_WIDTH = 1200, 720
-_INCHES = (10.0, 6.0)
+_FIGURE_SIZE = (10.0, 6.0)
 _NO_POINTS = np.zeros((0, 3))
 #: Frames out of which the view is found.
-_FEW = 25
+_VIEW_FRAMES = 25
 
 
 @styled
@@ -68,27 +68,27 @@ def write_video(
         FingerPinError: If ffmpeg is needed and not found.
     """
     target = Path(path)
-    gif = target.suffix == ".gif"
+    is_gif = target.suffix == ".gif"
     if target.suffix not in (".mp4", ".gif"):
         raise InputError("path", "must end in .mp4 or .gif", str(path))
-    rate = (20.0 if gif else 30.0) if rate is None else rate
+    rate = (20.0 if is_gif else 30.0) if rate is None else rate
     for name, value in (("speed", speed), ("rate", rate)):
         if not 0.0 < value < np.inf:
             raise InputError(name, "must be a number above 0", value)
     ffmpeg = find_ffmpeg()
-    if not gif and not ffmpeg:
-        wanted = "the program ffmpeg, which is not found (the package imageio-ffmpeg has it, too)"
-        raise FingerPinError(f"an MP4 needs {wanted}; a GIF does without")
+    if not is_gif and not ffmpeg:
+        requirement = "the program ffmpeg, which is not found (the package imageio-ffmpeg has it, too)"
+        raise FingerPinError(f"an MP4 needs {requirement}; a GIF does without")
     writer: AbstractMovieWriter = (FFMpegWriter if ffmpeg else PillowWriter)(fps=rate)  # type: ignore[arg-type]
     motion = Playback.from_result(result, rate / speed)
-    figure = new_figure(*_INCHES, layout=None)
+    figure = new_figure(*_FIGURE_SIZE, layout=None)
     film = _Film(figure, motion)
-    resolution = (_GIF_WIDTH if gif else _WIDTH) / _INCHES[0]
-    shown = rc_context({"animation.ffmpeg_path": ffmpeg})
-    with shown, replacing(target) as temporary, writer.saving(figure, temporary, resolution):
+    resolution = (_GIF_WIDTH if is_gif else _WIDTH) / _FIGURE_SIZE[0]
+    context = rc_context({"animation.ffmpeg_path": ffmpeg})
+    with context, replacing(target) as temporary, writer.saving(figure, temporary, resolution):
         step, last = speed / rate, motion.time[-1]
-        for due in np.arange(motion.time[0], last + 0.5 * step, step):
-            film.show(int(np.argmin(np.abs(motion.time - due))))
+        for time in np.arange(motion.time[0], last + 0.5 * step, step):
+            film.show(int(np.argmin(np.abs(motion.time - time))))
             writer.grab_frame(facecolor=_BACKGROUND)
     return target
 
@@ -102,8 +102,8 @@ def draw_picture(result: xr.Dataset, stage: Array, goal: Array | None = None) ->
         stage: Points that are in view whatever the posture, shape (k, 3), m, base frame.
         goal: Point that is marked, shape (3,), m, base frame.
     """
-    figure = new_figure(*_INCHES, layout=None)
-    figure.set_dpi(_GIF_WIDTH / _INCHES[0])
+    figure = new_figure(*_FIGURE_SIZE, layout=None)
+    figure.set_dpi(_GIF_WIDTH / _FIGURE_SIZE[0])
     figure.set_facecolor(_BACKGROUND)
     motion = Playback.from_result(result)
     film = _Film(figure, motion, stage)
@@ -144,48 +144,48 @@ class _Film:
         self.motion = motion
         self.poses = self.links = scene.geometry.poses(motion.position, motion.palm)
         self.solids, objects = tuple(_solids(scene)), motion.objects
-        # Objects are further links; what is seen of them does not move the camera far away.
+        # Objects are added as links, but do not widen the view.
         finger_solids = self.solids
         if objects is not None and objects.by_name:
             self.solids += tuple(_objects(objects, self.poses.translation.shape[1]))
-            placed = np.stack([objects.placed(name) for name in objects.by_name], axis=1)
-            turned = Rotation.from_quat(placed[..., 3:].reshape(-1, 4)).as_matrix().reshape(*placed.shape[:2], 3, 3)
+            poses = np.stack([objects.object_poses(name) for name in objects.by_name], axis=1)
+            rotations = Rotation.from_quat(poses[..., 3:].reshape(-1, 4)).as_matrix().reshape(*poses.shape[:2], 3, 3)
             self.poses = LinkPoses(
-                np.concatenate([self.poses.rotation, turned], axis=1),
-                np.concatenate([self.poses.translation, placed[..., :3]], axis=1),
+                np.concatenate([self.poses.rotation, rotations], axis=1),
+                np.concatenate([self.poses.translation, poses[..., :3]], axis=1),
             )
-        self.scale = scale_above(motion.largest)
-        away = np.array(_AWAY) / np.linalg.norm(_AWAY)
-        right = np.cross([0.0, 0.0, 1.0], away)
+        self.scale = tension_scale(motion.largest)
+        direction = np.array(_CAMERA_DIRECTION) / np.linalg.norm(_CAMERA_DIRECTION)
+        right = np.cross([0.0, 0.0, 1.0], direction)
         right /= np.linalg.norm(right)
         # Rows: to the right, up, and towards the camera, in the base frame.
-        self.camera = np.array([right, np.cross(away, right), away]) @ scene.view()
+        self.camera = np.array([right, np.cross(direction, right), direction]) @ scene.view()
         self.tips = scene.tips(self.links) @ self.camera[:2].T
         self.axes = axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_axis_off()
-        few = np.unique(np.linspace(0, len(motion.time) - 1, _FEW).round().astype(int))
+        view_frames = np.unique(np.linspace(0, len(motion.time) - 1, _VIEW_FRAMES).round().astype(int))
         points = np.concatenate(
             [
                 self.tips.reshape(-1, 2),
                 stage @ self.camera[:2].T,
                 np.zeros((0, 2)) if objects is None else objects.points_in_view() @ self.camera[:2].T,
-                *(self._outline(solid, frame) for frame in few for solid in finger_solids),
-                *(line for frame in few for line in self._lines(frame)),
+                *(self._outline(solid, frame) for frame in view_frames for solid in finger_solids),
+                *(line for frame in view_frames for line in self._lines(frame)),
             ]
         )
         low, high = points.min(axis=0), points.max(axis=0)
         # Room for the legend at the left, and for the title above.
-        unit = float(np.max((high - low) / (np.array([0.76, 0.8]) * _INCHES)))
-        left, below = 0.5 * (low + high) - unit * np.array([0.58, 0.47]) * _INCHES
-        axes.set(xlim=(left, left + unit * _INCHES[0]), ylim=(below, below + unit * _INCHES[1]))
+        unit = float(np.max((high - low) / (np.array([0.76, 0.8]) * _FIGURE_SIZE)))
+        left, bottom = 0.5 * (low + high) - unit * np.array([0.58, 0.47]) * _FIGURE_SIZE
+        axes.set(xlim=(left, left + unit * _FIGURE_SIZE[0]), ylim=(bottom, bottom + unit * _FIGURE_SIZE[1]))
         axes.text(0.025, 0.93, motion.title, color=_INK, transform=axes.transAxes, fontsize=13, parse_math=False)
         if scene.strands:
             self._legend(figure)
         self.clock = axes.text(0.975, 0.05, "", color=_INK, transform=axes.transAxes, ha="right", fontsize=13)
         self.bodies = PolyCollection([], linewidths=0.8)
         axes.add_collection(self.bodies)
-        axes.plot(*np.moveaxis(self.tips, -1, 0), color=_TRACE, linewidth=1.0, alpha=0.3)
-        self.traces = [axes.plot([], [], color=_TRACE, linewidth=2.0)[0] for _ in range(self.tips.shape[1])]
+        axes.plot(*np.moveaxis(self.tips, -1, 0), color=_TRACE_COLOUR, linewidth=1.0, alpha=0.3)
+        self.traces = [axes.plot([], [], color=_TRACE_COLOUR, linewidth=2.0)[0] for _ in range(self.tips.shape[1])]
         width = 2.0 * 72.0 * scene.tube_radius / unit
         self.tubes = LineCollection([], linewidths=width, capstyle="round")
         axes.add_collection(self.tubes)
@@ -195,11 +195,11 @@ class _Film:
     def show(self, frame: int) -> None:
         """Move all bodies and tendons to their places in a frame."""
         motion, scene = self.motion, self.motion.scene
-        # What is farther away is drawn first.
-        depth = [float(self._placed(solid, frame).mean(axis=0) @ self.camera[2]) for solid in self.solids]
-        order = np.argsort(depth)
-        self.bodies.set_verts([self._outline(self.solids[index], frame) for index in order])
-        colours = [self.solids[index].colour for index in order]
+        # Distant solids are drawn first.
+        depth = [float(self._corner_positions(solid, frame).mean(axis=0) @ self.camera[2]) for solid in self.solids]
+        back_to_front = np.argsort(depth)
+        self.bodies.set_verts([self._outline(self.solids[index], frame) for index in back_to_front])
+        colours = [self.solids[index].colour for index in back_to_front]
         self.bodies.set_facecolor(colours)
         self.bodies.set_edgecolor([(0.8, 0.8, 0.8, 1.3 * opacity) for *_, opacity in colours])
         lines, tension = self._lines(frame), motion.tension[frame]
@@ -216,7 +216,7 @@ class _Film:
         """Mark a point of the last frame, shape (3,), m, base frame or that of a moving palm."""
         palm = self.motion.palm
         x, y = self.camera[:2] @ (goal if palm is None else palm.rotation[-1] @ goal + palm.translation[-1])
-        self.axes.plot(x, y, "+", color=_TRACE, markersize=16.0, markeredgewidth=2.0, zorder=4)
+        self.axes.plot(x, y, "+", color=_TRACE_COLOUR, markersize=16.0, markeredgewidth=2.0, zorder=4)
         self.axes.annotate("goal", (x, y), (9.0, 6.0), textcoords="offset points", color=_INK, fontsize=11)
 
     def _lines(self, frame: int) -> list[Array]:
@@ -226,20 +226,20 @@ class _Film:
         paths = scene.geometry.paths(motion.position[frame], scene.looseness(motion.tension[frame]), poses)
         return [path.points @ self.camera[:2].T for path in paths]
 
-    def _placed(self, solid: _Solid, frame: int) -> Array:
+    def _corner_positions(self, solid: _Solid, frame: int) -> Array:
         rotation, translation = self.poses.rotation[frame, solid.link], self.poses.translation[frame, solid.link]
         return np.asarray(solid.corners @ rotation.T + translation)
 
     def _outline(self, solid: _Solid, frame: int) -> Array:
-        points = self._placed(solid, frame) @ self.camera[:2].T
+        points = self._corner_positions(solid, frame) @ self.camera[:2].T
         return np.asarray(points[scipy.spatial.ConvexHull(points).vertices])
 
     def _legend(self, figure: Figure) -> None:
         colours = ListedColormap(tension_colours(np.linspace(0.0, self.scale, 256), self.scale))
-        place = figure.add_axes((0.03, 0.3, 0.014, 0.4))
-        bar = figure.colorbar(ScalarMappable(Normalize(0.0, self.scale), colours), cax=place)
+        bar_axes = figure.add_axes((0.03, 0.3, 0.014, 0.4))
+        bar = figure.colorbar(ScalarMappable(Normalize(0.0, self.scale), colours), cax=bar_axes)
         bar.set_ticks([0.0, 0.5 * self.scale, self.scale])
-        bar.ax.tick_params(colors=_DIM, labelcolor=_INK)
+        bar.ax.tick_params(colors=_DIM_INK, labelcolor=_INK)
         bar.set_label("tendon tension (N)", color=_INK)
         bar.outline.set_visible(False)
 
@@ -247,43 +247,43 @@ class _Film:
 def _solids(scene: Scene) -> Iterator[_Solid]:
     geometry = scene.geometry
     for visual in geometry.visuals:
-        shape, turn = primitive(visual.name, visual.shape)
-        corners = _corners(shape) @ (visual.placement.rotation @ turn).T + visual.placement.translation
+        shape, rotation = primitive(visual.name, visual.shape)
+        corners = _hull_points(shape) @ (visual.placement.rotation @ rotation).T + visual.placement.translation
         yield _Solid(visual.link, corners, (*visual.colour[:3], SOLID_OPACITY * visual.colour[3]))
     for pulley in geometry.pulleys:
-        ring = _ring(max(abs(pulley.radius) - scene.tube_radius, 0.5 * scene.tube_radius), 0.8 * geometry.lanes.spacing)
+        rim = _rims(max(abs(pulley.radius) - scene.tube_radius, 0.5 * scene.tube_radius), 0.8 * geometry.lanes.spacing)
         yield _Solid(
-            pulley.joint, ring @ pulley.frame.T + pulley.offset * pulley.frame[:, 2], (*GROOVE_COLOUR, SOLID_OPACITY)
+            pulley.joint, rim @ pulley.frame.T + pulley.offset * pulley.frame[:, 2], (*GROOVE_COLOUR, SOLID_OPACITY)
         )
 
 
 def _objects(objects: SceneObjects, first: int) -> Iterator[_Solid]:
     for index, name in enumerate(objects.by_name):
-        for shape, turned, offset, colour in objects.parts(name):
-            corners = _corners(shape) @ turned.T + offset
+        for shape, rotation, offset, colour in objects.parts(name):
+            corners = _hull_points(shape) @ rotation.T + offset
             yield _Solid(first + index, corners, (*colour, SOLID_OPACITY))
 
 
-def _corners(shape: Command) -> Array:
+def _hull_points(shape: Command) -> Array:
     """Return points whose hull is, or looks like, a geometry of meshcat."""
     if shape["type"] == "BoxGeometry":
         sides = [0.5 * shape[side] for side in ("width", "height", "depth")]
         return np.array(list(product(*((-half, half) for half in sides))))
     if shape["type"] == "CylinderGeometry":
-        return np.asarray(_ring(shape["radiusTop"], shape["height"]) @ Y_TO_Z)
+        return np.asarray(_rims(shape["radiusTop"], shape["height"]) @ Y_TO_Z)
     if shape["type"] == "BufferGeometry":
         return np.reshape(shape["data"]["attributes"]["position"]["array"], (-1, 3))
-    return _round(shape["radius"])
+    return _sphere_points(shape["radius"])
 
 
-def _round(radius: float) -> Array:
+def _sphere_points(radius: float) -> Array:
     """Return points of a sphere, shape (p, 3)."""
-    turns = np.linspace(0.0, np.pi, 13)
-    points = np.array([_ring(np.sin(turn), 2.0 * np.cos(turn))[: len(_ROUND)] for turn in turns])
+    polar_angles = np.linspace(0.0, np.pi, 13)
+    points = np.array([_rims(np.sin(angle), 2.0 * np.cos(angle))[: len(_CIRCLE_ANGLES)] for angle in polar_angles])
     return np.asarray(radius * points.reshape(-1, 3))
 
 
-def _ring(radius: float, height: float) -> Array:
+def _rims(radius: float, height: float) -> Array:
     """Return the two rims of a cylinder about z, shape (2 r, 3)."""
-    rim = radius * np.stack([np.cos(_ROUND), np.sin(_ROUND)], axis=-1)
+    rim = radius * np.stack([np.cos(_CIRCLE_ANGLES), np.sin(_CIRCLE_ANGLES)], axis=-1)
     return np.array([[x, y, z] for z in (-0.5 * height, 0.5 * height) for x, y in rim])

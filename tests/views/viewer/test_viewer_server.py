@@ -68,7 +68,7 @@ def test_view_opens_the_browser_at_its_own_address_also_where_ipykernel_was_impo
 
 
 def test_a_blocking_view_ends_with_an_interrupt(result, monkeypatch, capsys):
-    monkeypatch.setattr("finger_pin.views.viewer.viewing.PageServer.join", interrupt)
+    monkeypatch.setattr("finger_pin.views.viewer.page_server.PageServer.join", interrupt)
     viewing = view(result, open_browser=False, block=True)
     assert viewing.url in capsys.readouterr().out
     with pytest.raises(OSError, match="refused"):
@@ -77,7 +77,7 @@ def test_a_blocking_view_ends_with_an_interrupt(result, monkeypatch, capsys):
 
 def test_without_a_browser_a_view_waits_only_if_it_was_asked_to(result, monkeypatch, capsys):
     monkeypatch.setattr("webbrowser.open", lambda url, new: False)
-    monkeypatch.setattr("finger_pin.views.viewer.viewing.PageServer.join", interrupt)
+    monkeypatch.setattr("finger_pin.views.viewer.page_server.PageServer.join", interrupt)
     with view(result) as viewing:
         assert viewing.url.encode() and fetch(viewing.url)
         told = capsys.readouterr()

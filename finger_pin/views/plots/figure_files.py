@@ -25,14 +25,12 @@ from finger_pin.views.plots.style import Width, settings
 FORMATS = ("png", "pdf", "svg")
 #: What is drawn of every result of a finger, and of a hand.
 FIGURES = {"fig6": plot_fig6, "losses": plot_losses, "energy": plot_energy}
-FIGURES_OF_TREES = {"motion": plot_hand_motion, "energy": plot_energy}
+TREE_FIGURES = {"motion": plot_hand_motion, "energy": plot_energy}
 
 
-def figures_of(result: xr.Dataset) -> dict[str, Callable[..., Figure]]:
+def figures_by_name(result: xr.Dataset) -> dict[str, Callable[..., Figure]]:
     """Return the figures that are drawn of a result, by name."""
-    figures: dict[str, Callable[..., Figure]] = dict(
-        FIGURES if read_scene(result.attrs).finger.links else FIGURES_OF_TREES
-    )
+    figures: dict[str, Callable[..., Figure]] = dict(FIGURES if read_scene(result.attrs).finger.links else TREE_FIGURES)
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence
     if "contact_force" in result:
@@ -58,7 +56,7 @@ def draw_all(
     Args:
         result: Dataset of `simulate`.
         folder: Folder of the file; one of the same name is replaced whole or not at all.
-        names: Which of `figures_of`; all by default.
+        names: Which of `figures_by_name`; all by default.
         format: `png`, `pdf` or `svg`; default that of matplotlib's setting ``savefig.format``, PNG unless changed.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
@@ -66,13 +64,13 @@ def draw_all(
     Raises:
         InputError: If there is no such figure of this result, or no such format.
     """
-    figures = figures_of(result)
-    wanted = list(figures if names is None else names)
-    for name in wanted:
+    figures = figures_by_name(result)
+    functions = list(figures if names is None else names)
+    for name in functions:
         if name not in figures:
             raise InputError("names", f"the figures of this result are {', '.join(figures)}", name)
-    drawn = ((name, figures[name](result, width=width, titles=titles)) for name in wanted)
-    return [save_figure(figure, Path(folder) / name, format) for name, figure in drawn]
+    paths = ((name, figures[name](result, width=width, titles=titles)) for name in functions)
+    return [save_figure(figure, Path(folder) / name, format) for name, figure in paths]
 
 
 def save_figure(figure: Figure, path: str | Path, format: str | None = None) -> Path:
@@ -89,20 +87,20 @@ def save_figure(figure: Figure, path: str | Path, format: str | None = None) -> 
     target = Path(path)
     if not target.suffix:
         target = target.with_name(f"{target.name}.{format or settings['savefig.format']}")
-    end = target.suffix.removeprefix(".").lower()
-    if end not in FORMATS:
-        raise InputError("format", f"must be {', '.join(FORMATS)}", end)
+    suffix = target.suffix.removeprefix(".").lower()
+    if suffix not in FORMATS:
+        raise InputError("format", f"must be {', '.join(FORMATS)}", suffix)
     target.parent.mkdir(parents=True, exist_ok=True)
     engine = figure.get_layout_engine()
     with replacing(target) as temporary:
         try:
-            if engine is not None and end == "png":
+            if engine is not None and suffix == "png":
                 # matplotlib draws a figure twice that it lays out itself.
                 engine.execute(figure)
                 figure.set_layout_engine(None)
-            # Little compression: it takes a fifth of the time, and a line drawing is small anyway.
-            options: Any = {"pil_kwargs": {"compress_level": 2}} if end == "png" else {}
-            figure.savefig(temporary, format=end, **options)
+            # Low compression takes a fifth of the time, and line drawings are small.
+            options: Any = {"pil_kwargs": {"compress_level": 2}} if suffix == "png" else {}
+            figure.savefig(temporary, format=suffix, **options)
         finally:
             if engine is not None:
                 figure.set_layout_engine(engine)

@@ -18,12 +18,12 @@ from finger_pin.files import write_table, write_text
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.progress import notebook_bar
-from finger_pin.studies.dataset import assemble, checked
+from finger_pin.studies.dataset import assemble, require_complete
 from finger_pin.studies.designs import PointList
 from finger_pin.studies.keys import BaseScenario, Point
-from finger_pin.studies.metrics import Metric, metrics_of
+from finger_pin.studies.metrics import Metric, scenario_metrics
 from finger_pin.studies.records import DONE, Progress, RunRecord, Study, open_study
-from finger_pin.studies.search import HOPELESS, Search, nondominated
+from finger_pin.studies.search import FAILED_EXCESS, Search, nondominated
 from finger_pin.studies.search_problem import (
     Constraint,
     Goals,
@@ -32,7 +32,7 @@ from finger_pin.studies.search_problem import (
     parse_variable,
     point_at,
     radii,
-    start_of,
+    start_values,
 )
 from finger_pin.typing import Array
 
@@ -48,7 +48,7 @@ class Effort:
     Attributes:
         population: Designs of a generation.
         generations: Number of generations.
-        seed: The same seed searches the same way.
+        seed: Seed of the random numbers.
     """
 
     population: int = 24
@@ -90,7 +90,7 @@ def optimise(
 
     Args:
         scenario: The scenario to be varied, its name, or the path of a file.
-        over: Variables, or how `parse_variable` reads them; by default the winding `radii` of the finger.
+        over: Variables, or texts for `parse_variable`; by default the winding `radii` of the finger.
         minimise: Metrics to be made small.
         maximise: Metrics to be made large.
         constraints: Bounds on metrics, such as ``self_locking_margin>=1.5``.
@@ -101,7 +101,7 @@ def optimise(
         executor: Executor of the runs, any of `concurrent.futures`; by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         progress: Called with the numbers of finished, failed and all runs; in a notebook there is a bar by default.
-        stop: Asked now and then; true ends the search there.
+        stop: Called now and then; true ends the search.
 
     Returns:
         Along ``sample``, which begins with the scenario's own design and follows the search: every key, metric,
@@ -117,27 +117,27 @@ def optimise(
     effort = effort or Effort()
     goals = Goals.from_metrics(minimise, maximise, constraints)
     base = BaseScenario.from_scenario(scenario, overrides, finger)
-    metrics_of(base.scenario, goals.metrics)
+    scenario_metrics(base.scenario, goals.metrics)
     variables = _variables(over, base)
-    start = start_of(variables, base)
+    start = start_values(variables, base)
     with open_study(base, goals.metrics, output, PRODUCTS, executor, stop, restart) as study:
-        course = _Course(study, goals, variables, effort, progress or notebook_bar("runs"))
-        result = _assembled(base, goals, *course.follow(start)).assign_attrs(vars(effort))
+        search = _SearchRun(study, goals, variables, effort, progress or notebook_bar("runs"))
+        result = _dataset(base, goals, *search.execute(start)).assign_attrs(vars(effort))
         if output is not None:
             _write(result, base, Path(output))
-    return checked(result, study.token.cancelled)
+    return require_complete(result, study.token.cancelled)
 
 
 def _variables(over: Iterable[Variable | str] | None, base: BaseScenario) -> list[Variable]:
     """Return the variables of a search, by default the winding radii of the finger."""
-    chosen = radii(base.scenario.finger) if over is None else over
-    variables = [parse_variable(each) if isinstance(each, str) else each for each in chosen]
+    choices = radii(base.scenario.finger) if over is None else over
+    variables = [parse_variable(variable) if isinstance(variable, str) else variable for variable in choices]
     check_variables(variables, base)
     return variables
 
 
 @dataclass(frozen=True, eq=False)
-class _Course:
+class _SearchRun:
     """Progress of a search, generation by generation."""
 
     study: Study
@@ -146,7 +146,7 @@ class _Course:
     effort: Effort
     progress: Progress | None
 
-    def follow(self, start: Mapping[str, float]) -> tuple[list[Point], list[RunRecord | None]]:
+    def execute(self, start: Mapping[str, float]) -> tuple[list[Point], list[RunRecord | None]]:
         """Return all points with their records, the scenario's own first."""
         sizes = len(self.variables), len(self.goals.objectives), self.effort.population
         search = Search(*sizes, self.effort.seed, _shares(self.variables, start))
@@ -155,66 +155,66 @@ class _Course:
         for _ in range(self.effort.generations):
             if records[-1] is None or self.study.token():
                 break
-            asked = [point_at(self.variables, shares) for shares in search.ask()]
-            evaluated = self._evaluate(asked, records)
-            points, records = points + asked, records + evaluated
-            done = [record for record in evaluated if record is not None]
-            if len(done) < len(evaluated):
+            new_points = [point_at(self.variables, shares) for shares in search.ask()]
+            new_records = self._evaluate(new_points, records)
+            points, records = points + new_points, records + new_records
+            done = [record for record in new_records if record is not None]
+            if len(done) < len(new_records):
                 break
-            judged = [self._judge(record) for record in done]
-            search.tell(np.array([value for value, _ in judged]), np.array([excess for _, excess in judged]))
+            goal_values = [self._evaluate_goals(record) for record in done]
+            search.tell(np.array([value for value, _ in goal_values]), np.array([excess for _, excess in goal_values]))
         return points, records
 
-    def _evaluate(self, points: list[Point], earlier: list[RunRecord | None]) -> list[RunRecord | None]:
+    def _evaluate(self, points: list[Point], earlier_records: list[RunRecord | None]) -> list[RunRecord | None]:
         total = 1 + self.effort.population * self.effort.generations
-        failed = sum(record is not None and record.status != DONE for record in earlier)
+        failed_before = sum(record is not None and record.status != DONE for record in earlier_records)
 
         def report(finished: int, failures: int, _: int) -> None:
             if self.progress is not None:
-                self.progress(len(earlier) + finished, failed + failures, total)
+                self.progress(len(earlier_records) + finished, failed_before + failures, total)
 
         return self.study.evaluate(points, report)
 
-    def _judge(self, record: RunRecord) -> tuple[Array, Array]:
-        """Return objectives and excesses, `HOPELESS` for a design that cannot be run."""
+    def _evaluate_goals(self, record: RunRecord) -> tuple[Array, Array]:
+        """Return objectives and excesses, `FAILED_EXCESS` for a design that cannot be run."""
         if record.status == DONE:
             values, excesses = self.goals.values(record.metrics), self.goals.excesses(record.metrics)
             if np.isfinite(values).all() and not np.isnan(excesses).any():
-                return values, np.clip(excesses, -HOPELESS, HOPELESS)
-        return np.full(len(self.goals.objectives), HOPELESS), np.full(len(self.goals.constraints), HOPELESS)
+                return values, np.clip(excesses, -FAILED_EXCESS, FAILED_EXCESS)
+        return np.full(len(self.goals.objectives), FAILED_EXCESS), np.full(len(self.goals.constraints), FAILED_EXCESS)
 
 
 def _shares(variables: Sequence[Variable], start: Mapping[str, float]) -> Array | None:
     """Return the coordinates of the scenario's own design in the unit cube, or None outside of it."""
     shares = []
     for variable in variables:
-        first = start[variable.keys[0]]
+        value = start[variable.keys[0]]
         for key, sign in zip(variable.keys, variable.signs, strict=True):
-            if start[key] != sign * first:
+            if start[key] != sign * value:
                 return None
-        if not variable.range.low <= first <= variable.range.high:
+        if not variable.range.low <= value <= variable.range.high:
             return None
-        shares.append(variable.range.share(first))
+        shares.append(variable.range.share(value))
     return np.array(shares)
 
 
-def _assembled(base: BaseScenario, goals: Goals, points: list[Point], records: list[RunRecord | None]) -> xr.Dataset:
-    listing = PointList({key: [point[key] for point in points] for key in points[0]})
-    result = assemble(base.scenario, listing, goals.metrics, records)
+def _dataset(base: BaseScenario, goals: Goals, points: list[Point], records: list[RunRecord | None]) -> xr.Dataset:
+    point_list = PointList({key: [point[key] for point in points] for key in points[0]})
+    result = assemble(base.scenario, point_list, goals.metrics, records)
     measured = [(row, r.metrics) for row, r in enumerate(records) if r is not None and r.status == DONE]
     feasible, front = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=int)
     if measured:
         rows = np.array([row for row, _ in measured])
         values = np.array([goals.values(metrics) for _, metrics in measured])
-        good = np.array([bool((goals.excesses(metrics) <= 0.0).all()) for _, metrics in measured])
-        good &= np.isfinite(values).all(axis=1)
-        rows, values = rows[good], values[good]
+        feasible_rows = np.array([bool((goals.excesses(metrics) <= 0.0).all()) for _, metrics in measured])
+        feasible_rows &= np.isfinite(values).all(axis=1)
+        rows, values = rows[feasible_rows], values[feasible_rows]
         feasible[rows] = True
         best = nondominated(values)
         rows, values = rows[best], values[best]
         # A design that comes again is on the front once; numbers follow the first objective.
-        _, once = np.unique(values, axis=0, return_index=True)
-        front[rows[once]] = 1 + np.arange(len(once))
+        _, unique_rows = np.unique(values, axis=0, return_index=True)
+        front[rows[unique_rows]] = 1 + np.arange(len(unique_rows))
     result["feasible"] = ("sample", feasible, {"long_name": "whether the design keeps all constraints"})
     result["front"] = ("sample", front, {"long_name": "number of the design on the front, from 1; 0 for the others"})
     return result.assign_attrs(goals.describe())
@@ -231,8 +231,8 @@ def _write(result: xr.Dataset, base: BaseScenario, folder: Path) -> None:
     columns = [*(str(name) for name in result.data_vars if "units" in result[name].attrs), *keys]
     scenarios = folder / "front"
     scenarios.mkdir(exist_ok=True)
-    for old in scenarios.glob("*.toml"):
-        old.unlink()
+    for stale_file in scenarios.glob("*.toml"):
+        stale_file.unlink()
     table: list[list[object]] = [["design", *(f"{name} ({result[name].attrs['units']})" for name in columns)]]
     for number in range(1, 1 + int(result["front"].max())):
         row = result.isel(sample=int(np.flatnonzero(result["front"].values == number)[0]))
@@ -240,6 +240,6 @@ def _write(result: xr.Dataset, base: BaseScenario, folder: Path) -> None:
         table.append([name, *(float(row[column]) for column in columns)])
         scenario = base.at({key: float(row[key]) for key in keys})
         title = f"design {name} of the front of a search on {scenario.name}"
-        changed = scenario.updated(name=f"{scenario.name[:50]}_front_{name}", title=title)
-        write_text(scenarios / f"{name}.toml", to_toml(changed))
+        renamed = scenario.updated(name=f"{scenario.name[:50]}_front_{name}", title=title)
+        write_text(scenarios / f"{name}.toml", to_toml(renamed))
     write_table(folder / "front.csv", table)

@@ -19,7 +19,7 @@ from finger_pin.simulation.progress import in_notebook
 from finger_pin.views.viewer.animation import animation_page, posture_page
 
 #: Height of the page in a notebook, pixels.
-_CELL = 620
+_PAGE_HEIGHT = 620
 
 
 class PageServer:
@@ -55,7 +55,7 @@ class PageServer:
 
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
-                # Another site's name that resolves to the loopback address must not read from here.
+                # A foreign host name that resolves to the loopback address is refused.
                 if self.headers.get("Host") not in server._hosts:
                     self.send_error(403)
                 elif self.path != "/":
@@ -102,9 +102,9 @@ class PageHandle:
         return f"<{type(self).__name__} at {self.url}>"
 
     def _repr_html_(self) -> str:
-        # Notebooks show the page itself: where they run on another machine, this one's address leads nowhere.
+        # Notebooks embed the page: the address is useless where they run on another machine.
         page = html.escape(self._page)
-        return f'<iframe srcdoc="{page}" width="100%" height="{_CELL}" style="border: none"></iframe>'
+        return f'<iframe srcdoc="{page}" width="100%" height="{_PAGE_HEIGHT}" style="border: none"></iframe>'
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -140,7 +140,7 @@ def view(
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    return _served(animation_page(result, forces, ghost, finger), open_browser, block)
+    return _serve(animation_page(result, forces, ghost, finger), open_browser, block)
 
 
 def view_forces(
@@ -166,21 +166,21 @@ def view_forces(
     Raises:
         InputError: If the finger is not made of links.
     """
-    return _served(posture_page(finger, forces, tension), open_browser, block)
+    return _serve(posture_page(finger, forces, tension), open_browser, block)
 
 
-def opened(url: str, open_browser: bool | None, block: bool | None) -> bool:
+def open_page(url: str, open_browser: bool | None, block: bool | None) -> bool:
     """Open a page in the user's browser, and return whether to serve it until Ctrl-C.
 
-    Where no browser can be opened, nobody would look at it: then it is served for ever only if that was asked for.
+    Where no browser can be opened the page is served until Ctrl-C only with ``block``.
 
     Args:
         url: Address of the page.
         open_browser: Whether to open it; by default unless a notebook shows it.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
     """
-    wanted = not in_notebook() if open_browser is None else open_browser
-    failed = wanted and not webbrowser.open(url, new=2)
+    use_browser = not in_notebook() if open_browser is None else open_browser
+    failed = use_browser and not webbrowser.open(url, new=2)
     if block is not None:
         return block
     if sys.flags.interactive or "ps1" in vars(sys) or in_notebook():
@@ -190,9 +190,9 @@ def opened(url: str, open_browser: bool | None, block: bool | None) -> bool:
     return not failed
 
 
-def _served(page: str, open_browser: bool | None, block: bool | None) -> PageHandle:
-    viewing = PageHandle(page)
-    if opened(viewing.url, open_browser, block):
-        print(f"The finger moves at {viewing.url} (Ctrl-C ends this)", flush=True)
-        viewing.wait()
-    return viewing
+def _serve(page: str, open_browser: bool | None, block: bool | None) -> PageHandle:
+    handle = PageHandle(page)
+    if open_page(handle.url, open_browser, block):
+        print(f"The finger moves at {handle.url} (Ctrl-C ends this)", flush=True)
+        handle.wait()
+    return handle

@@ -17,10 +17,10 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.progress import notebook_bar
-from finger_pin.studies.dataset import assemble, checked
+from finger_pin.studies.dataset import assemble, require_complete
 from finger_pin.studies.designs import Design, Grid
 from finger_pin.studies.keys import BaseScenario, Value
-from finger_pin.studies.metrics import Metric, metrics_of
+from finger_pin.studies.metrics import Metric, scenario_metrics
 from finger_pin.studies.records import Progress, open_study
 
 PRODUCTS = ["sweep.nc", "figures/sweep.png"]
@@ -60,7 +60,7 @@ def sweep(
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         retry_failed: Whether to repeat runs that failed before.
         progress: Called with the numbers of finished, failed and all runs; in a notebook there is a bar by default.
-        stop: Asked now and then; true ends the sweep there, with ``status`` missing where it has not been.
+        stop: Called now and then; true ends the sweep, with ``status`` missing for the runs that were not made.
 
     Returns:
         A variable per metric, ``status`` and ``reason``; a dimension per key of a grid, else the dimension ``sample``.
@@ -73,9 +73,9 @@ def sweep(
         ExecutorError: If the executor cannot go on.
     """
     design = Grid(over) if isinstance(over, Mapping) else over
-    _refuse_varied(overrides or {}, design)
+    _check_overrides(overrides or {}, design)
     base = BaseScenario.from_scenario(scenario, overrides, finger)
-    chosen = metrics_of(base.scenario, metrics)
+    chosen = scenario_metrics(base.scenario, metrics)
     for key, values in design.values.items():
         base.check(key, values, alone=len(design.values) == 1)
     with open_study(base, chosen, output, PRODUCTS, executor, stop, restart) as study:
@@ -83,10 +83,10 @@ def sweep(
         result = assemble(base.scenario, design, chosen, records)
         if output is not None:
             save(result, Path(output) / "sweep.nc")
-    return checked(result, study.token.cancelled)
+    return require_complete(result, study.token.cancelled)
 
 
-def _refuse_varied(overrides: Mapping[str, Any], design: Design) -> None:
+def _check_overrides(overrides: Mapping[str, Any], design: Design) -> None:
     """Refuse an override of an entry that a key of the design replaces: itself, or one of a finger, hand or motor."""
     for name in (split(key)[0].removesuffix(".base") for key in design.values if split(key)[1] is None):
         for entry in overrides:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from finger_pin.cancellation import CancelToken
-from finger_pin.commands.console import bar, noted, print_text, talks
+from finger_pin.commands.console import bar, error_note, print_text, shows_progress
 from finger_pin.commands.options import Quiet, Restart, Settings, folder_name, overrides
 
 
@@ -38,16 +38,18 @@ def identify(
     from finger_pin.identification.identify import identify
 
     if listed:
-        print_text(_listing())
+        from finger_pin.description.tables import list_benches
+
+        print_text("\n".join(["Benches", *(f"  {name:18}{title}" for name, title in list_benches().items())]))
         return
-    changed = overrides(settings)
+    changes = overrides(settings)
     folder = output or Path("results", folder_name(f"identify-{Path(bench).stem}", *settings))
     token = CancelToken()
-    with noted("the same command goes on from what is finished"):
-        with _progress(talks(quiet)) as progress, token:
+    with error_note("the same command goes on from what is finished"):
+        with _progress(shows_progress(quiet)) as progress, token:
             result = identify(
                 bench,
-                overrides=changed,
+                overrides=changes,
                 output=folder,
                 starts=starts,
                 seed=seed,
@@ -66,14 +68,8 @@ def identify(
             raise KeyboardInterrupt
 
 
-def _listing() -> str:
-    from finger_pin.description.tables import list_benches
-
-    return "\n".join(["Benches", *(f"  {name:18}{title}" for name, title in list_benches().items())])
-
-
 @contextmanager
-def _progress(shown: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Show a bar if asked, and give a function that takes the piece of work, how much of it is done, and its size."""
-    with bar(shown, "pieces") as show:
-        yield lambda words, done, total: show(done, total, text=words)
+def _progress(visible: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """Show a bar if asked, and yield a function of the name of a piece of work, the finished part, and its size."""
+    with bar(visible, "pieces") as show:
+        yield lambda label, done, total: show(done, total, text=label)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from finger_pin.cancellation import CancelToken
-from finger_pin.commands.console import complain, noted, print_text, progress_bar, talks
-from finger_pin.commands.options import Figures, Format, Quiet, Settings, folder_name, overrides, refuse_format, wrong
+from finger_pin.commands.console import error_note, print_error, print_text, progress_bar, shows_progress
+from finger_pin.commands.options import Figures, Format, Quiet, Settings, folder_name, invalid, overrides, refuse_format
 from finger_pin.exceptions import FingerPinError, IntegrationError, Interrupted, ScenarioWarning
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class NotDrawn(FingerPinError):
-    """Figures or animation cannot be drawn; the data are kept."""
+    """Raised when figures or animation cannot be drawn; the data are kept."""
 
 
 def simulate(
@@ -50,27 +50,27 @@ def simulate(
     listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers, hands, methods, and exit.")] = False,
 ) -> None:
     """Simulate a scenario, write its results, and print a summary."""
-    changed = overrides(settings, duration=duration, method=method)
+    changes = overrides(settings, duration=duration, method=method)
     refuse_format(figures, format)
     if scenario is not None and mujoco is not None:
-        raise wrong("SCENARIO", f"{scenario}: --mujoco takes its place")
+        raise invalid("SCENARIO", f"{scenario}: --mujoco takes its place")
     if listed:
         print_text(listing())
         return
     from finger_pin.description.loading import load_scenario
-    from finger_pin.simulation.convergence import tightened
-    from finger_pin.simulation.recording import only
+    from finger_pin.simulation.convergence import scenario_to_repeat
+    from finger_pin.simulation.recording import select
     from finger_pin.simulation.result_folder import ResultFolder
 
     loaded = (
-        load_scenario("fig6" if scenario is None else scenario, changed)
+        load_scenario("fig6" if scenario is None else scenario, changes)
         if mujoco is None
-        else _hand(mujoco, changed, quiet)
+        else _mujoco_scenario(mujoco, changes, quiet)
     )
     output = output or Path("results", default_name(loaded, settings, duration, method))
     if check:
-        tightened(loaded)
-    stored = None if variables is None else _stored(variables, loaded)
+        scenario_to_repeat(loaded)
+    names = None if variables is None else _read_variables(variables, loaded)
     with ResultFolder(output) as folder:
         token = CancelToken()
         result, problem = compute(loaded, token, quiet, check)
@@ -78,11 +78,11 @@ def simulate(
             assert problem is not None
             problem.add_note("nothing was computed")
             raise problem
-        with noted("earlier results are as they were"):
+        with error_note("earlier results are as they were"):
             with token:
-                folder.write(result if stored is None else only(result, [*stored, "convergence_difference"]))
-            trouble = draw(result, folder, token, figures, format)
-            problem = (problem or trouble) if token.cancelled else (trouble or problem)
+                folder.write(result if names is None else select(result, [*names, "convergence_difference"]))
+            drawing_problem = draw(result, folder, token, figures, format)
+            problem = (problem or drawing_problem) if token.cancelled else (drawing_problem or problem)
             with token:
                 folder.publish()
     if not quiet:
@@ -93,23 +93,23 @@ def simulate(
         problem.add_note(f"what was computed is in {output}")
         raise problem
     if view:
-        from finger_pin.views.viewer import view as show
+        from finger_pin.views.viewer import view as show_view
 
-        show(result, block=True)
+        show_view(result, block=True)
 
 
-def _stored(text: str, scenario: Scenario) -> list[str]:
+def _read_variables(text: str, scenario: Scenario) -> list[str]:
     """Return the names of the variables to store; pictures and summary are of all."""
     from finger_pin.control.closed_loop import ClosedLoop
-    from finger_pin.simulation.recording import refuse_unknown
+    from finger_pin.simulation.recording import check_variables
     from finger_pin.simulation.variables import variables
 
     names = [name.strip() for name in text.split(",")]
-    refuse_unknown("--variables", names, variables(ClosedLoop.from_scenario(scenario)))
+    check_variables("--variables", names, variables(ClosedLoop.from_scenario(scenario)))
     return names
 
 
-def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
+def _mujoco_scenario(path: Path, changes: dict[str, Any], quiet: bool) -> Scenario:
     """Return a scenario that moves the hand of a MuJoCo model; print the elements that are not carried over."""
     from finger_pin.description.demo_motion import demo_motion, idle_inputs
     from finger_pin.description.loading import read_scenario
@@ -118,14 +118,14 @@ def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
 
     with warnings.catch_warnings():
         if not quiet:
-            # It is in the list that is printed.
+            # The printed list has them.
             warnings.simplefilter("ignore", LeftOutWarning)
         description = from_mujoco(path, path.stem)
     if not quiet and description.tree.left_out:
         print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))
     if not quiet and (idle := idle_inputs(description)):
         print_text(f"Held at zero, as their controls have no range: {', '.join(idle)}\n")
-    return read_scenario(demo_motion(description), changed)
+    return read_scenario(demo_motion(description), changes)
 
 
 def default_name(scenario: Scenario, settings: list[str], duration: str | None, method: str | None) -> str:
@@ -139,27 +139,27 @@ def compute(
 ) -> tuple[xr.Dataset | None, BaseException | None]:
     """Return the result as far as it goes, its convergence if asked, and the exception that stopped it, or None."""
     from finger_pin.simulation.convergence import check_convergence
-    from finger_pin.simulation.running import run
+    from finger_pin.simulation.run import run
 
-    bar = progress_bar(talks(quiet), scenario.simulation.duration)
+    bar = progress_bar(shows_progress(quiet), scenario.simulation.duration)
     with bar as progress, token, warnings.catch_warnings():
-        # The summary says what it would say.
+        # The summary has these warnings.
         warnings.simplefilter("ignore", ScenarioWarning)
         try:
-            whole = run(scenario, progress=progress, stop=token)
+            result = run(scenario, progress=progress, stop=token)
         except (IntegrationError, Interrupted) as error:
             return error.result, error
         if not check:
-            return whole, None
+            return result, None
         try:
-            convergence = check_convergence(scenario, whole, progress=progress, stop=token)
-            return convergence.attach(whole), None
+            convergence = check_convergence(scenario, result, progress=progress, stop=token)
+            return convergence.attach(result), None
         except IntegrationError as error:
-            complain("simulate", f"convergence could not be checked: {error}")
+            print_error("simulate", f"convergence could not be checked: {error}")
         except Interrupted as error:
             error.add_note("before convergence was checked")
-            return whole, error
-    return whole, None
+            return result, error
+    return result, None
 
 
 def draw(
@@ -174,13 +174,13 @@ def draw(
 
         write_animation(result, folder.stage / "animation.html")
         if figures:
-            from finger_pin.views.plots import saving
+            from finger_pin.views.plots import figure_files
 
-            saving.draw_all(result, folder.stage / "figures", format=format)
+            figure_files.draw_all(result, folder.stage / "figures", format=format)
     except OSError:
         raise
     except (KeyboardInterrupt, Exception) as error:
-        # A result is worth more than its pictures.
+        # The result is kept without its pictures.
         folder.discard_views()
         if isinstance(error, KeyboardInterrupt):
             return error

@@ -1,4 +1,4 @@
-"""Play a scenario in the browser: the loop that steps it in real time, and the page that it is seen on."""
+"""Playground: the loop that steps a scenario in real time, and the page that shows it."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ import viser
 from finger_pin.exceptions import FingerPinError
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.views.playground.access import own_page_only
-from finger_pin.views.playground.pacing import Pacer
+from finger_pin.views.playground.pacer import Pacer
 from finger_pin.views.playground.panel import PAUSE, PLAY, RESET, STEP, Panel
 from finger_pin.views.playground.session import Session, save_pieces
 from finger_pin.views.playground.stage import Stage
-from finger_pin.views.viewer.viewing import opened
+from finger_pin.views.viewer.page_server import open_page
 
 # Height of the page in a notebook, pixels.
-_CELL = 620
+_PAGE_HEIGHT = 620
 # Time between two updates of the text and the plots, and between two looks for somebody who looks, s.
-_REPORTED, _IDLE = 0.1, 0.1
+_REPORT_PERIOD, _IDLE_PERIOD = 0.1, 0.1
 # What a press of Step simulates, s.
-_STEP = 0.02
+_STEP_DURATION = 0.02
 
 
 class Playground:
     """A scenario that is being played; a context manager that ends it.
 
     Attributes:
-        session: What is played.
+        session: The played scenario.
         url: Address of the page.
         playing: Whether time runs.
-        rate: Simulated seconds per second as they come.
+        rate: Actual simulated seconds per second.
         message: The last one on the page.
     """
 
@@ -45,7 +45,7 @@ class Playground:
         self.session, self.playing, self.message = session, True, ""
         self._folder, self._pacer = folder, Pacer()
         self._jobs: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        self._closed, self._reported = threading.Event(), 0.0
+        self._closed, self._report_time = threading.Event(), 0.0
         with own_page_only(host):
             self._server = viser.ViserServer(host=host, port=port, label=session.scenario.name, verbose=False)
         self.url = f"http://{host}:{self._server.get_port()}/"
@@ -57,10 +57,10 @@ class Playground:
 
     @property
     def rate(self) -> float:
-        """Simulated seconds per second as they come."""
+        """Actual simulated seconds per second."""
         return self._pacer.rate
 
-    def later(self, job: Callable[[], None]) -> None:
+    def schedule(self, job: Callable[[], None]) -> None:
         """Run a job between two steps, and show its error if it is refused."""
         self._jobs.put(job)
 
@@ -71,14 +71,14 @@ class Playground:
             self._pacer.restart()
         elif button == STEP:
             self.playing = False
-            self._advance(_STEP)
+            self._advance(_STEP_DURATION)
         elif button == RESET:
             self.session.reset()
-            self._panel.let_go()
-            self._panel.follow()
+            self._panel.hide_crosses()
+            self._panel.update_sliders()
 
     def set_speed(self, speed: float) -> None:
-        """Change how fast time runs."""
+        """Change the speed of time."""
         self._pacer.speed = speed
         self._pacer.restart()
 
@@ -90,7 +90,7 @@ class Playground:
             return
         pieces = self.session.stop()
         self.message = "saving the record ..."
-        # A record is repeated to find its signals, which takes about as long as it did: time runs on meanwhile.
+        # A record is simulated again for its signals, which takes about as long, while time runs on.
         threading.Thread(target=self._save, args=(pieces,), daemon=True).start()
 
     def _save(self, pieces: Sequence[Simulator]) -> None:
@@ -103,55 +103,55 @@ class Playground:
 
     def _advance(self, duration: float) -> float:
         """Step by a time, unless that takes too long; return the simulated time, s."""
-        period, done = self.session.inputs.period, 0.0
-        while done + 0.999 * period <= duration and not (self.playing and self._pacer.late):
+        period, simulated = self.session.inputs.period, 0.0
+        while simulated + 0.999 * period <= duration and not (self.playing and self._pacer.is_late):
             self.session.step()
-            done += period
-        return done
+            simulated += period
+        return simulated
 
     def _run(self) -> None:
         while not self._closed.is_set():
             if not self._server.get_clients():
-                # Nobody looks.
+                # No browser is connected.
                 self._pacer.restart()
-                self._closed.wait(_IDLE)
+                self._closed.wait(_IDLE_PERIOD)
                 continue
             try:
-                self._work()
+                self._run_jobs()
                 if self.playing:
-                    self._pacer.stepped(self._advance(self._pacer.due()))
+                    self._pacer.finish_frame(self._advance(self._pacer.start_frame()))
                 else:
-                    self._pacer.due()
+                    self._pacer.start_frame()
                 self._draw()
             except FingerPinError as error:
-                self._refuse(str(error), error)
-            self._closed.wait(self._pacer.rest())
+                self._show_error(str(error), error)
+            self._closed.wait(self._pacer.idle_time())
 
-    def _work(self) -> None:
-        """Run the jobs that the page has asked for; errors are shown, and playing goes on."""
+    def _run_jobs(self) -> None:
+        """Run the jobs of the page; errors are shown, and playing goes on."""
         with suppress(queue.Empty):
             while True:
                 job = self._jobs.get_nowait()
                 try:
                     job()
                 except FingerPinError as error:
-                    self._refuse(str(error), error)
+                    self._show_error(str(error), error)
                 except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
                     self.message = f"refused: {type(error).__name__}: {error}"
 
-    def _refuse(self, text: str, error: FingerPinError) -> None:
+    def _show_error(self, text: str, error: FingerPinError) -> None:
         self.message = text
-        # A motion that cannot go on stands still until it is reset.
+        # After a failed integration the motion is paused until it is reset.
         self.playing = self.playing and not isinstance(error, RuntimeError)
 
     def _draw(self) -> None:
         reading, now = self.session.reading(), time.perf_counter()
         with self._server.atomic():
             self._stage.show(reading)
-            if now - self._reported > _REPORTED:
-                self._reported = now
+            if now - self._report_time > _REPORT_PERIOD:
+                self._report_time = now
                 self._panel.show(reading)
-                self._panel.report(reading.time, self.rate, self._pacer.slow, self.message)
+                self._panel.report(reading.time, self.rate, self._pacer.is_slow, self.message)
 
     def wait(self) -> None:
         """Play until the user interrupts (Ctrl-C)."""
@@ -173,7 +173,7 @@ class Playground:
         return f"<{type(self).__name__} of {self.session.scenario.name} at {self.url}>"
 
     def _repr_html_(self) -> str:
-        return f'<iframe src="{self.url}" width="100%" height="{_CELL}" style="border: none"></iframe>'
+        return f'<iframe src="{self.url}" width="100%" height="{_PAGE_HEIGHT}" style="border: none"></iframe>'
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -188,10 +188,10 @@ def serve(
     session: Session, host: str, port: int, folder: Path, open_browser: bool | None, block: bool | None
 ) -> Playground:
     """Play a session, as `finger_pin.views.playground.play` says."""
-    playing = Playground(session, host, port, folder)
-    if opened(playing.url, open_browser, block):
+    playground = Playground(session, host, port, folder)
+    if open_page(playground.url, open_browser, block):
         if host not in ("127.0.0.1", "localhost"):
             print(f"Whoever reaches {host} on the network can play too", flush=True)
-        print(f"Play at {playing.url} (Ctrl-C ends this)", flush=True)
-        playing.wait()
-    return playing
+        print(f"Play at {playground.url} (Ctrl-C ends this)", flush=True)
+        playground.wait()
+    return playground
