@@ -6,7 +6,7 @@ from . import mujoco as mujoco
 from . import studies as studies
 from . import views as views
 from .analysis.linearise import linearise as linearise
-from .description.finger import FingerDescription as FingerDescription
+from .description.finger_description import FingerDescription as FingerDescription
 from .description.loading import load_finger as load_finger
 from .description.loading import load_hand as load_hand
 from .description.loading import load_scenario as load_scenario

@@ -16,7 +16,7 @@ from pydantic_core import PydanticUndefined
 from finger_pin.commands.application import run_function
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.controller import ControllerSettings
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.objects import EnvironmentSettings
 from finger_pin.description.recordings.bench import IdentifySettings

@@ -20,7 +20,7 @@ from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.tableaus import rodas5p
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError

@@ -11,7 +11,7 @@ from finger_pin.commands.console import print_text
 from finger_pin.commands.options import Settings, invalid, overrides
 
 if TYPE_CHECKING:
-    from finger_pin.description.finger import FingerDescription
+    from finger_pin.description.finger_description import FingerDescription
     from finger_pin.description.scenario import Scenario
 
 #: What a file's name may end with.

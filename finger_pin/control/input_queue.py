@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.typing import Array
 

@@ -13,7 +13,7 @@ from finger_pin.control.input_queue import input_delays
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.core.inputs import InputTable, core_signal, scheduled_control
 from finger_pin.description.effects import wound_tendons
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import ForceSignal, InputSignal, SignalSettings

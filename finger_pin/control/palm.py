@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.inputs import InputTable, core_signal
-from finger_pin.description.finger import HandSettings
+from finger_pin.description.finger_description import HandSettings
 from finger_pin.description.objects import PATH as OBJECT_PATH
 from finger_pin.description.placement import PATH, PathSignal
 from finger_pin.laws.input_functions import base_motion

@@ -20,8 +20,8 @@ from finger_pin.core.evaluation.state_batches import STATES, States, evaluate_ma
 from finger_pin.core.inputs import InputTable, held_control
 from finger_pin.core.jit import call, empty_table, pack
 from finger_pin.core.linear_systems import Linear, build_linear
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.parameters import Parameters
 from finger_pin.core.structure import Structure
 from finger_pin.core.threads import in_threads, threads
 from finger_pin.laws.law import ContactLaw, Law

@@ -11,7 +11,7 @@ from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.state_batches import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
-from finger_pin.core.parameters import compile_mechanism
+from finger_pin.core.mechanism_parameters import compile_mechanism
 from finger_pin.description.caching import cached_property
 from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from finger_pin.core.axes import Subset
 from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.inputs import PLANNED, InputTable
-from finger_pin.core.parameters import Parameters
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.structure import Structure
 from finger_pin.description.caching import memoised
 

@@ -8,7 +8,7 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import StructType, Vector
 from finger_pin.core.linear_systems import Linear
-from finger_pin.core.parameters import Parameters
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.structure import Structure
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, field_serializer, field_validator
 
 from finger_pin.description.fields import flatten, unflatten
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.signals import ForceSignal, InputSignal, SpoolAngle, VoltageSignal, WoundLength, check_axes
 from finger_pin.description.tables import dump_set_fields
 from finger_pin.description.validation import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.tree_actuators import TreeActuator
 
 # Of the motion, Hz, and of the tensions of tendons that only pull, N.

@@ -14,7 +14,7 @@ import numpy as np
 import tomli_w
 
 from finger_pin.description.fields import find_field
-from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.recordings.signal_files import resolve_commands, resolve_signals
 from finger_pin.description.resolution import kind_of, override, read_scenario_file, refuse_other

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.caching import cached_property, memoised
 from finger_pin.description.cords import CordElement
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.typing import Array, Indices
 
 # Below this share of the largest, an internal tension counts as none.

@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.effects import CLOSED_LOOP, OF_SCENARIO, idle, shown
-from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.objects import EnvironmentSettings, Object
 from finger_pin.description.routing import Routing
 from finger_pin.description.signals import ReferenceSettings

@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand, problem
 from finger_pin.typing import Array

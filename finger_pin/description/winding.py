@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.parameters import Tendon, Winch
 from finger_pin.description.signals import SignalSettings
 from finger_pin.description.validation import problem, suggestion

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.tree_parts import Tip
 from finger_pin.description.validation import MOST_ANGLE, validate

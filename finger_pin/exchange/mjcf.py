@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.parameters import Link
 from finger_pin.description.scenario import Scenario

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.polynomial import Polynomial
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_parts import Coupling, Keyframe
 from finger_pin.exceptions import InputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.surface import Shaped, Surface
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import Body

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.tree_parts import Body, TreeTendon
 from finger_pin.description.validation import expand
 from finger_pin.description.waypoints import Waypoint

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.exceptions import InputError
 
 #: The plugin, and the actuator and tuple that `add_friction` makes.

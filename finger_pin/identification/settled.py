@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from finger_pin.analysis import equilibrium, steady_state
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.parameters import Winch
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError

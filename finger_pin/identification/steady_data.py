@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from finger_pin.analysis import steady_state
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError, ScenarioWarning

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.scenario import Scenario

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.typing import Array

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.caching import memoised
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import Link
 from finger_pin.exceptions import InputError

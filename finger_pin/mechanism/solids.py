@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.caching import memoised
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.objects import Object, inertia_matrix
 from finger_pin.description.parameters import Link
 from finger_pin.description.placement import Palm

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.caching import cached_property
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.tree_parts import TreeJoint
 from finger_pin.description.waypoints import Waypoint

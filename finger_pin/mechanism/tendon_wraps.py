@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from finger_pin.description.cords import CordPart
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 
 
 class Wrap(NamedTuple):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.routing import Routing
 from finger_pin.laws.actuator import ACTUATOR

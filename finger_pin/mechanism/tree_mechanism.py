@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.polynomial import Polynomial
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_parts import Coupling
@@ -192,13 +192,11 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
     limits = [each.limiter for each in limited.values()]
     # Law (9) whose level is its floor.
-    friction = [
-        (0, 0, each.friction / _DRY_STICTION, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()
-    ]
+    level = [(0, 0, each.friction / _DRY_STICTION, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()]
     return [
         ("tendon_spring", DEAD_BAND_SPRING, along(sprung), springs),
         ("tendon_limit", STROKE_LIMITER, along(limited), limits),
-        ("tendon_dry_friction", PIN_FRICTION, along(rubbing), friction),
+        ("tendon_dry_friction", PIN_FRICTION, along(rubbing), level),
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.caching import memoised
-from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.parameters import Link
 from finger_pin.description.scenario import Scenario

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree_parts import Body, Coupling, TreeJoint, TreeSolid
 from finger_pin.mechanism.tendon_paths import joint_placement, rotation

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Annotated, Any
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.parameters import per_item
 from finger_pin.description.validation import Description, quantity, real, suggestion, validate

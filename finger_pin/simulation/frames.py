@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.objects import Object
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, validate

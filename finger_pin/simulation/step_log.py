@@ -19,7 +19,7 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, IntegrationError

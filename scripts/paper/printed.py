@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.control.build import build_controller
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.recordings.csv_files import read_columns
 from finger_pin.references.reference import ReferenceSignals

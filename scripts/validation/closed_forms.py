@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from scipy.special import ellipj, ellipk
 
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.typing import Array

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import load_finger
 from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
 from finger_pin.typing import Array

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import load_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import load_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulator import Simulator

@@ -16,7 +16,7 @@ from finger_pin.core.evaluation.law_code import (
     TouchSlopeColumns,
     addresses,
 )
-from finger_pin.core.parameters import compile_mechanism
+from finger_pin.core.mechanism_parameters import compile_mechanism
 from finger_pin.exchange.mujoco_friction import ELEMENT, PIN, TENDON, Coefficients, ElementPlaces, PluginFriction
 from finger_pin.laws.law import Law, Row, Touch
 from finger_pin.mechanism.finger import Finger

@@ -14,7 +14,7 @@ from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.inputs import held_control, planned_control
 from finger_pin.core.islands import find_islands
 from finger_pin.core.jit import pack
-from finger_pin.core.parameters import compile_mechanism
+from finger_pin.core.mechanism_parameters import compile_mechanism
 from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper

@@ -11,7 +11,7 @@ import finger_pin as fp
 from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.inputs import held_control
 from finger_pin.core.islands import Selection, selections
-from finger_pin.core.parameters import compile_mechanism
+from finger_pin.core.mechanism_parameters import compile_mechanism
 from finger_pin.mechanism.mechanism import Mechanism
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.description.finger import HandSettings
+from finger_pin.description.finger_description import HandSettings
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.validation import validate
 

@@ -8,7 +8,7 @@ from paper.plot_workspace import plot_workspace
 
 import finger_pin as fp
 from finger_pin.analysis import force_polytope, self_locking_map
-from finger_pin.description.finger import HandSettings
+from finger_pin.description.finger_description import HandSettings
 from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views import plots, view_forces
 from finger_pin.views.viewer import write_animation

@@ -13,7 +13,7 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
-from finger_pin.core.parameters import Parameters
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.path_tables import PIECE, PathParameters, PathWork
 from finger_pin.core.structure import Structure
 

@@ -25,8 +25,8 @@ from finger_pin.core.collision.broad_phase import (
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import Model
-from finger_pin.core.parameters import Parameters
 from finger_pin.core.path_tables import LOOK, MAX_LOOKS, PIECE, PathWork
 from finger_pin.core.stepping.integration import Integration
 from finger_pin.core.structure import Structure

@@ -12,8 +12,8 @@ from finger_pin.core.evaluation.law_code import TOUCH_SLOPE as AT
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import MODEL
-from finger_pin.core.parameters import Parameters
 from finger_pin.core.structure import Structure
 
 

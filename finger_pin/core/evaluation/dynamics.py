@@ -17,8 +17,8 @@ from finger_pin.core.evaluation.rigid_body_dynamics import (
 )
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, call_value, njit_always_inline, njit_inline, unpack
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import MODEL
-from finger_pin.core.parameters import Parameters
 from finger_pin.core.structure import Structure
 
 

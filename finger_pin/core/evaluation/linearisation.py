@@ -12,8 +12,8 @@ from finger_pin.core.evaluation.rigid_body_dynamics import inverse_dynamics
 from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, call_at, call_filling, njit_always_inline, unpack
 from finger_pin.core.linear_systems import Linear
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import MODEL
-from finger_pin.core.parameters import Parameters
 from finger_pin.core.structure import Structure
 
 

@@ -19,8 +19,8 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import MODEL
-from finger_pin.core.parameters import Parameters
 from finger_pin.core.path_tables import PIECE, WRENCH, PathParameters, PathStructure
 from finger_pin.core.structure import Structure
 

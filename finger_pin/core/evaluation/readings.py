@@ -7,7 +7,7 @@ import numpy as np
 from finger_pin.core.evaluation.blocks import factorise, substitute
 from finger_pin.core.jit import Vector, njit_inline
 from finger_pin.core.linear_systems import Linear
-from finger_pin.core.parameters import Parameters
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.structure import Structure
 
 

@@ -15,7 +15,7 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.chains import BODY, PRISMATIC
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
-from finger_pin.core.parameters import Parameters
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.structure import Structure
 
 

@@ -25,8 +25,8 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import MODEL, Model
-from finger_pin.core.parameters import Parameters
 from finger_pin.core.structure import Structure
 
 

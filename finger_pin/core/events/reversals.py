@@ -16,8 +16,8 @@ import numpy as np
 
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.jit import Matrix, call_value, njit_always_inline, njit_inline
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import Model
-from finger_pin.core.parameters import Parameters
 from finger_pin.core.stepping.integration import Integration
 from finger_pin.core.structure import Structure
 

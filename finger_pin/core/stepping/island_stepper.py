@@ -15,7 +15,7 @@ from finger_pin.core.events.step_events import activate_contacts, step_events
 from finger_pin.core.inputs import InputTable
 from finger_pin.core.islands import Island
 from finger_pin.core.jit import Block, CompiledFunction, copied, pack
-from finger_pin.core.parameters import Parameters
+from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.adaptive import advance
 from finger_pin.core.stepping.knots import ADVANCE_KNOTTED_ARGS, AdvanceKnottedArgs, advance_knotted

@@ -13,7 +13,7 @@ from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.inputs import HELD, InputTable
 from finger_pin.core.islands import Island, selections
 from finger_pin.core.jit import copied
-from finger_pin.core.parameters import compile_mechanism
+from finger_pin.core.mechanism_parameters import compile_mechanism
 from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, failure
 from finger_pin.core.stepping.repetition import Steps

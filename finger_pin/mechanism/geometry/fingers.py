@@ -10,7 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.from_pinocchio import chain, finger_width, placed_solids, turned_model
 from finger_pin.mechanism.geometry.cord_pieces import Arc, Leg, WoundSpan

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.from_pinocchio import turned_model
 from finger_pin.mechanism.geometry.cord_pieces import LinkPoses, Piece, link_poses

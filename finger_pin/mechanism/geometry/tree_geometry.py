@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.cords import Cord
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.tree import LARGEST_RADIUS, Tree
 from finger_pin.description.tree_parts import TreeSolid

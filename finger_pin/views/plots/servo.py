@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.description.finger import FingerDescription
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.frames import read_scene
 from finger_pin.views.plots.lines import names, series, shade, times, trace
