@@ -13,7 +13,6 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import expand
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.references.reference import LoopReference, SignalReference
@@ -90,7 +89,7 @@ def self_locking_margin(
     cases = _extreme_bends(directions, (np.abs(motion.position) @ routing.curvature_matrix.T).sum(axis=1))
     signs, sliding = directions[cases, :size], directions[cases, size:]
     weights = signs * scenario.finger.numbers["joint_friction"][scenario.finger.joint_friction.break_away_entry]
-    gain = expand(scenario.controller.gain, size)
+    gain = scenario.numbers["gain"]
     # Without gain there is no lag that would say what passive tendons carry: they count as planned.
     gears = gear_shares(scenario.finger) if servos else np.ones((2, routing.actuated))
     loop = FrictionLoop.from_tendons(
@@ -133,7 +132,7 @@ def _movable_scale(
     """
     finger = Finger(scenario.finger)
     limits, actuated = np.array(tension_limits(finger)), finger.routing.actuated
-    minimum = expand(scenario.controller.minimum_tension, len(finger.routing.tendons))
+    minimum = scenario.numbers["minimum_tension"]
     weight = np.array([finger.static_torque(each) for each in position])
     drag = signs * finger.joint_friction.break_away_drag(signs)
 

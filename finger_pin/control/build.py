@@ -52,7 +52,7 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     if len(parts) > 1:
         return hand_controller([build_controller(part) for part in parts.values()], routing)
     scenario = next(iter(parts.values()))
-    settings = scenario.controller
+    settings, numbers = scenario.controller, scenario.numbers
     if settings.kind == "tensions":
         return OpenLoopTensions.from_scenario(scenario, routing)
     if scenario.finger.through_space:
@@ -61,17 +61,16 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     if settings.is_paper and has_closure:
         return ProportionalController.from_scenario(scenario, routing)
     finger = finger or Finger(scenario.finger)
-    joints, tendons = len(finger.routing.joints), len(finger.routing.tendons)
     springs = settings.spring_compensation or not has_closure
     controller = CompensatedController(
         routing=finger.routing,
         law=TorqueLaw(
-            gain=expand(settings.gain, joints),
-            damping=expand(settings.damping, joints),
+            gain=numbers["gain"],
+            damping=numbers["damping"],
             static=_static_torque(finger, settings.gravity_compensation, springs),
         ),
         distribution=_distribution(scenario, finger),
-        minimum=expand(settings.minimum_tension, tendons),
+        minimum=numbers["minimum_tension"],
         tendons=_feedforward(scenario, finger),
         joints=_joint_compensation(scenario, finger),
         fingertip=_fingertip(scenario, finger),
@@ -79,23 +78,21 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     loop = settings.passive_tension_loop
     if loop is None:
         return controller
-    target = expand(settings.passive_tension, finger.routing.passive)
-    return PassiveTensionLoop(controller, target, loop.proportional, loop.integral, loop.limit)
+    return PassiveTensionLoop(controller, numbers["passive_tension"], loop.proportional, loop.integral, loop.limit)
 
 
 def _routed(scenario: Scenario, finger: Finger) -> RoutedController:
     """Return the controller of a finger whose arms depend on the posture; warn of lost force closure."""
-    settings, size = scenario.controller, len(finger.routing.joints)
+    settings, numbers = scenario.controller, scenario.numbers
     closure = closure_over_range(finger)
     if not closure.holds:
         warnings.warn(f"{closure}: tendons go slack or turn joints there", ClosureWarning, stacklevel=4)
     law = TorqueLaw(
-        gain=expand(settings.gain, size),
-        damping=expand(settings.damping, size),
+        gain=numbers["gain"],
+        damping=numbers["damping"],
         static=_static_torque(finger, settings.gravity_compensation, settings.spring_compensation),
     )
-    minimum = expand(settings.minimum_tension, len(finger.routing.tendons))
-    return RoutedController(finger, law, minimum, _fingertip(scenario, finger))
+    return RoutedController(finger, law, numbers["minimum_tension"], _fingertip(scenario, finger))
 
 
 def _distribution(scenario: Scenario, finger: Finger) -> TensionDistribution:

@@ -17,7 +17,6 @@ from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import ForceSignal, InputSignal, SignalSettings
-from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, ReferenceSignals
@@ -51,7 +50,7 @@ class OpenLoopTensions(LoopController):
         winched = dict(zip(routing.tendons, routing.winched, strict=False))
         signals |= {name: each for name, each in (scenario.controller.tendon_winding or {}).items() if winched[name]}
         keyframe_inputs = scenario.keyframe.inputs if scenario.keyframe else {}
-        minimum = expand(scenario.controller.minimum_tension, len(routing.tendons))
+        minimum = scenario.numbers["minimum_tension"]
         settings: list[SignalSettings] = [
             signals.get(name) or _constant_tension(keyframe_inputs.get(name, float(tension)))
             for name, tension in zip(routing.tendons[: routing.actuated], minimum, strict=False)

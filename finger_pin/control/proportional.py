@@ -13,7 +13,6 @@ from finger_pin.control.torque import FingertipForce, TorqueLaw
 from finger_pin.core.inputs import InputTable, core_signal, planned_control
 from finger_pin.description.routing import ForceClosure, Routing
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import expand
 from finger_pin.laws.input_functions import internal_level, proportional_torque
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, ReferenceSignals
@@ -46,10 +45,8 @@ class ProportionalController(LoopController):
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> ProportionalController:
         """Read the paper's controller (19)-(22) of a scenario, without additions to it."""
-        gain = expand(scenario.controller.gain, len(routing.joints))
-        minimum = expand(scenario.controller.minimum_tension, len(routing.tendons))
-        damping = expand(scenario.controller.damping, len(routing.joints))
-        return cls.from_routing(routing, gain, minimum, damping)
+        numbers = scenario.numbers
+        return cls.from_routing(routing, numbers["gain"], numbers["minimum_tension"], numbers["damping"])
 
     @classmethod
     def from_routing(

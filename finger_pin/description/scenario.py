@@ -250,7 +250,7 @@ class Scenario(Description):
         if self.controller.kind == "proportional" and not closure.holds and not self.finger.through_space:
             self._check_taut(routing, str(closure))
         check_sources(self.finger, self.controller.tensions or {})
-        rest = expand(self.controller.minimum_tension, len(routing.tendons))
+        rest = self.numbers["minimum_tension"]
         if self.controller.kind == "proportional" and closure.holds:
             rest = closure.tension * np.max(rest / closure.tension)
         check_currents(self.finger.actuators, dict(zip(routing.tendons, rest, strict=True)))
@@ -269,8 +269,18 @@ class Scenario(Description):
             raise problem("finger.tendons", f"{missing}, and {tautness}; {_OPEN_LOOP_SETTING} can do without")
 
     def _tautness(self, routing: Routing) -> Tautness:
-        minimum = expand(self.controller.minimum_tension, len(routing.tendons))
-        return Tautness.from_finger(self.finger, routing, self.coupling(routing), minimum)
+        return Tautness.from_finger(self.finger, routing, self.coupling(routing), self.numbers["minimum_tension"])
+
+    @property
+    def numbers(self) -> dict[str, Array]:
+        """Numbers of the controller as arrays of one per joint, tendon or passive tendon, by entry."""
+        joints, settings = len(self.finger.joints), self.controller
+        return {
+            "gain": expand(settings.gain, joints),
+            "damping": expand(settings.damping, joints),
+            "minimum_tension": expand(settings.minimum_tension, len(self.finger.tendons)),
+            "passive_tension": expand(settings.passive_tension, len(self.finger.passive_names)),
+        }
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
         """Return the constraint of the passive tendons on the references (20)."""

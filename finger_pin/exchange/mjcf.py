@@ -18,7 +18,6 @@ from finger_pin.description.finger_description import FingerDescription, HandSet
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.parameters import Link
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_compliance import soft
 from finger_pin.exchange.mjcf_friction import add_friction_elements
@@ -193,10 +192,10 @@ def _add_links(
     size = len(links)
     first, last = next(iter(links)), next(reversed(links.values()))
     shapes_of_link = link_shapes(description, links)
-    damping = expand(description.joint_friction.viscous, size)
-    limiter = description.stroke_limiter
+    damping = description.numbers["joint_friction"]["viscous"]
+    limiter = description.numbers["stroke_limiter"]
     mobility = np.linalg.inv(build_rigid_body(description).mass_matrix(np.zeros(size)))
-    stiffness, damper = expand(limiter.stiffness, size), expand(limiter.viscous, size)
+    stiffness, damper = limiter["stiffness"], limiter["viscous"]
     if shapes:
         _add_shapes(body, palm_shapes(description, first, links[first]))
     position, twist = (0.0, 0.0, 0.0), 0.0

@@ -16,7 +16,6 @@ import pinocchio as pin
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.tree_parts import Body, TreeTendon
-from finger_pin.description.validation import expand
 from finger_pin.description.waypoints import Waypoint
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_compliance import IMPEDANCE, Mobility, quaternion, soft
@@ -107,7 +106,7 @@ class _Writer:
             squares.append(abs(actuator.by_length) * actuator.gear**2 * mobility)
         stops = [tendon.limit_stiffness * of_tendons[name] for name, tendon in tendons if tendon.range]
         if self.limits:
-            stiffness = expand(self.description.stroke_limiter.stiffness, len(of_joints))
+            stiffness = self.description.numbers["stroke_limiter"]["stiffness"]
             stops += (stiffness * [*of_joints.values()]).tolist()
         squares += [(1.0 - IMPEDANCE) / IMPEDANCE**2 * square for square in stops]
         return math.sqrt(max(1.0, *squares))
@@ -163,8 +162,8 @@ class _Writer:
         elif not is_fixed and not is_mocap:
             least = {"pos": "0 0 0", "mass": numbers(_NO_INERTIA), "diaginertia": numbers(*[_NO_INERTIA] * 3)}
             ET.SubElement(element, "inertial", least)
-        friction, size = self.description.joint_friction, len(self.tree.joints)
-        loss = np.maximum(expand(friction.floor, size), expand(friction.drag, size))
+        friction = self.description.numbers["joint_friction"]
+        loss = np.maximum(friction["floor"], friction["drag"])
         for k, (joint, moved) in enumerate(self.tree.joints.items()):
             if moved.body == name and not is_mocap:
                 place = {"axis": numbers(*moved.axis), "pos": numbers(*moved.anchor), "ref": numbers(moved.reference)}
@@ -185,8 +184,8 @@ class _Writer:
 
     def _joint(self, k: int, name: str) -> dict[str, str]:
         """Return spring, damper and range of a joint."""
-        joint, size = self.description.joints[name], len(self.tree.joints)
-        viscous = float(expand(self.description.joint_friction.viscous, size)[k]) * self.tree.joints[name].bearing
+        joint, values = self.description.joints[name], self.description.numbers
+        viscous = float(values["joint_friction"]["viscous"][k]) * self.tree.joints[name].bearing
         spring = joint.spring
         attributes = {"damping": numbers(viscous + (spring.damping if spring else 0.0))}
         if spring is not None:
@@ -194,8 +193,7 @@ class _Writer:
         limited = joint.limited and self.limits
         attributes |= {"range": numbers(*joint.range), "limited": str(limited).lower()}
         if limited:
-            stops = self.description.stroke_limiter
-            stiffness, damper = (float(expand(each, size)[k]) for each in (stops.stiffness, stops.viscous))
+            stiffness, damper = (float(values["stroke_limiter"][entry][k]) for entry in ("stiffness", "viscous"))
             attributes |= soft(stiffness, damper, self.mobility.joints[name], "limit", stop=True)
         return attributes
 

@@ -15,7 +15,6 @@ from finger_pin.cancellation import CancelToken
 from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.identification.checkpoint import Checkpoint, digest
 from finger_pin.identification.comparison import other_laws
@@ -167,10 +166,10 @@ def _run_pipeline(
 def _undamped_joints(scenario: Scenario, problem: Problem) -> list[str]:
     """Return the undamped joints in motions: where friction holds them they ring, in ten times the steps."""
     finger, joints = scenario.finger, list(scenario.finger.joints)
-    friction = finger.joint_friction
-    damped = np.add(expand(friction.viscous, len(joints)), expand(friction.micro_damping, len(joints)))
+    friction = finger.numbers["joint_friction"]
+    damped = friction["viscous"] + friction["micro_damping"]
     damped += [0.0 if joint.spring is None else joint.spring.damping for joint in finger.joints.values()]
-    tendons_damp = bool(np.any(expand(finger.tendon_friction.viscous, len(finger.tendons)) > 0.0))
+    tendons_damp = bool(np.any(finger.numbers["tendon_friction"]["viscous"] > 0.0))
     settings = [model.recording.settings for model in problem.models]
     computed = any(each.kind == "motion" and not each.imposed for each in settings)
     if tendons_damp or not computed:

@@ -14,7 +14,6 @@ from finger_pin.control.motor_signals import spool_windings, voltage_signals
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.position_drive import SteppedDrives, spool_goals
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
@@ -91,7 +90,7 @@ class Inputs:
         self._voltage_signals = voltage_signals(scenario, loop.finger, "motor_voltage")
         self._supply_signals = voltage_signals(scenario, loop.finger, "supply_voltage")
         parts = scenario.parts().values()
-        self._damping = np.concatenate([expand(each.controller.damping, len(each.finger.joints)) for each in parts])
+        self._damping = np.concatenate([part.numbers["damping"] for part in parts])
 
     def reset(self) -> None:
         """Return to the motion of the scenario."""
