@@ -66,8 +66,8 @@ def fig6_progress():
 
 @pytest.fixture(scope="session")
 def fig6_runs(fig6_progress):
-    """The first 0.1 s of reversals by every method at the default tolerances."""
-    scenarios = {each: {"simulation.duration": 0.1, "simulation.method": each} for each in METHODS}
+    """The first 0.05 s of reversals by every method at the default tolerances."""
+    scenarios = {each: {"simulation.duration": 0.05, "simulation.method": each} for each in METHODS}
     return {
         method: fp.simulate(fp.load_scenario("reversals", changed), progress=fig6_progress[method].append)
         for method, changed in scenarios.items()

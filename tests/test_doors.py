@@ -135,7 +135,7 @@ def hand(request, tmp_path_factory):
 @pytest.mark.slow
 def test_a_hand_is_taken_where_a_finger_is(hand):
     assert fp.Simulator(hand).finger.routing.joints == tuple(fp.load_scenario("hand").finger.joints)
-    assert fp.analysis.closure_over_range(hand, samples=8).holds
+    assert fp.analysis.closure_over_range(hand, samples=2).holds
 
 
 def test_of_a_scenario_its_finger_or_hand_is_taken(tmp_path):

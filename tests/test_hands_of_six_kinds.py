@@ -121,12 +121,13 @@ def hand(request, tmp_path_factory):
     (folder / "s.toml").write_text(fp.to_toml(scenario))
     result = fp.simulate(scenario)
     fp.save(result, folder / "r.nc")
-    return SimpleNamespace(folder=folder, description=description, scenario=scenario, result=result)
+    built = fp.Finger(description)
+    return SimpleNamespace(folder=folder, description=description, scenario=scenario, result=result, built=built)
 
 
 def argument(name, door, hand):
     """Return what a door is given for an argument."""
-    description, scenario, result, built = hand.description, hand.scenario, hand.result, fp.Finger(hand.description)
+    description, scenario, result, built = hand.description, hand.scenario, hand.result, hand.built
     channels = built.mechanism.channels
     paths = {"save": "saved.nc", "write_animation": "page.html", "write_video": "film.mp4"}
     makers = {

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pytest
@@ -74,6 +75,12 @@ def test_joint_friction_grows_with_the_sum_of_the_tensions(finger):
     np.testing.assert_allclose(levels[2], 10.0 * levels[0], rtol=1e-9)
 
 
+@cache
+def stepped(**settings):
+    """Abduction, asked for a step of 0.05 rad."""
+    return run(Ramp(posture(0.0, 1.0), posture(0.05, 1.0), 0.06), 0.12, **settings).sel(joint="abduction")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kinetic", "excess"),
@@ -88,11 +95,8 @@ def test_high_tensions_or_friction_grip_a_phalanx(kinetic, excess):
 
     Without help from the tendons' friction its deflection x solves K_P (step - x) = L (1 - exp(-s0 x / L)), L = M^d R.
     """
-    step = 0.05
-    reference = Ramp(posture(0.0, 1.0), posture(step, 1.0), 0.06)
-    free = run(reference, 0.12).joint_position.sel(joint="abduction").values
-    gripped = run(reference, 0.12, **excess).sel(joint="abduction")
-    assert free[-1] > 0.8 * step
+    step, gripped = 0.05, stepped(**excess)
+    assert float(stepped().joint_position[-1]) > 0.8 * step
     level = kinetic * float(gripped.joint_reaction.min())
     deflection = scipy.optimize.brentq(lambda x: step - x - level * (1.0 - math.exp(-5.0 * x / level)), 0.0, step)
     assert float(abs(gripped.joint_position).max()) < deflection < 0.3 * step

@@ -31,19 +31,21 @@ PAGES = [ROOT / "README.md", ROOT / "finger_pin" / "QUESTIONS.md", *sorted(ROOT.
 LINKED = [*PAGES, *sorted(set(ROOT.glob("[fst]*/**/*.md")) - set(PAGES))]
 DURATION = 0.02
 SHORTER = {
+    r"(--method Radau) --duration \S+": r"\1 --duration=0.004",
     r"--duration \S+": f"--duration {DURATION}",
     r":7\b": ":2",
     r":6:log": ":2:log",
     r"--samples \d+": "--samples 2",
     r"(cliffs\.py) \d+": r"\1 1",
     r"(flights\.py --count) \d+": r"\1 1",
-    r"(intervals\.py) \d+": r"\1 2",
+    r"(flights\.py --falls) \d+": r"\1 1",
+    r"(intervals\.py) \d+": r"\1 1",
     r"(validate\.py)( --only \S+)?$": r"\1 --only kinematics",
     r"force_capability\.py$": "force_capability.py ub --posture 0,30,30,20 --limit 15 --force 0,0,1 --view",
-    r"conclusions\.py$": "conclusions.py reversals --only a",
+    r"conclusions\.py( reversals)?$": "conclusions.py reversals --only a",
     r"reaction\.py$": "reaction.py reversals --forces 1",
     # What it finds has a test of its own.
-    r"(identify\.py) (winding|servo_pendulum|postures|spool_finger|instrument).*": r"\1 --list any",
+    r"(identify\.py) (winding|servo_pendulum|postures|spool_finger|instrument|second_instrument).*": r"\1 --list any",
     # It fits benches under every law.
     r"(compare_laws\.py).*": r"\1 transmission",
     # It fits for minutes.
@@ -81,6 +83,9 @@ def shown(tmp_path_factory):
         shutil.copytree(Path(tables.__file__).parent / kind, shipped / kind)
     for path in (shipped / "scenarios").iterdir():
         path.write_text(re.sub(r"(?m)^duration = .*", f"duration = {DURATION}", path.read_text("utf-8")), "utf-8")
+    printed = shipped / "benches" / "fig6.toml"
+    # Two of its many parameters are sought.
+    printed.write_text(re.sub(r'(?m)^"finger\..*\n', "", printed.read_text("utf-8")), "utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         for module in (tables, resolution):

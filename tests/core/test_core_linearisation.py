@@ -118,7 +118,11 @@ def held(case):
     return replace(still, loop=replace(case.loop, controller=Held(tuple(still.control.tension))))
 
 
-@pytest.fixture(scope="module", params=[*LOOPS, "reversals_held", "two_passive_pushed_held", "lugre_held"])
+PUSHED = [name for name in LOOPS if name.endswith("_pushed")]
+FEW = ["reversals", "carried", "reversals_held", "two_passive_pushed_held", "lugre_held"]
+
+
+@pytest.fixture(scope="module", params=[*PUSHED, *FEW])
 def examined(request, cases):
     """A loop, and the states at which its right-hand side is smooth nearby."""
     name = request.param

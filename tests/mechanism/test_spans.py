@@ -1,6 +1,7 @@
 """Length, turn, pull and slopes of spans: against MuJoCo, against closed forms and differences, and compiled."""
 
 import math
+from functools import cache
 
 import mujoco
 import numba
@@ -142,10 +143,9 @@ def test_points_in_line_with_the_centre_have_a_path(span):
     assert np.isfinite(slopes(span, y, numbers("inside"))[1]).all()
 
 
-@pytest.mark.slow
-@every_case
-def test_compiled_spans_agree(span, side):
-    p = numbers(side)
+@cache
+def compiled(span):
+    """Return a compiled function that fills the value of a span and its slopes."""
     compiled_value, compiled_slopes = inlined(span.value), inlined(span.slopes)
 
     @numba.njit(error_model="numpy")
@@ -153,6 +153,13 @@ def test_compiled_spans_agree(span, side):
         compiled_value(y, p, out)
         compiled_slopes(y, p, slopes)
 
+    return both
+
+
+@pytest.mark.slow
+@every_case
+def test_compiled_spans_agree(span, side):
+    p, both = numbers(side), compiled(span)
     for y in postures(span, p, 20):
         out, found = np.zeros(8), np.zeros(42)
         both(y, p, out, found)

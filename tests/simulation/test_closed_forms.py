@@ -9,8 +9,7 @@ from validation.closed_forms import SLIDING, one_joint, slide
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("exponent", [1, 2])
-@pytest.mark.parametrize("micro", [0.0, 2.0])
+@pytest.mark.parametrize(("exponent", "micro"), [(1, 0.0), (2, 2.0)])
 @pytest.mark.parametrize(("velocity", "sign"), [(1e-3, -1.0), (-1e-3, 1.0)])
 def test_pulling_and_releasing_lose_tension_by_the_capstan_law(velocity, sign, exponent, micro):
     law = SLIDING | {"stribeck_exponent": exponent, "micro_damping": micro}
@@ -27,7 +26,7 @@ def test_the_hysteresis_loop_of_a_tendon_is_twice_the_tension_times_sinh_wide():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ratio", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("ratio", [1.0, 2.0])
 def test_a_tendon_breaks_away_at_rho_times_its_sliding_friction_for_its_normal_force(ratio):
     """Friction over normal force: rho mu^d far below the Stribeck velocity, mu^d far above it."""
     static, kinetic = (closed_forms.friction_coefficient(ratio, velocity) for velocity in (1e-9, 1.0))

@@ -64,8 +64,8 @@ def test_the_account_of_a_hand_is_the_sum_of_its_fingers(scenario, result):
 
 @pytest.mark.slow
 def test_the_textbook_evaluation_gives_the_signals_of_the_compiled_hand(scenario, result):
-    """Radau on NumPy and Pinocchio, for a hundredth of a second."""
-    short = fp.load_scenario("hand", {"simulation.duration": 0.002, "simulation.method": "Radau"})
+    """Radau on NumPy and Pinocchio, for a thousandth of a second."""
+    short = fp.load_scenario("hand", {"simulation.duration": 0.001, "simulation.method": "Radau"})
     slow = fp.simulate(short)
     near = result.sel(time=slow.time)
     np.testing.assert_allclose(slow.joint_position, near.joint_position, rtol=0.0, atol=1e-7)

@@ -29,7 +29,7 @@ def share_left_open(loop, duration=0.015):
         rtol=1e-6,
         atol=1e-6 * loop.finger.layout.scales(),
         watch=lambda time, x: steps.append(time),
-        stop=lambda: len(steps) == 600,
+        stop=lambda: len(steps) == 300,
     )
     times = np.linspace(0.0, trajectory.breakpoints[-1], 101)
     x = trajectory.interpolate(times)

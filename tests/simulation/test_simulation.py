@@ -189,9 +189,9 @@ def test_a_sampled_controller_is_asked_once_a_period_and_held_between():
     assert float(abs(result.energy_residual).max()) < 1e-5 * float(abs(result.energy_exchanged_actuators).max())
 
 
-def test_a_sampled_controller_approaches_the_continuous_one_in_proportion_to_its_period(fig6_runs):
+def test_a_sampled_controller_approaches_the_continuous_one_in_proportion_to_its_period():
     scenario = fp.load_scenario("reversals", {"simulation.duration": 0.1})
-    reference = fig6_runs["Rodas5P"].joint_position
+    reference = fp.simulate(scenario).joint_position
     differences = [
         float(abs(fp.simulate(scenario, control_period=period).joint_position - reference).max())
         for period in (1e-3, 1e-4)

@@ -97,9 +97,8 @@ def nothing_overlaps(figure):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", ["column", "page"])
+@pytest.mark.parametrize(("width", "titles"), [("column", True), ("column", False), ("page", True)])
 @pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
-@pytest.mark.parametrize("titles", [True, False])
 def test_nothing_overlaps_and_nothing_is_cut_off_at_any_width_and_after_enlarging(draw, width, titles):
     figure = draw(synthetic(), width=width, titles=titles)
     assert figure.get_figwidth() == {"column": 3.5, "page": 7.16}[width]

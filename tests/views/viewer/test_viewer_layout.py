@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from closed_kinematics import equation_1
 from motion import joint_position
-from pages import opened, seek
+from pages import opened, painted, seek
 from selenium.webdriver.support.ui import WebDriverWait
 
 import finger_pin as fp
@@ -111,17 +111,18 @@ def test_colours_of_tensions_have_a_scale_only_where_there_is_tension(browser, r
     assert shown == [pull > 0.0, True]
 
 
-@pytest.mark.parametrize("size", [(390, 844), (844, 390), (1400, 900)])
-def test_no_table_is_cut_and_nothing_lies_over_the_page(browser, tmp_path, result, size):
-    hand = fp.simulate(fp.load_scenario("hand", {"simulation.duration": 0.01}))
-    shape = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size[0] < 500}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", shape)
+@pytest.mark.parametrize("whole", [False, True], ids=["a finger", "a hand"])
+def test_no_table_is_cut_and_nothing_lies_over_the_page(browser, tmp_path, result, whole):
+    shown = fp.simulate(fp.load_scenario("hand", {"simulation.duration": 0.01})) if whole else result
+    page = opened(browser, write_animation(shown, tmp_path / "page.html").as_uri())
+    # A joint that rounding has turned by less than nothing.
+    page.execute_script("fingerPlayer.frames.columns.joint.data.fill(-1e-5)")
     try:
-        for each in (result, hand):
-            page = opened(browser, write_animation(each, tmp_path / "page.html").as_uri())
-            page.execute_script("document.getElementById('readings').open = true")
-            # A joint that rounding has turned by less than nothing.
-            page.execute_script("fingerPlayer.frames.columns.joint.data.fill(-1e-5); fingerPlayer.seek(0)")
+        for width, height in ((390, 844), (844, 390), (1400, 900)):
+            shape = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
+            page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", shape)
+            painted(page)
+            page.execute_script("document.getElementById('readings').open = true; fingerPlayer.seek(0)")
             assert page.find_elements("css selector", "#joints td.value")[-1].text in ("0°", "0.0°")
             panel, table, over = page.execute_script("""
             const bottom = (id) => document.getElementById(id).getBoundingClientRect().bottom;
