@@ -29,15 +29,15 @@ def test_slopes_where_the_steps_of_a_run_do_not_bear_other_numbers_are_those_of_
     data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
     asked = problem(data)
     expected = np.concatenate(asked.slopes(asked.start))
-    nearby = motions.nearby
+    repeat_steps = motions.repeat_steps
 
     def failed(trajectory, others):
         """Return runs of which some have ended early, and tell nothing."""
-        runs = nearby(trajectory, others)
+        runs = repeat_steps(trajectory, others)
         ended = [replace(each, failure="singular", interpolate=_nothing(each)) for each in runs]
         return ended if failing == "all" else [runs[0], *ended[1:]]
 
-    monkeypatch.setattr(motions, "nearby", failed)
+    monkeypatch.setattr(motions, "repeat_steps", failed)
     slopes = np.concatenate(problem(data).slopes(asked.start))
     assert np.sqrt(np.mean((slopes - expected) ** 2)) < 0.03 * np.sqrt(np.mean(expected**2))
 
