@@ -97,8 +97,9 @@ class Cord(NamedTuple):
             last: Index behind the last one.
         """
         trunk = CordPart(1.0, self.elements[first:last])
+        shares = [(1.0 / part.divisor, part.crossed) for part in (trunk, *self.parts[1:])]
         for joint in joints:
-            yield sum(1.0 / part.divisor for part in (trunk, *self.parts[1:]) if joint in part.crossed)
+            yield sum(share for share, crossed in shares if joint in crossed)
 
 
 def check_tendons(tendons: Mapping[str, Tendon], joints: tuple[str, ...], paths: tuple[str, ...]) -> None:
