@@ -25,6 +25,9 @@ LEAST_TOLERANCES = {"rtol": LEAST_RTOL, "atol_scale": LEAST_ATOL_SCALE}
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
 # radian, and steps follow it if they are shorter than so many radians.
 _SLOW_STEPS, _SHORT_STEP, _LEAST_DECAY, _RADIANS_PER_STEP = 50_000, 5e-6, 0.1, 6.0
+# Samples, a mean step apart, in which a swing is looked for; fewer cycles in them do not make steps short; and the part
+# by which its frequency differs from that of a mode that rings.
+_SWING_SAMPLES, _LEAST_CYCLES, _SAME_FREQUENCY = 8192, 20, 0.2
 # A contact is too stiff where a newton presses it in by so small a part of what positions are computed to.
 _LEAST_DEPTH_SHARE = 1e-4
 
@@ -69,25 +72,51 @@ def account_warning(result: xr.Dataset, share: float) -> str:
 
 
 def ringing_warning(loop: ClosedLoop, trajectory: Trajectory) -> str:
-    """Return the warning about a mass that rings undamped and makes steps short, with its frequency, or empty.
+    """Return the warning about what rings or swings and makes steps short, with its frequency, or empty.
 
-    The modes are those of the Jacobian of the whole at the last state.
+    Undamped modes are those of the Jacobian of the whole at the last state. A swing of another frequency is a limit
+    cycle of control and friction.
     """
     end, steps = float(trajectory.breakpoints[-1]), trajectory.statistics.steps
     if steps < _SLOW_STEPS or end > _SHORT_STEP * steps:
         return ""
-    x, scales = trajectory.interpolate(np.array([end]))[0], loop.finger.layout.scales()
-    values, modes = np.linalg.eig(_jacobian(loop, end, x, scales))
-    resolved = values.imag * end / steps < _RADIANS_PER_STEP
+    x, layout, step = trajectory.interpolate(np.array([end]))[0], loop.finger.layout, end / steps
+    values, modes = np.linalg.eig(_jacobian(loop, end, x, layout.scales()))
+    resolved = values.imag * step < _RADIANS_PER_STEP
     undamped = (values.imag > 0.0) & (np.abs(values.real) < _LEAST_DECAY * values.imag) & resolved
-    if not undamped.any():
-        return ""
     fastest = int(np.argmax(np.where(undamped, values.imag, 0.0)))
-    name = loop.finger.layout.names[int(np.argmax(np.abs(modes[:, fastest])))]
+    ringing = values[fastest].imag / (2.0 * np.pi) if undamped.any() else 0.0
+    name, swinging = _steady_swing(loop, trajectory, step)
+    if name and abs(swinging - ringing) > _SAME_FREQUENCY * ringing:
+        return (
+            f"{name} swings at {swinging:.3g} Hz and does not come to rest, and steps of {step:.1g} s on average "
+            "follow it; less gain, more damping or more viscous friction there helps"
+        )
+    if not ringing:
+        return ""
+    name = layout.names[int(np.argmax(np.abs(modes[:, fastest])))]
     return (
-        f"{name} rings almost undamped at {values[fastest].imag / (2.0 * np.pi):.3g} Hz, and steps of "
-        f"{end / steps:.1g} s on average follow it; more viscous friction, a softer spring or more mass there helps"
+        f"{name} rings almost undamped at {ringing:.3g} Hz, and steps of {step:.1g} s on average follow it; more "
+        "viscous friction, a softer spring or more mass there helps"
     )
+
+
+def _steady_swing(loop: ClosedLoop, trajectory: Trajectory, step: float) -> tuple[str, float]:
+    """Return name and frequency, Hz, of the velocity that swings most in the last steps; no name if none does."""
+    # Its import takes a while, and few runs are slow.
+    from scipy.signal import detrend
+
+    layout, end = loop.finger.layout, float(trajectory.breakpoints[-1])
+    speeds = [k for k, name in enumerate(layout.names) if "velocity[" in name]
+    times = np.linspace(end - step * _SWING_SAMPLES, end, _SWING_SAMPLES, endpoint=False)
+    motion = trajectory.interpolate(times)[:, speeds] / layout.scales()[speeds]
+    spectra = np.abs(np.fft.rfft(detrend(motion, axis=0), axis=0)) ** 2
+    largest = int(np.argmax(spectra.sum(axis=0)))
+    spectrum = spectra[:, largest]
+    cycles = int(np.argmax(spectrum))
+    if cycles < _LEAST_CYCLES or spectrum[cycles - 2 : cycles + 3].sum() < 0.5 * spectrum.sum():
+        return "", 0.0
+    return layout.names[speeds[largest]], cycles / (step * _SWING_SAMPLES)
 
 
 def stiffness_warning(result: xr.Dataset, finger: Finger, tolerance: float) -> str:

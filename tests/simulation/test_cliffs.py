@@ -80,6 +80,20 @@ def test_what_rings_in_a_slow_run_is_named_with_its_frequency(monkeypatch):
     assert float(rest.split(" Hz")[0]) == pytest.approx(frequency, rel=0.15)
 
 
+@pytest.mark.slow
+def test_what_control_and_friction_keep_swinging_in_a_slow_run_is_named_with_its_frequency(monkeypatch):
+    monkeypatch.setattr(accuracy, "_SLOW_STEPS", 10_000)
+    damped = "hand.fingers.*.finger.joint_friction.viscous"
+    overrides = {"simulation.duration": 0.06, "simulation.sample_rate": 1e5, damped: 0.0}
+    result = fp.simulate(fp.load_scenario("pinch", overrides))
+    name, _, rest = result.attrs["ringing"].partition(" swings at ")
+    joint = name.removeprefix("joint_velocity[").rstrip("]")
+    # Zero crossings in the last 20 ms, two in a cycle.
+    speed = result.joint_velocity.sel(joint=joint).values[-2000:]
+    crossings = np.count_nonzero(np.diff(np.sign(speed - speed.mean())))
+    assert float(rest.split(" Hz")[0]) == pytest.approx(crossings / 0.04, rel=0.05)
+
+
 def test_a_result_that_cannot_fit_into_memory_is_refused_by_its_sample_rate(monkeypatch):
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 2**18}
     monkeypatch.setattr(os, "sysconf", pages.__getitem__)
