@@ -36,7 +36,7 @@ class CancelToken:
         return self.cancelled or self._stopped
 
     def cancel(self) -> None:
-        """Ask for the end."""
+        """Request the end of the computation."""
         self.cancelled = True
 
     def __enter__(self) -> Self:

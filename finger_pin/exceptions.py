@@ -34,7 +34,7 @@ class MicroDampingWarning(ScenarioWarning):
 
 
 class AccuracyWarning(ScenarioWarning):
-    """What a result shows is finer than its tolerances tell."""
+    """Warning about a result that shows finer detail than its tolerances support."""
 
 
 class LeftOutWarning(ScenarioWarning):

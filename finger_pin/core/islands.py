@@ -81,7 +81,7 @@ def find_islands(structure: Structure, control: InputTable, touching: bool = Tru
     unread = np.setdiff1d(np.arange(channels), structure.channel)
     for label in dict.fromkeys(labels[:width].tolist()):
         rows = np.flatnonzero(labels[row_at:loop_at] == label)
-        fed = structure.channel[rows]
+        channel = structure.channel[rows]
         states = structure.state[rows]
         islands.append(
             Island(
@@ -89,7 +89,7 @@ def find_islands(structure: Structure, control: InputTable, touching: bool = Tru
                 rows=rows,
                 states=np.sort(states[states >= 0]),
                 # What nobody reads is the first one's.
-                channels=np.union1d(fed[fed >= 0], unread if not islands else []).astype(np.int64),
+                channels=np.union1d(channel[channel >= 0], unread if not islands else []).astype(np.int64),
                 planned=np.flatnonzero(labels[loop_at + control.loop] == label)
                 if planned
                 else np.zeros(0, dtype=np.int64),

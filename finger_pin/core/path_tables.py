@@ -118,7 +118,7 @@ class PathParameters(NamedTuple):
 
 
 class PathWork(NamedTuple):
-    """Memory for pieces.
+    """Working memory for the pieces of paths.
 
     Attributes:
         out: Values and slopes of the shapes, shape (E, OUT).

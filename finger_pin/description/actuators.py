@@ -151,8 +151,8 @@ class Motor(Description):
         if sheet is None and self.friction.coulomb is None:
             raise problem("friction.coulomb", "is missing: give it, or a data_sheet")
         if sheet is not None and self.constants[2] < 0.0:
-            most = self.constants[0] * sheet.stall_current
-            allowed = f"must be at most {most:.4g} N m, by this current and this speed at no load"
+            stall_torque = self.constants[0] * sheet.stall_current
+            allowed = f"must be at most {stall_torque:.4g} N m, by this current and this speed at no load"
             raise problem("data_sheet.stall_torque", allowed, sheet.stall_torque)
         return self
 

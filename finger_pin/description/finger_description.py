@@ -214,7 +214,7 @@ class PlacedFinger(Description):
 
     @property
     def rotation(self) -> Array:
-        """From the finger's base frame to the palm's, shape (3, 3)."""
+        """Rotation from the finger's base frame to the palm's, shape (3, 3)."""
         return rotation(*self.orientation).copy()
 
 

@@ -103,7 +103,7 @@ class Shaped(Description):
 
     @property
     def sizes(self) -> tuple[float, ...]:
-        """The numbers of `SIZES`, m."""
+        """Sizes of the shape in the order of `SIZES`, m."""
         if self.sides or self.semi_axes:
             return self.sides or self.semi_axes or ()
         return tuple(getattr(self, name) for name in SIZES[self.shape])

@@ -91,7 +91,7 @@ def from_mujoco(
 
 
 class _Reader:
-    """Reads a model, element by element."""
+    """Reader of a MuJoCo model, element by element."""
 
     def __init__(self, mujoco: Any, model: Any, plugins: list[str]) -> None:
         self.mujoco, self.model = mujoco, apply_flags(mujoco, model)

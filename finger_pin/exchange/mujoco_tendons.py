@@ -28,7 +28,7 @@ def within_margin(ends: Array, margin: float) -> list[float]:
 
 
 class TendonReader(ElementReader):
-    """Reads tendons."""
+    """Reader of a MuJoCo model's tendons."""
 
     def table(self, i: int) -> Table:
         """Return a tendon by its index."""

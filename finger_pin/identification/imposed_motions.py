@@ -116,10 +116,10 @@ def _extended_spline(spline: PPoly, end: float) -> PPoly:
 
 def _check_range(entry: str, values: Array, scenario: Scenario, joint: str) -> None:
     low, high = scenario.finger.joints[joint].range
-    beyond = np.maximum(low - values, values - high)
-    if scenario.finger.joints[joint].limited and beyond.max() > RANGE_MARGIN:
-        allowed = f"is beyond the stops of {joint}, {low:.3g} to {high:.3g} rad, in row {int(np.argmax(beyond)) + 1}"
-        raise InputError(entry, f"{allowed}; widen its range, or limited = false", float(values[np.argmax(beyond)]))
+    excess = np.maximum(low - values, values - high)
+    if scenario.finger.joints[joint].limited and excess.max() > RANGE_MARGIN:
+        allowed = f"is beyond the stops of {joint}, {low:.3g} to {high:.3g} rad, in row {int(np.argmax(excess)) + 1}"
+        raise InputError(entry, f"{allowed}; widen its range, or limited = false", float(values[np.argmax(excess)]))
 
 
 def _check_actuators(entry: str, recording: Recording, scenario: Scenario) -> None:

@@ -55,7 +55,7 @@ class NoiseGrowth:
 
     @property
     def active(self) -> bool:
-        """Whether any noise grows."""
+        """Whether the noise of any output grows with its reading."""
         return bool(np.any(self.noise_share))
 
     def growth(self, errors: Sequence[Array]) -> list[Array]:

@@ -29,7 +29,7 @@ _STIFF_RATIO = 5.0
 
 
 class MujocoWarning(ScenarioWarning):
-    """An option or step of a MuJoCo model weakens friction."""
+    """Warning about an option or time step of a MuJoCo model that weakens friction."""
 
 
 def add_friction(

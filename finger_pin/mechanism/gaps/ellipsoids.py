@@ -111,8 +111,8 @@ def _normal(y: Any, p: Any) -> Any:
         least = 0.5 * (ss + tt) - (0.25 * (ss - tt) * (ss - tt) + st * st) ** 0.5
         lift = max(_LEAST_CURVATURE_SHARE * (abs(ss) + abs(tt)) - least, 0.0)
         ss, tt = ss + lift, tt + lift
-        by_s, by_t, whole = dot(s, between_supports), dot(t, between_supports), 1.0 / (ss * tt - st * st)
-        a, b = (tt * by_s - st * by_t) * whole, (ss * by_t - st * by_s) * whole
+        by_s, by_t, inverse_determinant = dot(s, between_supports), dot(t, between_supports), 1.0 / (ss * tt - st * st)
+        a, b = (tt * by_s - st * by_t) * inverse_determinant, (ss * by_t - st * by_s) * inverse_determinant
         share, better = 1.0, gap
         for _ in range(_MOST_HALVINGS):
             a_, b_ = share * a, share * b
@@ -147,7 +147,7 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
     gap = dot(n, (y[0], y[1], y[2])) - first_level - second_level
     s, t = perpendicular_vectors(n[0], n[1], n[2])
     ss, st, tt = _bent(s, t, by_n, by_other, gap)
-    whole = 1.0 / (ss * tt - st * st)
+    inverse_determinant = 1.0 / (ss * tt - st * st)
     for j in range(6):
         unit = (1.0 * (j % 3 == 0), 1.0 * (j % 3 == 1), 1.0 * (j % 3 == 2))
         moved = unit
@@ -159,7 +159,7 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
             moved = (d - a, e - b, f - c)
         rises = dot(n, moved)
         by_s, by_t = dot(s, moved), dot(t, moved)
-        a, b = (tt * by_s - st * by_t) * whole, (ss * by_t - st * by_s) * whole
+        a, b = (tt * by_s - st * by_t) * inverse_determinant, (ss * by_t - st * by_s) * inverse_determinant
         turning = (a * s[0] + b * t[0], a * s[1] + b * t[1], a * s[2] + b * t[2])
         slid = turned(by_other, turning[0], turning[1], turning[2])
         out[72 + j] = rises

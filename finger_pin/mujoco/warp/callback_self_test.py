@@ -60,5 +60,5 @@ def _holds_and_releases(device: str, attach: Callable[..., Any]) -> bool:
     # Bristles give way by less than 10 F / s0; what is left over pulls it, 0.1 kg, by 1.1 times the mean tension.
     free_travel = 0.5 * 0.1 * 1.1 * friction_force / 0.1 * time**2
     at_rest = abs(forces[0] / (0.8 * friction_force * pull / tension)) - 1.0
-    released = 0.8 * free_travel < travel[1] < 1.2 * free_travel
-    return bool(loads_match and travel[0] < 1e-3 and released and abs(at_rest) < 0.05)
+    travels_freely = 0.8 * free_travel < travel[1] < 1.2 * free_travel
+    return bool(loads_match and travel[0] < 1e-3 and travels_freely and abs(at_rest) < 0.05)

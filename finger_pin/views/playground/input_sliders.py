@@ -146,7 +146,7 @@ class Inputs:
         return np.asarray(np.clip(values, low, high))
 
     def set_value(self, kind: str, index: int, value: float, position: Array) -> None:
-        """Move a slider, and let its kind move the finger."""
+        """Move a slider, and the finger with it."""
         if kind != self.kind:
             self.choose(kind, position)
         slider = self.sliders[kind][index]
