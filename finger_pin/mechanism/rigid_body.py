@@ -142,10 +142,10 @@ class RigidBody:
                 rate[..., at + 3] = -0.5 * np.sum(vector * part, axis=-1)
         return rate
 
-    def _floats(self, *, single: bool = False, **given: Array) -> tuple[Array, ...]:
+    def _floats(self, *, single: bool = False, **arguments: Array) -> tuple[Array, ...]:
         """Return arguments by name as floats: q of shape (..., nq), others (..., nv)."""
         model = self.model
-        return tuple(as_floats(k, v, model.nq if k == "q" else model.nv, single=single) for k, v in given.items())
+        return tuple(as_floats(k, v, model.nq if k == "q" else model.nv, single=single) for k, v in arguments.items())
 
     def external_torque(self, q: Array, forces: Array) -> Array:
         """Return sum of J^T F over the tips, shape (..., nv), for forces of shape (..., t, 3), N, base frame."""

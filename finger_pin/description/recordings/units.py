@@ -75,8 +75,8 @@ def parse_unit(text: str) -> tuple[str, float] | None:
     if spelled[:1] in _PREFIXES and spelled[1:] in _PREFIXED:
         return spelled[1:], _PREFIXES[spelled[0]]
     for sign, allowed in (("/", ("m/s", "rad/s")), (" ", ("N m", "m N"))):
-        one, found, other = spelled.partition(sign)
-        parts = [parse_unit(part) for part in (one, other)] if found else []
+        one, separator, other = spelled.partition(sign)
+        parts = [parse_unit(part) for part in (one, other)] if separator else []
         if len(parts) == 2 and parts[0] and parts[1]:
             (first, a), (second, b) = parts[0], parts[1]
             if f"{first}{sign}{second}" in allowed:
