@@ -109,8 +109,8 @@ class Problem:
         low, high = self.low[self._scenario_indices], self.high[self._scenario_indices]
         self._limits = Limits.from_parts(parts, keys, low, high)
         start_values: dict[str, Any] = {nuisance.key: nuisance.start for nuisance in nuisances}
-        for part in reversed(parts):
-            start_values |= zip([keys[k] for k in part.indices], part.family.values, strict=True)
+        for scenario_part in reversed(parts):
+            start_values |= zip([keys[k] for k in scenario_part.indices], scenario_part.family.values, strict=True)
         neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
         middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
         default_start = [start_values.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
