@@ -83,7 +83,9 @@ class ForcePolytope(BriefRepr):
             for first, second in ((0, 1), (1, 2), (2, 0)):
                 low, high = sorted((int(face[first]), int(face[second])))
                 faces_of_edge.setdefault((low, high), []).append(index)
-        return [edge for edge, pair in faces_of_edge.items() if np.prod(self.normals[pair], axis=0).sum() < 1.0 - 1e-6]
+        return [
+            edge for edge, (one, other) in faces_of_edge.items() if self.normals[one] @ self.normals[other] < 1.0 - 1e-6
+        ]
 
     def _boundary_order(self) -> Any:
         """Return the vertices of a flat set in their order around its middle."""

@@ -61,7 +61,10 @@ class SpringReturn(BriefRepr):
 
     @property
     def ratio(self) -> float:
-        """Least tension on the way out over that on the way in: 1 without friction, 0 where a joint stays."""
+        """Ratio of the least tension on the way out to that on the way in.
+
+        It is 1 without friction, and 0 where a joint stays.
+        """
         return float(np.min(np.maximum(self.letting_out, 0.0) / self.winding_in))
 
     @property

@@ -20,7 +20,9 @@ from finger_pin.typing import Array
 
 
 class Parameters(NamedTuple):
-    """Numbers of a mechanism of one `Structure`; what changes in place is the owner's.
+    """Numbers of a mechanism, for one `Structure`.
+
+    Arrays that change in place belong to one owner; see `separate`.
 
     Attributes:
         bodies: Placement and inertia, columns `BODY`, shape (n, columns); free bodies turn with their attitude.

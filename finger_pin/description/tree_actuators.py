@@ -168,7 +168,7 @@ class TreeActuator(Description):
 
     @property
     def only_pulls(self) -> bool:
-        """Whether it never pushes what it drives, whatever its input and motion."""
+        """Whether the actuator only pulls, at any input and motion."""
         if self.muscle is not None:
             return self.gear > 0.0
         bounds = [each * self.gear for each in self.force_range or ()]

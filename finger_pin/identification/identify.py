@@ -164,7 +164,7 @@ def _run_pipeline(
 
 
 def _undamped_joints(scenario: Scenario, problem: Problem) -> list[str]:
-    """Return the undamped joints in motions: where friction holds them they ring, in ten times the steps."""
+    """Return the undamped joints in motions; held by friction they ring, which takes ten times the steps."""
     finger, joints = scenario.finger, list(scenario.finger.joints)
     friction = finger.numbers["joint_friction"]
     damped = friction["viscous"] + friction["micro_damping"]

@@ -191,7 +191,7 @@ class Finger:
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs u: the actuated tendons, of winches what is wound, then the actuators of a tree."""
+        """Names of the inputs u: of actuated tendons (or of their winding), then of a tree's actuators."""
         names = zip(self.routing.tendons, self.routing.winched, strict=False)
         inputs = (f"tendon_winding.{name}" if winched else name for name, winched in names)
         return (*inputs, *self.description.tree.actuators)

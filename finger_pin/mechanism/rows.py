@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.description.caching import cached_property
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.path_elements import PathTerm
@@ -181,7 +182,7 @@ class Rows:
         """Return whether paths through space belong to any row."""
         return any(self.paths)
 
-    @property
+    @cached_property
     def structure_key(self) -> tuple[Any, ...]:
         """All that does not change with numbers that stay zero or stay other than zero, to be compared by value."""
         wiring = self.inputs, self.loads, self.readings

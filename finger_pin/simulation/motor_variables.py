@@ -52,7 +52,8 @@ def _loop_variables() -> dict[str, Quantity]:
 
     def sampled_signal(run: SampledTrajectory, name: str) -> Array:
         assert run.loop.drives is not None and run.loop.drives.compiled is not None
-        drives, values = (run.loop.drives.compiled, np.zeros((len(run.times), len(run.loop.finger.actuators.names))))
+        drives = run.loop.drives.compiled
+        values = np.zeros((len(run.times), len(run.loop.finger.actuators.names)))
         values[:, run.loop.finger.actuators.holds] = drives.zero_order_hold(getattr(drives, name), run.times)
         return values
 
