@@ -11,8 +11,9 @@ from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
 from finger_pin.analysis.locking_margin import SelfLockingMargin, locking_advice, quick_margin, self_locking_margin
 from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
+from finger_pin.analysis.settled_postures import settled_posture
 from finger_pin.analysis.spring_return import SpringReturn, spring_return
-from finger_pin.analysis.steady import SteadyState, steady_state
+from finger_pin.analysis.steady import SteadyState, rubbing_cords, sliding_tendons, steady_state
 from finger_pin.analysis.tip_force import RequiredTension, largest_force, tension_for_force
 from finger_pin.analysis.tip_statics import Friction
 
@@ -39,8 +40,11 @@ __all__ = [
     "locking_over_range",
     "posed",
     "quick_margin",
+    "rubbing_cords",
     "self_locking_map",
     "self_locking_margin",
+    "settled_posture",
+    "sliding_tendons",
     "spring_return",
     "steady_state",
     "tension_for_force",

@@ -55,8 +55,9 @@ def equilibrium(
     *,
     position: Sequence[float] | Array | None = None,
     fingertip_force: Sequence[float] | Array | None = None,
+    friction: Array | None = None,
 ) -> Equilibrium:
-    """Return the frictionless equilibrium under given inputs.
+    """Return the equilibrium under given inputs, frictionless by default.
 
     With friction there are many states at rest around it; this is the one in which no bristle is bent: tau = G, and
     the state's derivative is zero with friction and without. It lies where the potential energy falls to from a
@@ -68,6 +69,7 @@ def equilibrium(
             name.
         position: theta to begin at, shape (n,), rad; by default the angles of the ranges nearest to zero.
         fingertip_force: F, shape (3,), of several tips (t, 3), N, base frame; none by default.
+        friction: What bristles hold in every posture, N and N m, shape (z,), the last numbers of the packed state.
 
     Raises:
         InputError: If a size is wrong, a tension is negative, the finger has servos, free objects, rows with states of
@@ -92,7 +94,7 @@ def equilibrium(
         if position is None
         else np.array(finite_vector("position", position, joints))
     )
-    problem = _Statics.from_posture(finger, command, tip_force, start)
+    problem = _Statics.from_posture(finger, command, tip_force, start, friction)
     y = problem.start
     initial_acceleration = float(np.max(np.abs(problem.acceleration(y))))
     if initial_acceleration >= _REST_ACCELERATION:
@@ -125,9 +127,13 @@ class _Statics:
     on_paths: NDArray[np.bool_]
 
     @classmethod
-    def from_posture(cls, finger: Finger, command: Array, tip_force: Array, position: Array) -> _Statics:
-        """Return the problem that starts at a posture, shape (n,)."""
+    def from_posture(
+        cls, finger: Finger, command: Array, tip_force: Array, position: Array, friction: Array | None
+    ) -> _Statics:
+        """Return the problem that starts at a posture, shape (n,), with what bristles hold."""
         rest, passive = finger.rest_state(position), finger.routing.passive
+        if friction is not None:
+            finger.mechanism.split(rest)[2][:] = friction
         actuator_state = finger.layout.unpack(rest).actuator_state
         for table in finger.mechanism.rows:
             if table.group in (STATEFUL, MUSCLES):
@@ -162,6 +168,7 @@ class _Statics:
         stored, _ = signals.mechanism.account()
         potential_energy = finger.motion(theta, np.zeros(joints)).potential_energy
         work = (~finger.routing.winched * signals.tendons.entering[:actuated]) @ finger.excursion(theta)
+        work -= _held_by_friction(signals)
         work += float(np.sum(self.tip_force * finger.rigid_body.tip_position(theta))) + _actuator_work(signals)
         return float(sum(stored.values()) + potential_energy - work)
 
@@ -199,6 +206,12 @@ def _check_can_rest(finger: Finger) -> None:
     for name, actuator in description.tree.actuators.items():
         if actuator.integrates or actuator.integral:
             raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")
+
+
+def _held_by_friction(signals: FingerSignals) -> float:
+    """Return the work of tendons' lengths against what the bristles of their canals hold, J."""
+    rows = [signals.tendons.driven, *(wraps for wraps, _ in signals.tendons.beyond)]
+    return float(sum(table["friction"] @ table.row.length for table in rows))
 
 
 def _actuator_work(signals: FingerSignals) -> float:

@@ -1,18 +1,20 @@
-"""Steady states of tendons and servos in closed form: everything slides evenly, or rests after having slid so."""
+"""Steady states of tendons, of their rows, and of servos: everything slides evenly, or rests after having slid so."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.laws.bristle import friction_coefficient
-from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import loss_share, stribeck_share
-from finger_pin.mechanism.coerce import FingerLike, description_of
+from finger_pin.mechanism.canals import is_canal
+from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.mechanism import Sliding
+from finger_pin.mechanism.rows import weighted_sum
 from finger_pin.mechanism.servos import Actuators
-from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 
 
@@ -37,43 +39,61 @@ def steady_state(
     """Return the steady states of a finger's actuated tendons.
 
     Args:
-        finger: Its description, its name, or the path of its file.
+        finger: A finger, its description, its name, or the path of its file.
         command: f^a at the entrances of the canals, shape (m, a), N.
         speed: v, shape (m,), m/s, of all of them; positive as they are drawn in.
         position: theta, shape (m, n), rad, for the curvature of the paths; zero by default.
         at_rest: Whether they rest after having slid so: bristles keep what they hold, viscous friction is gone.
     """
-    description = description_of(finger)
-    tendons = Tendons.from_description(description)
-    actuators = Actuators.from_description(description, tendons.routing)
-    actuated, v = tendons.routing.actuated, np.asarray(speed, dtype=float)[:, None]
-    posture = np.zeros((len(v), len(tendons.routing.joints))) if position is None else position
-    kinetic = capstan_coefficient(tendons.surface, tendons.routing.curvature(posture))[:, :actuated]
-    ratio, viscous, stribeck, exponent, drag, floor = (
-        each[:actuated]
-        for each in (
-            tendons.stiction_ratio,
-            tendons.viscous,
-            tendons.stribeck_velocity,
-            tendons.stribeck_exponent,
-            tendons.drag,
-            tendons.floor,
-        )
-    )
-    coefficient = friction_coefficient(v, kinetic, ratio * kinetic, stribeck, exponent)
-    tension = sliding_tension(command, coefficient, v, viscous, drag, floor)
-    for k, places in tendons.several.items():
-        strand_tension = np.asarray(command, dtype=float)[:, k]
-        for bends, offset, _ in places:
-            kinetic = capstan_coefficient(tendons.surface[k], np.abs(posture) @ bends + offset)
-            coefficient = friction_coefficient(v[:, 0], kinetic, ratio[k] * kinetic, stribeck[k], exponent[k])
-            strand_tension = sliding_tension(
-                strand_tension, coefficient, v[:, 0], viscous[k] / len(places), drag[k] / len(places), floor[k]
-            )
-        tension[:, k] = strand_tension
-    if at_rest:
-        tension = np.where(tension > 0.0, np.maximum(0.0, tension + viscous * v), tension)
+    finger = as_finger(finger)
+    actuators, v = finger.actuators, np.asarray(speed, dtype=float)[:, None]
+    actuated, pulled = finger.routing.actuated, _with_ideal_sources(finger)
+    postures = np.zeros((len(v), len(finger.routing.joints))) if position is None else position
+    x = np.array([pulled.rest_state(posture) for posture in postures]).reshape(len(v), pulled.layout.size)
+    inputs = np.zeros((len(v), pulled.mechanism.channels))
+    inputs[:, :actuated] = command
+    rows = pulled.mechanism.evaluate(x, inputs, sliding=sliding_tendons(pulled, v, at_rest=at_rest)).rows
+    tension = rows["driven_tendons"].force
+    for table, weights in pulled.wraps.items():
+        tension = tension + weighted_sum(rows[table].force, weights[:actuated].T)
     return SteadyState(tension, command - tension, _current(actuators, command, v, at_rest))
+
+
+def sliding_tendons(finger: Finger, speed: Array, *, at_rest: bool) -> Sliding:
+    """Return the rows of friction of a finger's actuated tendons, all of which slide alike.
+
+    Args:
+        finger: The finger.
+        speed: v, shape (..., 1), m/s, positive as they are drawn in.
+        at_rest: Whether they have come to rest.
+    """
+    tables = {table.group: table for table in finger.mechanism.rows}
+    speeds = {
+        group: np.broadcast_to(speed, (*speed.shape[:-1], tables[group].count))
+        for group in ("driven_tendons", *finger.wraps)
+    }
+    return Sliding(speeds, at_rest)
+
+
+def rubbing_cords(finger: Finger) -> NDArray[np.bool_]:
+    """Return whether friction takes something of each cord: tendons, cords of a tree, and branches; shape (c,)."""
+    masks = [np.zeros(0, dtype=bool)]
+    for table in finger.mechanism.rows:
+        own = table.group in ("driven_tendons", "passive_tendons")
+        if own or (is_canal(table.group) and table.group not in finger.wraps):
+            surface, drag = (table.parameters[table.law.parameters.index(name)] for name in ("surface", "drag"))
+            masks.append((surface > 0.0) | (drag > 0.0))
+    return np.concatenate(masks)
+
+
+def _with_ideal_sources(finger: Finger) -> Finger:
+    """Return a finger whose tendons are pulled by their inputs alone, whatever drives them."""
+    description = finger.description
+    tendons = {name: each.updated(winch=None, maximum_tension=None) for name, each in description.tendons.items()}
+    if not description.actuators and tendons == description.tendons:
+        return finger
+    objects = finger.constructor_args.objects
+    return finger.changed(description.updated(actuators={}, tendons=tendons), objects)
 
 
 def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> Array:

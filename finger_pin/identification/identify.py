@@ -65,8 +65,7 @@ def identify(
         recordings: By name, entries as in a file.
         compare: By name, other laws: keys with a number that is held, or with bounds.
         data: By name of a recording, columns by name, in place of its file.
-        finger: Replaces the finger that the scenario describes, as for `fp.simulate`; in steady readings its numbers
-            count.
+        finger: Replaces the finger that the scenario describes, as for `fp.simulate`.
         overrides: Values by dotted key, as for `load_scenario`.
         output: Folder for ``identification.nc``, ``identified.toml`` and ``identification.html``; work that is done is
             kept there too, so that the same call goes on where another was stopped.

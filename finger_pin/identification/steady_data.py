@@ -6,15 +6,15 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from finger_pin.analysis import steady_state
+from finger_pin.analysis import rubbing_cords, settled_posture, steady_state
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import Recording, ScenarioMap, check_tension_sign
+from finger_pin.identification.resting_finger import resting_finger, wound_length
 from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
-from finger_pin.identification.settled import resting_finger, settled_posture, wound_length
-from finger_pin.mechanism.coerce import with_parameters_of
+from finger_pin.mechanism.coerce import FingerLike, with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
@@ -108,13 +108,17 @@ class SteadyReadings:
         if self._compares_posture:
             position = self._settled_postures(scenario, load)
         at_rest = settings.at_rest or self._compares_posture
-        steady = steady_state(scenario.finger, load, self.recording.speed, position, at_rest)
-        by_name = {
-            "tendon_tension": steady.tension,
-            "tendon_friction": steady.friction,
-            "motor_current": steady.current,
-        }
-        by_name[_POSTURE] = position
+        by_name = {_POSTURE: position}
+        if any(variable != _POSTURE for variable, _ in self._outputs):
+            finger: FingerLike = self._replacement or scenario.finger
+            if self._replacement is not None:
+                finger = with_parameters_of(self._replacement, self.scenario, scenario)
+            steady = steady_state(finger, load, self.recording.speed, position, at_rest)
+            by_name |= {
+                "tendon_tension": steady.tension,
+                "tendon_friction": steady.friction,
+                "motor_current": steady.current,
+            }
         name = self.recording.name
         return [
             nuisance_value(nuisance, name, output, "scale", 1.0) * by_name[variable][:, index]
@@ -210,8 +214,8 @@ class SteadyReadings:
         finger = self._finger(self.scenario)
         pins = finger.joint_friction
         joints_rub = bool(np.any(pins.bearing & ((pins.kinetic > 0.0) | (pins.static > 0.0) | (pins.drag > 0.0))))
-        tendons_rub = bool(np.any((finger.tendons.surface > 0.0) | (finger.tendons.drag > 0.0)))
-        several_tendons_rub = tendons_rub and len(finger.tendons.surface) > 1
+        cords = rubbing_cords(finger)
+        several_tendons_rub = bool(np.any(cords)) and len(cords) > 1
         if self.recording.settings.speed is not None and (joints_rub or several_tendons_rub):
             rubbing = "joints rub" if joints_rub else "several tendons rub"
             allowed = (

@@ -55,6 +55,10 @@ def direction(value: Number, side: Number) -> Number:
     return np.sign(value) * (side == 0.0) + side
 
 
+# Steps to a settled state, and what it may miss, part of it.
+_SETTLING_STEPS, _SETTLED = 50, 1e-14
+
+
 @dataclass(frozen=True)
 class Law:
     """A law of force: its function, slopes, energy and signals.
@@ -106,6 +110,23 @@ class Law:
     def energy_terms(self, row: Row, p: Parameters, force: Array, rate: Array, signals: Numbers) -> Numbers:
         """Return stored energy, J, and powers, W, from the results of `act`."""
         return self.account(row, p, force, rate, signals)
+
+    def settled(self, row: Row, p: Parameters) -> Row:
+        """Return rows of a law with a level, as (9), that have slid at their speeds until z' = 0: |z| is the level.
+
+        The level may depend on z, as that of (14) does, piece by piece in proportion: by the secant method.
+        """
+        level, sign = self.signals.index("level"), np.sign(row.speed)
+        state = np.zeros(np.broadcast_shapes(*map(np.shape, row)))
+        short, before, change = np.zeros_like(state), state, np.zeros_like(state)
+        for _ in range(_SETTLING_STEPS):
+            was, short = short, sign * self.act(row._replace(state=state), p)[2][level] - state
+            if np.all(np.abs(short) <= _SETTLED * np.abs(state)):
+                break
+            slope = np.divide(short - was, change, out=-np.ones_like(state), where=change != 0.0)
+            before, state = state, state - short / np.where(slope < 0.0, slope, -1.0)
+            change = state - before
+        return row._replace(state=state)
 
 
 class Touch(NamedTuple):

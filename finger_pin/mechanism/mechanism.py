@@ -15,24 +15,34 @@ spherical joint, whose four numbers in q are a unit quaternion (x, y, z, w).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import accumulate
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.path_elements import PathKinematics, Paths, path_kinematics, shift_joints
+from finger_pin.mechanism.path_elements import PathKinematics, Paths, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energies, Rows, RowSignals
-from finger_pin.mechanism.urdf import join_bodies
 from finger_pin.mechanism.wiring import sort_tables
 from finger_pin.typing import Array
 
 #: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `base_motion`.
 PRESCRIBED_ACCELERATIONS = 27
+
+
+class Sliding(NamedTuple):
+    """Rows that slide evenly, or rest after it, however the coordinates move.
+
+    Attributes:
+        speeds: By table, the speeds of its rows along their arms, shape (..., k).
+        at_rest: Whether they have come to rest: their states stay, what their speed makes is gone.
+    """
+
+    speeds: Mapping[str, Array]
+    at_rest: bool
 
 
 class Mechanism:
@@ -80,41 +90,6 @@ class Mechanism:
         self.states = [slice(ends[table.group] - table.states, ends[table.group]) for table in self.rows]
         self.state_count = max(ends.values(), default=0)
 
-    @classmethod
-    def from_parts(cls, parts: Mapping[str, Mechanism]) -> Mechanism:
-        """Return several mechanisms on one base, such as the fingers of a hand.
-
-        Coordinates are the joints of all parts, then the lumps of all. Names of joints, tips, lumps and tables begin
-        with that of their part and a dot; inputs follow each other.
-
-        Raises:
-            InputError: If gravity is not the same for all.
-        """
-        body = join_bodies({name: part.body for name, part in parts.items()})
-        width = int(body.model.nv) + sum(len(part.lumps) for part in parts.values())
-        joint = coordinate = channel = 0
-        lump, rows = int(body.model.nv), []
-        for name, part in parts.items():
-            size = int(part.body.model.nv)
-            places = np.append(coordinate + np.arange(size), lump + np.arange(len(part.lumps)))
-            for table in part.listed:
-                rows.append(
-                    replace(
-                        table.embed_coordinates(places, width),
-                        group=f"{name}.{table.group}",
-                        channels=np.where(table.channels >= 0, table.channels + channel, -1),
-                        pins=np.where(table.pins >= 0, table.pins + joint, -1),
-                        paths=shift_joints(table.paths, joint),
-                        inputs={f"{name}.{group}": weights for group, weights in table.inputs.items()},
-                        loads={f"{name}.{group}": weights for group, weights in table.loads.items()},
-                        readings={f"{name}.{group}": weights for group, weights in table.readings.items()},
-                    )
-                )
-            joint, coordinate = joint + part.body.model.njoints - 1, coordinate + size
-            lump, channel = lump + len(part.lumps), channel + part.channels
-        lumps = [f"{name}.{each}" for name, part in parts.items() for each in part.lumps]
-        return cls(body, rows, lumps, np.concatenate([part.inertia for part in parts.values()]), channel)
-
     @property
     def coordinates(self) -> int:
         """Number N of coordinates."""
@@ -153,7 +128,14 @@ class Mechanism:
         linear[..., model.nv :] = q[..., model.nq :]
         return linear
 
-    def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
+    def evaluate(
+        self,
+        x: Array,
+        command: Array,
+        force: Array | None = None,
+        base: Array | None = None,
+        sliding: Sliding | None = None,
+    ) -> Evaluation:
         """Return everything at packed states: accelerations of joints (18) and of masses of passive tendons (13).
 
         Args:
@@ -162,11 +144,12 @@ class Mechanism:
             force: At the tips, shape (3,) or (m, 3) for one, (t, 3) or (m, t, 3) for several, N, base frame.
             base: Motion of the base, the numbers of `base_motion`, shape (12 or more,) or (m, 12 or more), at rest by
                 default; after `PRESCRIBED_ACCELERATIONS` of them those of what is moved along paths, zero by default.
+            sliding: Rows whose states have settled, in place of those in x.
         """
         q, v, _ = self.split(x)
         joints, turning, lead = int(self.body.model.nv), q[..., : self.body.model.nq], x.shape[:-1]
         forces = self._forces(force, lead)
-        rows, torque = self._rows(x, np.asarray(command, dtype=float), forces)
+        rows, torque = self._rows(x, np.asarray(command, dtype=float), forces, sliding)
         external = np.zeros_like(torque)
         if np.any(forces):
             external[..., :joints] = self.body.external_torque(turning, forces)
@@ -200,7 +183,18 @@ class Mechanism:
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
 
-    def _rows(self, x: Array, command: Array, forces: Array) -> tuple[dict[str, RowSignals], Array]:
+    def with_row_states(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
+        """Return a packed state with the states that rows had in an evaluation."""
+        state = np.array(x, dtype=float)
+        z = self.split(state)[2]
+        for table, part in zip(self.rows, self.states, strict=True):
+            if table.states and table.law.arms == 1:
+                z[..., part] = rows[table.group].row.state
+        return state
+
+    def _rows(
+        self, x: Array, command: Array, forces: Array, sliding: Sliding | None
+    ) -> tuple[dict[str, RowSignals], Array]:
         """Return the signals of all tables under inputs and forces at tips, and the sum of A^T phi, shape (..., N)."""
         q, v, z = self.split(x)
         turning, linear, lead = q[..., : self.body.model.nq], self.linear_positions(q), x.shape[:-1]
@@ -221,6 +215,9 @@ class Mechanism:
                 reading=_weighted(table.readings, states, np.zeros((*lead, table.count))),
             )
             law: Any = table.law
+            if sliding is not None and table.group in sliding.speeds:
+                row = law.settled(row._replace(speed=sliding.speeds[table.group]), table.parameters)
+                row = row._replace(speed=np.zeros_like(row.speed)) if sliding.at_rest else row
             exerted, rate, signals = law.act(arguments := law.arguments(row), table.parameters)
             rows[table.group], earlier[table.group] = RowSignals(table, arguments, exerted, rate, signals), exerted
             if table.law.arms > 1:

@@ -9,14 +9,14 @@ velocity of every coordinate, and for a length it is the length's gradient.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import pinocchio as pin
 
 from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.spans.span import COINCIDENT
 from finger_pin.typing import Array
 
 
@@ -93,6 +93,7 @@ class PathTerm:
         measure: Weight in the row's length; by default the arm's.
         follows: Whether it begins where the row's leg before it ends: there the path turns.
         bends: Whether its turn is one of the row's path; behind a pulley each branch has rows of its own.
+        apart: Whether its ends lie apart where the joints are at their references.
     """
 
     piece: PathElement
@@ -101,6 +102,7 @@ class PathTerm:
     measure: float | None = None
     follows: bool = False
     bends: bool = True
+    apart: bool = True
 
     @property
     def length_weight(self) -> float:
@@ -112,17 +114,6 @@ class PathTerm:
 SPIN = 3
 #: Of every row of a table, the legs of its path.
 Paths = Sequence[Sequence[PathTerm]]
-
-
-def shift_joints(paths: Paths, shift: int) -> tuple[tuple[PathTerm, ...], ...]:
-    """Return paths with the indices of all joints but the base shifted by a number."""
-
-    @cache
-    def piece_there(piece: PathElement) -> PathElement:
-        ends = tuple(replace(end, joint=end.joint and end.joint + shift) for end in piece.ends)
-        return replace(piece, ends=ends, joint=piece.joint and piece.joint + shift)
-
-    return tuple(tuple(replace(leg, piece=piece_there(leg.piece)) for leg in legs) for legs in paths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +142,7 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
         np.zeros(len(paths)), np.zeros((len(paths), coordinates)), np.zeros(len(paths)), np.zeros((len(paths), 3))
     )
     for k, legs in enumerate(paths):
-        before = np.zeros(3)
+        before, bends = np.zeros(3), False
         for number, leg in enumerate(legs):
             piece = leg.piece
             points = [placements[end.joint].act(np.asarray(end.point, dtype=float)) for end in piece.ends]
@@ -174,11 +165,17 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
                 arm += wrench @ (twists[end.joint] - twists[piece.joint])
             kinematics.length[k] += leg.length_weight * length
             kinematics.arm[k, :width] += leg.arm * arm
+            # A leg between points at one place has no direction: the path turns from the one before to the one behind.
+            bends = leg.bends or (bends and leg.follows)
             if leg.bends:
-                kinematics.turn[k] += turn + (_angle(before, -loads[0][0]) if leg.follows else 0.0)
+                kinematics.turn[k] += turn
             if number == 0 and loads:
                 kinematics.force[k] = loads[0][0]
-            before = loads[-1][0] if loads else before
+            if not loads or (piece.shape.columns == 1 and length <= COINCIDENT):
+                continue
+            if bends and leg.follows:
+                kinematics.turn[k] += _angle(before, -loads[0][0])
+            before, bends = loads[-1][0], False
     return kinematics
 
 

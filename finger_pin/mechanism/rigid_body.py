@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from finger_pin.description.caching import cached_property
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.model_variants import DepthFirst, depth_first, floating
 from finger_pin.mechanism.state import Kinematics, as_floats
 from finger_pin.typing import Array
 
@@ -27,7 +28,8 @@ class RigidBody:
     """A Pinocchio model with a fixed base and one or more tips.
 
     Attributes:
-        model: The Pinocchio model.
+        model: The Pinocchio model. Where its joints are listed level by level, Pinocchio's own M and C of it are wrong:
+            `mass_matrix` and `coriolis_matrix` are right in any order.
         tips: Indices of the frames of the tips.
         tip_frame: Index of the first of them, the fingertip.
         supports: Shape (t, joints), one where a joint carries a tip.
@@ -86,10 +88,15 @@ class RigidBody:
 
     @property
     def _data(self) -> pin.Data:
-        """Pinocchio's memory; every thread has its own."""
-        if not hasattr(self._per_thread, "data"):
-            self._per_thread.data = self.model.createData()
-        return self._per_thread.data
+        return self._memory("listed", self.model)
+
+    def _memory(self, name: str, model: pin.Model) -> pin.Data:
+        """Return Pinocchio's memory for a model; every thread has its own."""
+        memory = vars(self._per_thread)
+        if name not in memory:
+            memory[name] = model.createData()
+        data: pin.Data = memory[name]
+        return data
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the contents of a copy: not the memory of threads."""
@@ -107,7 +114,8 @@ class RigidBody:
             gravity: Shape (3,), m/s2.
         """
         twin = copy.copy(self)
-        vars(twin).pop("_floating_model", None)
+        for derived in ("_floating_model", "_depth_first"):
+            vars(twin).pop(derived, None)
         twin.model = pin.Model(self.model)
         model_inertias = twin.model.inertias
         for joint, inertia in enumerate(inertias, start=1):
@@ -201,11 +209,16 @@ class RigidBody:
 
     def mass_matrix(self, q: Array) -> Array:
         """Return M(theta) by the composite rigid body algorithm, shape (n, n)."""
-        return np.array(pin.crba(self.model, self._data, *self._floats(single=True, q=q), pin.Convention.WORLD))
+        (q,), twin = self._floats(single=True, q=q), self._depth_first
+        data = self._memory("depth_first", twin.model)
+        return np.array(pin.crba(twin.model, data, q[twin.positions], pin.Convention.WORLD))[twin.matrix]
 
     def coriolis_matrix(self, q: Array, v: Array) -> Array:
         """Return C(theta, theta') with M' - 2 C skew-symmetric, shape (n, n)."""
-        return np.array(pin.computeCoriolisMatrix(self.model, self._data, *self._floats(single=True, q=q, v=v)))
+        (q, v), twin = self._floats(single=True, q=q, v=v), self._depth_first
+        data = self._memory("depth_first", twin.model)
+        q, v = q[twin.positions], v[twin.velocities]
+        return np.array(pin.computeCoriolisMatrix(twin.model, data, q, v))[twin.matrix]
 
     def gravity_torque(self, q: Array) -> Array:
         """Return G(theta), shape (n,), N m."""
@@ -235,7 +248,7 @@ class RigidBody:
         Returns:
             Moment and force on the base about its origin, in its axes, shape (6,), and torques, shape (n,).
         """
-        model, data = self._floating_model, self._floating_data
+        model, data = self._floating_model, self._memory("floating", self._floating_model)
         turned = np.r_[3:6, 0:3]
         pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         moving, speeding = np.append(base[:6][turned], v), np.append(base[6:12][turned], a)
@@ -244,21 +257,11 @@ class RigidBody:
 
     @cached_property
     def _floating_model(self) -> pin.Model:
-        """The same joints on a base that floats free of gravity."""
-        fixed, model = self.model, pin.Model()
-        base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
-        for index in range(1, fixed.njoints):
-            parent = int(fixed.parents[index])
-            at = model.addJoint(base + parent, fixed.joints[index], fixed.jointPlacements[index], fixed.names[index])
-            model.inertias[at] = fixed.inertias[index]
-        model.gravity.linear[:] = 0.0
-        return model
+        return floating(self.model)
 
-    @property
-    def _floating_data(self) -> pin.Data:
-        if not hasattr(self._per_thread, "afloat"):
-            self._per_thread.afloat = self._floating_model.createData()
-        return self._per_thread.afloat
+    @cached_property
+    def _depth_first(self) -> DepthFirst:
+        return depth_first(self.model)
 
     def distal_weights(self) -> Array:
         """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
@@ -277,16 +280,17 @@ class RigidBody:
             rows = [self.kinematics(*row) for row in zip(q, v, bases, strict=True)]
             return Kinematics(*(np.array([getattr(k, name) for k in rows]) for name in Kinematics.__annotations__))
         jacobian = self.jacobian(q)
-        # Pinocchio's kinetic energy is without what turns with the joints' motors.
-        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v) + 0.5 * self.model.armature @ (v * v)
+        # Pinocchio's own has the inertia of rotors for some kinds of joints only.
+        kinetic = 0.5 * v @ self.mass_matrix(q) @ v
+        potential = pin.computePotentialEnergy(self.model, self._data, q)
         # Only now is every branch placed: a Jacobian places its own alone.
         directions = self._directions()
-        potential = pin.computePotentialEnergy(self.model, self._data, q)
         if base is not None:
-            model, data = self._floating_model, self._floating_data
+            model, data = self._floating_model, self._memory("floating", self._floating_model)
             pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
             moving = np.concatenate([base[3:6], base[:3], v])
             kinetic = pin.computeKineticEnergy(model, data, np.append(pose, q), moving)
+            kinetic += 0.5 * self.model.armature @ (v * v)
             centre = pin.centerOfMass(self.model, self._data, q)
             potential = -self.mass * float(base[12:15] @ centre)
         return Kinematics(

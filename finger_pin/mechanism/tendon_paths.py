@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, pat
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import RowSignals, weighted_sum
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
-from finger_pin.mechanism.spans.span import SIDE_ON_OTHER_BODY
+from finger_pin.mechanism.spans.span import COINCIDENT, SIDE_ON_OTHER_BODY
 from finger_pin.mechanism.tendon_wraps import Wrap
 from finger_pin.typing import Array
 
@@ -56,8 +56,9 @@ class TendonPath:
     def beyond(self, wrap: Wrap, coefficients: Array) -> TendonPath:
         """Return the path from a wrap to the end, with the given coefficients; only the wrap turns."""
         legs = [replace(leg, bends=leg.bends and k < wrap.last) for k, leg in enumerate(self.legs) if k >= wrap.first]
-        # The leg before says which way it comes.
-        before = [replace(leg, arm=0.0, bends=False) for leg in self.legs[max(wrap.first - 1, 0) : wrap.first]]
+        # The leg before says which way it comes, if its ends lie apart.
+        last = max((k for k, leg in enumerate(self.legs[: wrap.first]) if leg.apart), default=0)
+        before = [replace(leg, arm=0.0, bends=False) for leg in self.legs[last : wrap.first]]
         return TendonPath(coefficients, (*before, *legs))
 
     def times(self, factor: float) -> TendonPath:
@@ -92,19 +93,20 @@ class TendonPaths:
     ) -> TendonPaths:
         """Read the tendons of a finger on a rigid body, on which the bodies of its tree have their places."""
         tree, joints = description.tree, list(description.joints)
+        references = np.array([joint.reference for joint in tree.joints.values()])
+        placements = body.placements(references)[0] if tree.tendons else []
         routes = {}
         for name, tendon in tree.tendons.items():
             coefficients = np.zeros(len(joints))
             for joint, coefficient in (tendon.joints or {}).items():
                 coefficients[joints.index(joint)] = coefficient
-            routes[name] = _route(coefficients, tendon.path or {}, placed or {})
+            routes[name] = _route(coefficients, tendon.path or {}, placed or {}, placements)
         crossing = zip(description.tendons.items(), Routing.from_description(description).coupling, strict=True)
         pulled = {
             name: TendonPath(-arms, ()) if tendon.along is None else routes[tendon.along]
             for (name, tendon), arms in crossing
         }
         middles = {name: 0.5 * sum(joint.range) for name, joint in description.joints.items()}
-        references = np.array([joint.reference for joint in tree.joints.values()])
         return cls(body, routes, pulled, placed or {}, middles, references)
 
     @cached_property
@@ -140,7 +142,12 @@ class TendonPaths:
         return kinematics.length + self.fixed @ q, kinematics.arm + self.fixed, kinematics.turn
 
 
-def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> TendonPath:
+def _route(
+    coefficients: Array,
+    path: Mapping[str, Waypoint],
+    placed: Mapping[str | None, Placed],
+    placements: Sequence[pin.SE3],
+) -> TendonPath:
     """Return a tendon's path; the turn before the first pulley is that of its canal."""
     parts: list[tuple[float, list[PathTerm]]] = [(1.0, [])]
     before: Place | None = None
@@ -153,7 +160,9 @@ def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[st
             point = placed[waypoint.body].place(waypoint.position)
             if before is not None:
                 legs = parts[-1][1]
-                legs.append(PathTerm(_piece(before, point, wrap, placed), follows=bool(legs)))
+                ends = [placements[end.joint].act(end.point) for end in (before, point)]
+                apart = float(np.linalg.norm(ends[1] - ends[0])) > COINCIDENT
+                legs.append(PathTerm(_piece(before, point, wrap, placed), follows=bool(legs), apart=apart))
             before, wrap = point, None
         else:
             wrap = waypoint

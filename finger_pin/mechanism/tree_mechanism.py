@@ -110,11 +110,11 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
     for name, tip in tips.items():
         placement = placed[tip.body].frame * pin.SE3(np.eye(3), np.array(tip.position))
         model.addFrame(pin.Frame(name, placed[tip.body].joint, 0, placement, pin.FrameType.OP_FRAME))
-    pin.crba(model, data := model.createData(), pin.neutral(model))
-    for name, moment in zip(tree.joints, np.diag(data.M), strict=True):
+    rigid_body = RigidBody(model, list(tips))
+    for name, moment in zip(tree.joints, np.diag(rigid_body.mass_matrix(pin.neutral(model))), strict=True):
         if not moment > 0.0:
             raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
-    return RigidBody(model, list(tips)), placed
+    return rigid_body, placed
 
 
 def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows) -> Rows:

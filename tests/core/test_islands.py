@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from core_cases import FORCE, Case
+from joined_mechanisms import join_mechanisms
 from test_any_mechanism import assert_same
 
 import finger_pin as fp
@@ -36,7 +37,7 @@ class Joined:
         """Join loops by their names."""
         self.loops = loops
         parts = {name: loop.finger.mechanism for name, loop in loops.items()}
-        self.parts, self.mechanism = tuple(parts.values()), Mechanism.from_parts(parts)
+        self.parts, self.mechanism = tuple(parts.values()), join_mechanisms(parts)
 
     def pack(self, vectors):
         """Join packed vectors of the fingers, shape (..., size), one for each."""
@@ -217,7 +218,7 @@ def test_parts_under_different_gravity_are_not_joined(scenarios):
         for name, g in (("index", -9.81), ("thumb", 0.0))
     }
     with pytest.raises(InputError, match=r"thumb\.gravity"):
-        Mechanism.from_parts(parts)
+        join_mechanisms(parts)
 
 
 STILL = """<mujoco><option gravity="0 0 0"/><worldbody><site name="p" pos="-.03 0 .01"/>

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.analysis import settled_posture
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.validation import validate
 from finger_pin.identification.recordings import read_recording
-from finger_pin.identification.settled import settled_posture
 from finger_pin.identification.steady_data import SteadyReadings
 
 THREE = """
@@ -79,6 +79,27 @@ def test_a_posture_at_rest_is_found_from_near_and_far(speed, near):
     finger = fp.Finger(fp.load_scenario("canal", {COULOMB: 0.15}).finger)
     found = settled_posture(finger, np.array([4.0]), speed, np.array([near]), np.zeros(3))
     assert found == pytest.approx([0.02 * 4.0 * np.exp(-0.15 * TURN * np.sign(speed or 0.0)) / 0.2], rel=1e-6)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_each_bend_of_a_cord_takes_its_part_before_the_joints_behind_it(tmp_path, way):
+    """k_j q_j = r_j T exp(-mu sum of the turns up to j), drawn in, and with the other sign let out."""
+    text = THREE.replace("radius =", "bends = true, radius =").replace(
+        "[controller]", "[finger.tendon_friction]\n[controller]"
+    )
+    (tmp_path / "three.toml").write_text(text)
+    friction = {"place": "bends", "coulomb": 0.2, "stiction_ratio": 1.0, "viscous": 0.0}
+    springs = {f"finger.joints.{name}.spring": {"stiffness": SPRING[name]} for name in RADIUS}
+    free = {"finger.joint_friction": {"coulomb": 0.0, "stiction": 0.0}, "finger.tendon_friction": friction}
+    scenario = fp.load_scenario(str(tmp_path / "three.toml"), springs | free)
+    told = {"kind": "steady", "speed": 1e-4 * way, "inputs": {"tendon_command.flexor": "in"}, "outputs": POSTURE}
+    pull = np.array([2.0, 6.0])
+    data = {"in": pull, **{name: np.full(2, 0.1) for name in RADIUS}}
+    settings = validate(RecordingSettings, told, ("identify", "recordings", "one"))
+    found = np.array(SteadyReadings(read_recording("one", settings, data), scenario).compute(scenario, {}))
+    radius, spring = (np.array([*each.values()])[:, None] for each in (RADIUS, SPRING))
+    left = pull * np.exp(-0.2 * way * np.cumsum(np.abs(found), axis=0))
+    np.testing.assert_allclose(spring * found, radius * left, rtol=2e-3)
 
 
 @pytest.mark.parametrize(

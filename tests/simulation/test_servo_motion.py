@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import tomli_w
+from joined_mechanisms import join_mechanisms
 from scipy.integrate import solve_ivp
 from servo_cases import INERTIA, LINK, LINK_INERTIA, RADIUS, SMOOTH, SPOOL, finger, scenario, together
 
 import finger_pin as fp
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.mechanism.mechanism import Mechanism
 
 K, D, G = 6000.0 / 0.3, 10.0, 9.81
 
@@ -223,7 +223,7 @@ def test_a_servo_that_is_let_go_carries_no_current_and_is_turned_back_through_it
 def test_hands_of_servos_fall_into_islands_that_move_as_each_does_alone():
     """The second tendon of a spool has an input that goes nowhere, the last one of all among them."""
     made = [finger(SMOOTH, opposed=True, drive="position", pretension=3.0, tendon_damping=each) for each in (5.0, 20.0)]
-    whole = Mechanism.from_parts({"left": made[0].mechanism, "right": made[1].mechanism})
+    whole = join_mechanisms({"left": made[0].mechanism, "right": made[1].mechanism})
 
     def stepper(mechanism, starts):
         q, v, z = zip(*(part.split(start) for part, start in starts), strict=True)

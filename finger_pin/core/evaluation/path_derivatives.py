@@ -9,13 +9,14 @@ from finger_pin.core.buffers import Work
 from finger_pin.core.evaluation.blocks import partition
 from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
-from finger_pin.core.evaluation.shape_code import GAP_OUT
+from finger_pin.core.evaluation.shape_code import GAP_OUT, SPAN_OUT
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, njit_always_inline, njit_inline, unpack
 from finger_pin.core.linear_systems import Linear
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import PIECE, WRENCH, PathParameters, PathStructure
 from finger_pin.core.structure import Structure
+from finger_pin.mechanism.spans.span import COINCIDENT
 
 
 @njit_always_inline
@@ -93,17 +94,19 @@ def _slopes_of_piece(paths: PathStructure, geometry: PathParameters, e: int, wor
 def _add_turns(structure: Structure, work: Work, linear: Linear, index: int) -> None:
     """Add the derivatives of the angle by which a row's path turns."""
     paths, pieces = structure.paths, work.paths
-    k, gather = paths.rows[index], pieces.gather
+    k, gather, before, bends = paths.rows[index], pieces.gather, -1, False
     for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
         e = paths.piece[leg]
-        if not paths.bends[leg]:
+        if paths.bends[leg]:
+            for s in range(paths.start[e], paths.start[e + 1]):
+                gather[paths.at[s]] += pieces.turn_slope[s]
+        before, bends = (before, bends or paths.bends[leg] > 0) if paths.follows[leg] else (-1, False)
+        if not pieces.out[e, SPAN_OUT.length] > COINCIDENT:
             continue
-        for s in range(paths.start[e], paths.start[e + 1]):
-            gather[paths.at[s]] += pieces.turn_slope[s]
-        if not paths.follows[leg]:
+        earlier, turning, before, bends = before, bends, e, False
+        if earlier < 0 or not turning:
             continue
-        before = paths.piece[leg - 1]
-        incoming, outgoing = pieces.wrench[before, 0, 9:12], pieces.wrench[e, 0, 3:6]
+        incoming, outgoing = pieces.wrench[earlier, 0, 9:12], pieces.wrench[e, 0, 3:6]
         _, sine = angle_between(incoming, outgoing)
         # A straight corner is a kink, as |q| is at 0.
         inverse = 1.0 / sine if sine > 1e-12 else 0.0
@@ -111,7 +114,7 @@ def _add_turns(structure: Structure, work: Work, linear: Linear, index: int) -> 
             change = pieces.wrench_slope[s, 0]
             for r in range(3):
                 gather[paths.at[s]] += inverse * incoming[r] * change[3 + r]
-        for s in range(paths.start[before], paths.start[before + 1]):
+        for s in range(paths.start[earlier], paths.start[earlier + 1]):
             change = pieces.wrench_slope[s, 0]
             for r in range(3):
                 gather[paths.at[s]] += inverse * change[9 + r] * outgoing[r]

@@ -23,6 +23,7 @@ from finger_pin.core.mechanism_parameters import Parameters
 from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import PIECE, WRENCH, PathParameters, PathStructure
 from finger_pin.core.structure import Structure
+from finger_pin.mechanism.spans.span import COINCIDENT
 
 
 @njit_inline
@@ -176,7 +177,7 @@ def measure_paths(structure: Structure, parameters: Parameters, work: Work) -> N
         if at < arms * closed:
             index = paths.row[pieces.closed[at // arms]] + at % arms
         k = paths.rows[index]
-        length, turn = 0.0, 0.0
+        length, turn, before, bends = 0.0, 0.0, -1, False
         begin, end = structure.arm_start[k], structure.arm_start[k + 1]
         for a in range(begin, end):
             work.arm[a] = parameters.arm[a]
@@ -189,10 +190,12 @@ def measure_paths(structure: Structure, parameters: Parameters, work: Work) -> N
                 continue
             if paths.bends[leg] and paths.columns[e] == 1:
                 turn += pieces.out[e, SPAN_OUT.turn]
-            if paths.bends[leg] and paths.follows[leg]:
-                before = paths.piece[leg - 1]
-                cosine, sine = angle_between(pieces.wrench[before, 0, 9:12], pieces.wrench[e, 0, 3:6])
-                turn += np.arctan2(sine, cosine)
+            before, bends = (before, bends or paths.bends[leg] > 0) if paths.follows[leg] else (-1, False)
+            if paths.columns[e] == 1 and pieces.out[e, SPAN_OUT.length] > COINCIDENT:
+                if before >= 0 and bends:
+                    cosine, sine = angle_between(pieces.wrench[before, 0, 9:12], pieces.wrench[e, 0, 3:6])
+                    turn += np.arctan2(sine, cosine)
+                before, bends = e, False
             for r in range(paths.start[e], paths.start[e + 1]):
                 net_wrench(paths.moves[r], pieces.wrench[e, m], net)
                 gather[paths.at[r]] = dot(axes[paths.at[r]], net)

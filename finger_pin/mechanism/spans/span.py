@@ -34,6 +34,8 @@ class WrapSegment:
 #: Numbers of a wrap: its radius, m; the side point, m; whether there is one; whether the path passes inside. A side
 #: point that another body carries is a third point in y, and inside if it is nearer than the radius.
 WRAP = ("radius", "side_x", "side_y", "side_z", "has_side", "inside")
+#: Points no farther apart are at one place, m: the leg between them has no direction.
+COINCIDENT = 1e-9
 #: What ``has_side`` is for a side point in y.
 SIDE_ON_OTHER_BODY = 2.0
 
@@ -49,7 +51,7 @@ def side_point(y: Any, p: Any) -> Any:
 def straight_value(y: Any, p: Any, out: Any) -> None:
     """Fill in length, no turn, and pull; no pull between coincident points."""
     length = math.sqrt((y[3] - y[0]) ** 2 + (y[4] - y[1]) ** 2 + (y[5] - y[2]) ** 2)
-    share = 1.0 / length if length > 0.0 else 0.0
+    share = 1.0 / length if length > COINCIDENT else 0.0
     out[0] = length
     out[1] = 0.0
     for i in range(3):
@@ -60,7 +62,7 @@ def straight_value(y: Any, p: Any, out: Any) -> None:
 def straight_slopes(y: Any, p: Any, out: Any) -> None:
     """Fill in the slopes: (I - d d^T) / length, for the direction d."""
     length = math.sqrt((y[3] - y[0]) ** 2 + (y[4] - y[1]) ** 2 + (y[5] - y[2]) ** 2)
-    share = 1.0 / length if length > 0.0 else 0.0
+    share = 1.0 / length if length > COINCIDENT else 0.0
     for i in range(3):
         out[i] = 0.0
         out[3 + i] = 0.0
