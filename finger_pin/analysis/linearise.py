@@ -1,8 +1,8 @@
 """Linearisation at a state: A, B, C, D, E of x' = f(x, u, p), y = h(x, u, p), or of the map over a step.
 
-Derivatives are differences of sixth order of the compiled evaluation, whose rounding they come near. Near a kink, such
-as where sliding reverses, they are of third order and from the state's side alone. At a kink, such as that of friction
-at rest, they are the mean of both sides, as the exact slopes of the laws are.
+Derivatives of f and h are differences of sixth order of the compiled evaluation, whose rounding they come near. Near a
+kink, such as where sliding reverses, they are of third order and from the state's side alone. At a kink, such as that
+of friction at rest, they are the mean of both sides, as the exact slopes of the laws are.
 """
 
 from __future__ import annotations
@@ -14,12 +14,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from finger_pin.analysis.step_map import StepMap
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.inputs import held_control
-from finger_pin.core.stepping.integrator import integrate_compiled
-from finger_pin.core.stepping.repetition import Steps
-from finger_pin.core.stepping.stepper import Stepper
-from finger_pin.core.stepping.tableaus import rodas5p
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
@@ -39,12 +35,9 @@ _SLOPE_TOLERANCE, _ROUNDING, _MAX_TRIALS, _STEP_DIVISOR = 1e-4, 1e-13, 4, 10.0
 _STATE_STEP, _INPUT_STEP, _PARAMETER_STEP = 1e-4, 1e-3, 1e-4
 # Steps of a map over these.
 _MAP_STEP_SHARE = 1e-3
-# Shift of the state, in its scales, of the motion whose time steps are used for all changes.
-_START_SHIFT = 1e-3
-# Tolerance of the step whose map is differentiated; it is taken again on the same steps.
-_STEP_TOLERANCE = 1e-9
 
-_Map = Callable[[Finger, Array, Array], Array]
+# Maps states, inputs, shapes (m, n) and (m, u), to numbers, shape (m, k).
+_Response = Callable[[Array, Array], Array]
 
 
 def linearise(
@@ -92,30 +85,45 @@ def linearise(
         raise InputError("parameters", "are those of a scenario: give one in place of the finger", list(parameters))
     x = as_packed(finger, state, "state")
     u = as_inputs(finger, inputs)
-    rate_or_map = _rate if dt is None else _step_map(finger, x, u, dt)
+    step_map = None if dt is None else StepMap(finger, x, u, dt)
 
-    def response(changed_finger: Finger, point: Array, inputs: Array) -> Array:
-        return np.concatenate([rate_or_map(changed_finger, point, inputs), _outputs(changed_finger, point, inputs)])
+    def response(changed: Finger) -> _Response:
+        compiled = CompiledFinger(changed)
+        return lambda states, commands: _rates_and_outputs(compiled, states, commands)
 
-    # The map is smooth on its steps, but curved where a kink is on the way: there steps are small.
-    step_share = 1.0 if dt is None else _MAP_STEP_SHARE
-    by_state = _slopes(lambda varied: response(finger, varied, u), x, step_share * _STATE_STEP * finger.layout.scales())
-    by_input = _slopes(lambda varied: response(finger, x, varied), u, np.full(len(u), step_share * _INPUT_STEP))
-    by_parameter = np.zeros((len(by_state[0]), 0)), np.zeros(0, int)
+    plain = response(finger)
+    steps = _STATE_STEP * finger.layout.scales(), np.full(len(u), _INPUT_STEP)
+    value = plain(x[None], u[None])[0]
+    by_state = _slopes(lambda states: plain(states, np.tile(u, (len(states), 1))), x, steps[0])
+    by_input = _slopes(lambda commands: plain(np.tile(x, (len(commands), 1)), commands), u, steps[1])
+    by_parameter = np.zeros((len(value), 0)), np.zeros(0, int)
+    values = sizes = np.zeros(0)
     if parameters:
         assert scenario is not None
-        family = ParametrisedScenario(scenario, tuple(parameters))
-        for key, value in zip(parameters, family.values, strict=True):
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise InputError(key, "must be a single number of the scenario", value)
-        values = np.array(family.values, dtype=float)
-        sizes = step_share * _PARAMETER_STEP * np.where(values == 0.0, 1.0, np.abs(values))
+        changed, values = _single_numbers(scenario, parameters)
+        sizes = _PARAMETER_STEP * np.where(values == 0.0, 1.0, np.abs(values))
+        by_parameter = _slopes(
+            lambda varied: np.array([response(changed(each))(x[None], u[None])[0] for each in varied]),
+            values,
+            sizes,
+            least=values == 0.0,
+        )
+    if step_map is not None:
+        size = len(x)
+        value[:size] = step_map.end
+        by_state[0][:size], by_input[0][:size] = step_map.slopes(*(_MAP_STEP_SHARE * each for each in steps))
+        if parameters:
+            by_parameter[0][:size] = step_map.slopes_by(changed, values, _MAP_STEP_SHARE * sizes)
+    return _dataset(finger, value, (by_state, by_input, by_parameter), list(parameters), dt)
 
-        def changed(varied: Array) -> Array:
-            return response(_build_finger(family.with_values(varied.tolist())), x, u)
 
-        by_parameter = _slopes(changed, values, sizes, least=values == 0.0)
-    return _dataset(finger, response(finger, x, u), (by_state, by_input, by_parameter), list(parameters), dt)
+def _single_numbers(scenario: Scenario, parameters: Sequence[str]) -> tuple[Callable[[Array], Finger], Array]:
+    """Return the finger of a scenario with other numbers, and the numbers that it has; refuse what is no single one."""
+    family = ParametrisedScenario(scenario, tuple(parameters))
+    for key, value in zip(parameters, family.values, strict=True):
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(key, "must be a single number of the scenario", value)
+    return lambda values: _build_finger(family.with_values(values.tolist())), np.array(family.values, dtype=float)
 
 
 def _build_finger(scenario: Scenario) -> Finger:
@@ -123,81 +131,80 @@ def _build_finger(scenario: Scenario) -> Finger:
 
 
 def _slopes(
-    function: Callable[[Array], Array], point: Array, steps: Array, least: Array | None = None
+    function: Callable[[Array], Array], point: Array, steps: Array, least: NDArray[np.bool_] | None = None
 ) -> tuple[Array, NDArray[np.int_]]:
     """Return the derivatives of a vector by a vector, shape (k, n), and from which sides they are, shape (n,).
 
     At the least value that is allowed they are from above, and 0 is said.
+
+    Args:
+        function: Maps m points, shape (m, n), to vectors, shape (m, k).
+        point: Shape (n,).
+        steps: Shape (n,).
+        least: Where a number must not be less, shape (n,).
     """
-    value = function(point)
+    value = function(point[None])[0]
     columns, sides = np.zeros((len(value), len(point))), np.zeros(len(point), int)
-    for k, step in enumerate(steps):
+    bounded: NDArray[np.bool_] = np.zeros(len(point), bool) if least is None else np.asarray(least, dtype=bool)
 
-        def line(offsets: Array, k: int = k) -> Array:
-            unit = np.arange(len(point)) == k
-            return np.array([function(point + each * unit) if each else value for each in offsets])
+    def lines(which: NDArray[np.intp], h: Array, offsets: Array) -> Array:
+        """Return the values at offsets along some numbers, shape (len(which), offsets, k); 0 is the point itself."""
+        moved = np.flatnonzero(offsets)
+        points = np.tile(point, (len(which), len(moved), 1))
+        points[np.arange(len(which)), :, which] += h[:, None] * offsets[moved]
+        values = np.tile(value, (len(which), len(offsets), 1))
+        if points.size:
+            values[:, moved] = function(points.reshape(-1, len(point))).reshape(len(which), len(moved), -1)
+        return values
 
-        if least is not None and least[k]:
-            columns[:, k] = _FORWARD[0] @ line(step * _OFFSETS[3:]) / step
-        else:
-            columns[:, k], sides[k] = _slope(line, value, step)
+    above = np.flatnonzero(bounded)
+    columns[:, above] = (
+        np.einsum("o,cok->ck", _FORWARD[0], lines(above, steps[above], _OFFSETS[3:])) / steps[above, None]
+    ).T
+    pending = np.flatnonzero(~bounded)
+    for trial in range(_MAX_TRIALS):
+        h = steps[pending] / _STEP_DIVISOR**trial
+        undecided = []
+        for k, values, size in zip(pending, lines(pending, h, _OFFSETS), h, strict=True):
+            slope, side = _slope(values, value, size)
+            if trial == 0 or side is not None:
+                columns[:, k], sides[k] = slope, side or 0
+            if side is None:
+                undecided.append(k)
+        pending = np.array(undecided, dtype=np.intp)
+        if not len(pending):
+            break
     return columns, sides
 
 
-def _slope(line: Callable[[Array], Array], value: Array, step: float) -> tuple[Array, int]:
-    """Return the derivative along a line, and its side: 1 above, -1 below, 0 for a central difference."""
-    centrals = []
-    for h in step / _STEP_DIVISOR ** np.arange(_MAX_TRIALS):
-        values = line(h * _OFFSETS)
-        central = _CENTRAL @ values / h
-        above, below = [weights @ values[3:] / h for weights in _FORWARD], [-w @ values[3::-1] / h for w in _FORWARD]
+def _slope(values: Array, value: Array, h: float) -> tuple[Array, int | None]:
+    """Return the derivative along a line of values at `_OFFSETS`, and its side: 1 above, -1 below, 0 central.
 
-        def agree(first: Array, second: Array, h: float = h) -> bool:
-            tolerance = _SLOPE_TOLERANCE * np.maximum(abs(first), abs(second)) + _ROUNDING * np.max(abs(value)) / h
-            return bool((abs(first - second) <= tolerance).all())
+    None: both sides have a kink.
+    """
+    central = _CENTRAL @ values / h
+    above, below = [weights @ values[3:] / h for weights in _FORWARD], [-w @ values[3::-1] / h for w in _FORWARD]
 
-        centrals.append(central)
-        if agree(above[0], below[0]):
-            return central, 0
-        if (side := agree(*above) - agree(*below)) != 0:
-            return (above if side > 0 else below)[0], side
-    return centrals[0], 0
+    def agree(first: Array, second: Array) -> bool:
+        tolerance = _SLOPE_TOLERANCE * np.maximum(abs(first), abs(second)) + _ROUNDING * np.max(abs(value)) / h
+        return bool((abs(first - second) <= tolerance).all())
 
-
-def _rate(finger: Finger, x: Array, u: Array) -> Array:
-    return np.asarray(CompiledFinger(finger).evaluate(x, u).rate)
+    if agree(above[0], below[0]):
+        return central, 0
+    if (side := agree(*above) - agree(*below)) != 0:
+        return (above if side > 0 else below)[0], side
+    return central, None
 
 
-def _step_map(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
-    """Return the map over a step, always on the same steps of the integrator."""
-
-    def stepped(other: Finger, start: Array, inputs: Array, ends: list[Array] | None) -> tuple[Array, list[Array]]:
-        mechanism, atol = other.mechanism, _STEP_TOLERANCE * other.layout.scales()
-        control = held_control(mechanism.channels, mechanism.coordinates)
-        stepper = Stepper(mechanism, control, start, rodas5p(), _STEP_TOLERANCE, atol)
-        stepper.hold(inputs)
-        if ends is not None:
-            stepper.repeat([Steps.from_ends(each) for each in ends])
-        trajectory = integrate_compiled(stepper, dt, other.layout.names)
-        if trajectory.failure:
-            raise InputError("state", f"cannot be integrated over dt: {trajectory.failure}")
-        return stepper.x, [each.ends for each in trajectory.steps]
-
-    # At rest nothing moves, and one step would do: those of a motion nearby follow what a change sets off.
-    ends = stepped(finger, x + _START_SHIFT * finger.layout.scales(), u, None)[1]
-    return lambda other, start, inputs: stepped(other, start, inputs, ends)[0]
-
-
-def _outputs(finger: Finger, x: Array, u: Array) -> Array:
-    compiled = CompiledFinger(finger)
-    signals = compiled.evaluate(x, u)
-    state = signals.state
-    routing, strands = finger.routing, signals.tendons.strands
+def _rates_and_outputs(compiled: CompiledFinger, x: Array, u: Array) -> Array:
+    """Return rates and outputs at packed states under inputs, shape (m, n + outputs)."""
+    signals, routing = compiled.evaluate(x, u), compiled.finger.routing
+    state, strands = signals.state, signals.tendons.strands
+    tip = compiled.motion(state.position, state.velocity).tip.reshape(len(x), -1)
+    current = signals.motors.current if signals.motors is not None else np.zeros((len(x), 0))
     # Of a passive tendon, the distal half.
-    tension = np.concatenate([strands[: routing.actuated], strands[routing.actuated + 1 :: 2]])
-    tip = np.ravel(compiled.motion(state.position, state.velocity).tip)
-    current = signals.motors.current if signals.motors is not None else np.zeros(0)
-    return np.concatenate([state.position, state.velocity, tension, tip, current])
+    tensions = strands[:, : routing.actuated], strands[:, routing.actuated + 1 :: 2]
+    return np.concatenate([signals.rate, state.position, state.velocity, *tensions, tip, current], axis=1)
 
 
 def _output_names(finger: Finger, count: int) -> list[str]:

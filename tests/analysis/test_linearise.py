@@ -81,6 +81,28 @@ def test_the_map_over_a_step_is_what_mujoco_s_steps_near_as_they_get_shorter():
     assert np.all(abs(2.0 * errors[2] - errors[1]) < 0.1 * largest[-1])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("speed", [(0.8, -0.5), (-0.02, 0.001), (0.0, 0.0)])
+def test_the_map_over_reversals_is_that_of_runs_from_changed_states(speed):
+    """Central differences of runs at 1e-12 that choose their own steps; the second joint turns round on the way."""
+    finger, u, dt, h = fp.Finger("planar"), np.array([4.0, 3.5, 3.2]), 1e-3, 1e-8
+    names = list(finger.layout.names)
+    x = finger.rest_state(np.array([0.5, 0.6]), np.array(speed))
+    x[[k for k, name in enumerate(names) if "stiction" in name]] = 1e-3
+
+    def end(start):
+        simulator = fp.Simulator(finger, position=[0.5, 0.6], rtol=1e-12, atol_scale=1e-12)
+        simulator.x = start
+        simulator.step(u, dt)
+        return np.array(simulator.x)
+
+    columns = [(end(x + h * unit) - end(x - h * unit)) / (2.0 * h) for unit in np.eye(len(x))]
+    found, expected = fp.linearise(finger, x, u, dt=dt), np.transpose(columns)
+    rows = np.abs(expected).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(found.A.values / rows, expected / rows, atol=2e-4)
+    np.testing.assert_allclose(found.rate, end(x), rtol=1e-6, atol=1e-9)
+
+
 def test_what_cannot_be_linearised_is_refused(drum):
     scenario, x = drum
     for arguments, said in (

@@ -232,9 +232,9 @@ class IslandIntegrator:
 
     def repeat(self, steps: Steps) -> None:
         """Repeat given steps from now on, regardless of errors."""
-        if steps.branches.shape[1] != len(self._bound.kinks):
-            steps = steps._replace(branches=np.zeros((len(steps.ends), 0)))
-        self.steps = steps
+        known = steps.branches.shape[1] == len(self._bound.kinks)
+        # A tuple of its own, so that the same steps are counted anew.
+        self.steps = steps._replace(branches=steps.branches if known else np.zeros((len(steps.ends), 0)))
 
     def copy(self) -> IslandIntegrator:
         """Return an independent integrator that continues with the same bits."""
