@@ -37,7 +37,7 @@ def readings(rng: np.random.Generator, coulomb: float, drag: float, offset: floa
     load = np.repeat(np.linspace(3.0, 15.0, 6), 6)
     way = np.tile([1.0, 1.0, 1.0, -1.0, -1.0, -1.0], 6)
     out = load * np.exp(-way * coulomb * TURN) - way * drag / (1.0 + way * np.tanh(coulomb * TURN / 2.0))
-    return {"in": load, "way": way, "out": out + offset + rng.normal(0.0, NOISE, load.size)}
+    return {"in": load, "way": way, "out": out - offset + rng.normal(0.0, NOISE, load.size)}
 
 
 def motion(rng: np.random.Generator, coulomb: float, drag: float, delay: float, turn: float = TURN) -> Made:

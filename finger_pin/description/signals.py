@@ -34,6 +34,7 @@ _ENTRIES_OF_KIND: dict[str, tuple[str, ...]] = {
     "points": ("times", "values"),
     "cosine": ("times", "values"),
     "samples": ("times", "values"),
+    "hold": ("times", "values"),
 }
 _ANGLE = real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)
 _FORCE = real(-_MOST_FORCE, _MOST_FORCE)
@@ -48,14 +49,14 @@ class SignalSettings(Description):
 
     A step adds ``height`` from ``time`` on; a ramp reaches it after ``duration``. Points are joined by motions of least
     jerk that rest at every point (Flash and Hogan, J. Neuroscience 5(7), 1985), of kind "cosine" by half periods of a
-    cosine; samples by monotone cubics (Fritsch and Butland, SIAM J. Scientific Computing 5(2), 1984). None overshoots,
-    and all are constant before and after.
+    cosine; samples by monotone cubics (Fritsch and Butland, SIAM J. Scientific Computing 5(2), 1984); of kind "hold" a
+    value stays until the next (zero-order hold). None overshoots, and all are constant before and after.
     """
 
-    kind: Annotated[Literal["sine", "step", "ramp", "points", "cosine", "samples"], choice(*_ENTRIES_OF_KIND)] = (
-        quantity(
-            "sine", unit="1", source="chosen", doc="Function that is added to the sinusoid: none, or one of these."
-        )
+    kind: Annotated[
+        Literal["sine", "step", "ramp", "points", "cosine", "samples", "hold"], choice(*_ENTRIES_OF_KIND)
+    ] = quantity(
+        "sine", unit="1", source="chosen", doc="Function that is added to the sinusoid: none, or one of these."
     )
     frequency: Annotated[float, real(0.0, 1e4)] = quantity(
         0.0, unit="Hz", source="chosen", doc="Frequency of the sinusoid."

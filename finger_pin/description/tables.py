@@ -28,7 +28,7 @@ PACKED_PREFIX = "base64:"
 # Of more numbers than this a text is written that is read at once; nobody reads them one by one.
 _MOST_PLAIN_NUMBERS = 10_000
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
-_KINDS_APART = {"step", "ramp", "points", "cosine", "samples", "tensions"}
+_KINDS_APART = {"step", "ramp", "points", "cosine", "samples", "hold", "tensions"}
 _INDEXED_KEY = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6}(,\d{1,6})*)\]")
 _Settings = TypeVar("_Settings", bound=Description)
 

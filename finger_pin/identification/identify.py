@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -116,7 +115,7 @@ def identify(
     with Checkpoint(None if output is None else Path(output), request, restart) as checkpoint:
         pipeline = FitPipeline(problem, checkpoint, loss, progress)
         result = _run_pipeline(problem, settings, starting_points(problem, starts, seed), starts, pipeline, profiles)
-        result.attrs["undamped"] = ", ".join(_undamped_joints(scenario, problem))
+        result.attrs["ringing"] = _ringing(problem, pipeline.best.z)
         result.attrs["profiles"] = int(profiles)
         result.attrs["custom_finger"] = int(custom_finger is not None)
         result.update(predictions(result, scenario, held_out, recorded, custom_finger))
@@ -127,11 +126,11 @@ def identify(
 
 
 def _model_warnings(problem: Problem, scenario: Scenario) -> Iterator[str]:
-    """Yield warnings: the first one of every recording, and tolerances that are too coarse for slopes."""
+    """Yield warnings: of the first window of every recording that has any, and of too coarse tolerances."""
     for name in dict.fromkeys(each.recording.name for each in problem.models):
         keys = [key_in(key, name) for key in problem.keys]
-        messages = (each.warning(keys) for each in problem.models if each.recording.name == name)
-        yield from itertools.islice(filter(None, messages), 1)
+        messages = (each.warnings(keys) for each in problem.models if each.recording.name == name)
+        yield from next(filter(None, messages), [])
     for name in ("rtol", "atol_scale") if problem.has_motion else ():
         tolerance = getattr(scenario.simulation, name)
         if tolerance > GREATEST_TOLERANCE:
@@ -162,18 +161,10 @@ def _run_pipeline(
     return result_dataset(problem, pipeline.fits, pipeline.best, ends, covariance, pipeline.comparison, unfinished)
 
 
-def _undamped_joints(scenario: Scenario, problem: Problem) -> list[str]:
-    """Return the undamped joints in motions; held by friction they ring, which takes ten times the steps."""
-    finger, joints = scenario.finger, list(scenario.finger.joints)
-    friction = finger.numbers["joint_friction"]
-    damped = friction["viscous"] + friction["micro_damping"]
-    damped += [0.0 if joint.spring is None else joint.spring.damping for joint in finger.joints.values()]
-    tendons_damp = bool(np.any(finger.numbers["tendon_friction"]["viscous"] > 0.0))
-    settings = [model.recording.settings for model in problem.models]
-    computed = any(each.kind == "motion" and not each.imposed for each in settings)
-    if tendons_damp or not computed:
-        return []
-    return [name for name, value in zip(joints, damped, strict=True) if value == 0.0]
+def _ringing(problem: Problem, z: Array) -> str:
+    """Return the first warning about what rings in the motions at a place of the search; empty without any."""
+    runs = zip(problem.models, problem.scenario_maps(), strict=True)
+    return next(filter(None, (model.ringing(*scenario_map(problem.values(z))) for model, scenario_map in runs)), "")
 
 
 def _as_builtin(value: Any) -> Any:

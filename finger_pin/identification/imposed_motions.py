@@ -7,29 +7,62 @@ and Surface Fitting with Splines, Oxford 1993, chapter 5). Bristles, springs, st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import PPoly, make_interp_spline, make_splrep
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, PPoly, make_interp_spline, make_splrep
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.recordings.bench import IMPOSED
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError
 from finger_pin.identification.motions import RecordedMotion
-from finger_pin.identification.recorded_inputs import Corrections, corrections
+from finger_pin.identification.recorded_inputs import without_commands
 from finger_pin.identification.recordings import RANGE_MARGIN, Recording
+from finger_pin.identification.scenario_parameters import Corrections, corrections
+from finger_pin.mechanism.finger import Finger
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 
 _SPLINE_DEGREE = 5
 # Extension of a motion's last piece, part of its duration, so that its end has an acceleration.
 _END_EXTENSION = 1e-9
+# A spline follows the noise where readings scatter by so many times its smoothing, and so large a part of the smooth
+# motion's acceleration is added by that; it is at most so many times the noise over the square of the period.
+_LEAST_EXCESS, _MOST_EXCESS_ACCELERATION, _NOISE_ACCELERATION = 1.5, 0.1, 5.0
 
 
 class ImposedMotion(RecordedMotion):
     """Recorded motion of all joints, or a window of one, whose effort is compared."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        scenario: Scenario,
+        rows: NDArray[np.intp],
+        window: int = 0,
+        finger: Finger | None = None,
+    ) -> None:
+        """Put the inputs into the scenario, in place of its own commands; as `RecordedMotion`.
+
+        Raises:
+            InputError: If a joint's motion, or a command that is no force, is missing.
+        """
+        scenario, self._dropped = without_commands(scenario, recording)
+        super().__init__(recording, scenario, rows, window, finger)
+
+    def warnings(self, searched_keys: Collection[str]) -> list[str]:
+        """Return warnings: of a motion's, of commands that are dropped, of splines that follow the noise."""
+        dropped = (
+            f"{self._entry}: {', '.join(self._dropped)} of the scenario is zero here, as no input gives it: a log of "
+            "efforts has all that pulls among its inputs"
+        )
+        noisy = (_noise_warning(self.recording, name, spline) for name, spline in self._splines.items())
+        return [*super().warnings(searched_keys), *([dropped] if self._dropped else []), *filter(None, noisy)]
 
     def _read_imposed_motion(self, scenario: Scenario) -> None:
         """Fit the splines.
@@ -52,6 +85,10 @@ class ImposedMotion(RecordedMotion):
             _check_range(f"{entry}.{name}", recording.inputs[name], scenario, joint)
         _check_actuators(entry, recording, scenario)
         self._splines = _splines(recording)
+
+    def ringing(self, scenario: Scenario, nuisance: Mapping[str, float]) -> str:
+        """Return an empty text: no joint rings that is given its motion."""
+        return ""
 
     def _loop(self, scenario: Scenario, nuisance: Mapping[str, float]) -> ClosedLoop:
         return super()._loop(scenario, nuisance).with_prescribed_motion(self._prescribed_motion(nuisance))
@@ -88,13 +125,50 @@ def _splines(recording: Recording) -> dict[str, PPoly]:
                 f"must be below {rms:.3g} rad, the rms of the readings about their mean, which it would smooth away"
             )
             raise InputError(f"{entry}.inputs.{name}.smoothing", allowed, smoothing)
-        if smoothing and rms:
-            spline = make_splrep(time, values, k=_SPLINE_DEGREE, s=len(time) * smoothing**2)
-        else:
-            spline = make_interp_spline(time, values, k=_SPLINE_DEGREE)
-        padded = PPoly.from_spline(spline)
+        padded = PPoly.from_spline(_smooth_spline(time, values, smoothing))
         splines[name] = PPoly(padded.c[:, _SPLINE_DEGREE:-_SPLINE_DEGREE], padded.x[_SPLINE_DEGREE:-_SPLINE_DEGREE])
     return splines
+
+
+def _smooth_spline(time: Array, values: Array, smoothing: float) -> BSpline:
+    """Return the spline of degree five with few knots that passes beside the values by a given rms, or through all."""
+    if smoothing and np.ptp(values):
+        return make_splrep(time, values, k=_SPLINE_DEGREE, s=len(time) * smoothing**2)
+    return make_interp_spline(time, values, k=_SPLINE_DEGREE)
+
+
+def _noise_warning(recording: Recording, name: str, spline: PPoly) -> str:
+    """Return a warning about a spline whose accelerations are those of the readings' noise; empty without any."""
+    time, values = recording.time, recording.inputs[name]
+    smoothing, noise = recording.settings.inputs[name].smoothing or 0.0, _noise(time, values)
+    followed = spline.derivative(2)(time)
+    largest_excess = _NOISE_ACCELERATION * noise / float(np.median(np.diff(time))) ** 2
+    if noise <= _LEAST_EXCESS * smoothing or largest_excess <= _MOST_EXCESS_ACCELERATION * np.std(followed):
+        return ""
+    smooth = _smooth_spline(time, values, noise).derivative(2)(time)
+    excess, acceleration = (float(np.sqrt(np.mean(each**2))) for each in (followed - smooth, smooth))
+    if excess <= _MOST_EXCESS_ACCELERATION * acceleration:
+        return ""
+    return (
+        f"identify.recordings.{recording.name}.inputs.{name}.smoothing = {smoothing:g}: the spline follows the noise: "
+        f"readings scatter by {noise:.2g} rad about a smooth motion, whose acceleration is {acceleration:.2g} rad/s2 "
+        f"rms, and the spline's errs by {excess:.2g}; smoothing = {noise:.2g} leaves that out (times that jitter are "
+        "noise of the angle, too)"
+    )
+
+
+def _noise(time: Array, values: Array) -> float:
+    """Return the rms noise of readings of a smooth motion by their sixth divided differences, each over its deviation.
+
+    A polynomial of degree five has none (J. von Neumann et al., Ann. Math. Statist. 12, 1941, for the first ones).
+    """
+    if len(time) < _SPLINE_DEGREE + 2:
+        return 0.0
+    nodes, windows = (sliding_window_view(each, _SPLINE_DEGREE + 2) for each in (time, values))
+    distances = (nodes[:, :, None] - nodes[:, None, :]) / (nodes[:, -1] - nodes[:, 0])[:, None, None]
+    weights = 1.0 / np.prod(distances + np.eye(_SPLINE_DEGREE + 2), axis=2)
+    differences = np.sum(weights * windows, axis=1) / np.linalg.norm(weights, axis=1)
+    return float(np.sqrt(np.mean(differences**2)))
 
 
 def _extended_spline(spline: PPoly, end: float) -> PPoly:
@@ -123,8 +197,18 @@ def _check_range(entry: str, values: Array, scenario: Scenario, joint: str) -> N
 
 
 def _check_actuators(entry: str, recording: Recording, scenario: Scenario) -> None:
-    """Refuse a tree's actuators that exert a force without an input: the log has their effort."""
-    inputs = {*(scenario.controller.inputs or {}), *(name.partition(".")[2] for name in recording.inputs)}
+    """Refuse actuators that exert a force without an input: the log has their effort."""
+    controller, inputs = scenario.controller, {name.partition(".")[2] for name in recording.inputs}
+    inputs |= {name for group in ("inputs", *WINDINGS) for name in getattr(controller, group) or {}}
+    follows_reference = any(name.startswith("joint_reference.") for name in recording.inputs)
+    for motor, servo in scenario.finger.actuators.items():
+        if servo.drive == "position" and not (follows_reference or {motor, *servo.tendons} & inputs):
+            allowed = f"lack spool_angle.{motor}, the goal of a position drive: give it, or leave the motor out"
+            raise InputError(entry, allowed)
+    for tendon, settings in scenario.finger.tendons.items():
+        if settings.winch is not None and tendon not in inputs:
+            allowed = f"lack tendon_winding.{tendon}, which a winch holds: give it, or leave the winch out"
+            raise InputError(entry, allowed)
     for name, actuator in scenario.finger.tree.actuators.items():
         exerts_force = any((actuator.offset, actuator.by_length, actuator.by_speed, actuator.integral, actuator.muscle))
         if exerts_force and name not in inputs:

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.scenario_parameters import ScenarioPart, entry_of, scenario_key
+from finger_pin.identification.scenario_parameters import ScenarioPart, entry_of, scenario_key, with_parameters
 from finger_pin.typing import Array
 
 # Tolerance of the edge, part of the line to a corner; greatest number of parameters of which all corners are tried.
@@ -47,10 +46,9 @@ class Limits:
         any_feasible = any(limits.refusal(each) is None for each in corners)
         for k, key in enumerate(keys):
             part = next(each for each in parts if k in each.indices)
-            single = ParametrisedScenario(part.family.scenario, (key,))
             for bound in (limits.low[k], limits.high[k]):
                 try:
-                    single.with_values([float(bound)])
+                    with_parameters(part.family.scenario, {key: float(bound)})
                 except InputError as error:
                     point, free = middle.copy(), np.arange(len(keys)) != k
                     point[k] = bound

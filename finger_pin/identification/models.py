@@ -50,8 +50,12 @@ def build_problem(
 
 
 def _check_corrections(model: RecordingModel, bounds: Mapping[str, tuple[float, float]]) -> None:
-    """Refuse bounds of an input's offset, scale and delay with which a recording cannot be computed."""
+    """Refuse bounds of an output's scale that reach 0, and of inputs with which a recording cannot be computed."""
     name = model.recording.name
+    for key, (low, high) in bounds.items():
+        columns = [f"{name}.{each}" for each in model.recording.outputs]
+        if low <= 0.0 <= high and key.endswith(".scale") and corrected_column(key, columns):
+            raise InputError(entry_of(key), "must not reach 0: a column has to tell its quantity", [low, high])
     for column in model.recording.inputs:
         keys = [key for key in bounds if acts_on(key, name) and corrected_column(key, [f"{name}.{column}"])]
         for ends in itertools.product(*(bounds[key] for key in keys)) if keys else ():

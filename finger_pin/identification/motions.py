@@ -16,9 +16,9 @@ from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.identification.recorded_inputs import Corrections, check_references, put_inputs, with_corrected_inputs
+from finger_pin.identification.recorded_inputs import check_references, put_inputs, with_corrected_inputs
 from finger_pin.identification.recordings import Recording, ScenarioMap, wraparound_warning
-from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
+from finger_pin.identification.scenario_parameters import Corrections, NuisanceParameter, corrections
 from finger_pin.identification.starts import check_reachable, far_start_warning, recorded_starts, start_parameters
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
@@ -38,6 +38,8 @@ _LEAST_TOLERANCE, GREATEST_TOLERANCE = 1e-10, 1e-4
 # Slope, in ranges of the signal over the range of the parameter, above which it is computed by runs with their own time
 # steps, and the change of the parameter for that, part of its range.
 _STEEP_SLOPE, _LARGE_CHANGE = 30.0, 1e-3
+# Steps per row of a recording from which on a run is slow.
+_SLOW_STEPS_PER_ROW = 4
 
 
 class RecordedMotion:
@@ -81,24 +83,23 @@ class RecordedMotion:
         self._finger = finger
         self._tolerance_factor = 1.0
 
-    def warning(self, searched_keys: Collection[str]) -> str:
-        """Return a warning about angles that wrap around, or a start far from the recorded one.
+    def warnings(self, searched_keys: Collection[str]) -> list[str]:
+        """Return warnings about angles that wrap around, or a start far from the recorded one.
 
         Nothing is said of a start whose columns' zeros are sought.
         """
         jumps = wraparound_warning(self.recording)
         if jumps:
-            return jumps
+            return [jumps]
         starts = {} if self.recording.settings.start != "rest" else self._starts
         prefix = f"recordings.{self.recording.name}."
         starts = {joint: each for joint, each in starts.items() if f"{prefix}{each.column}.offset" not in searched_keys}
         if not starts:
-            return ""
+            return []
         loop = self._setup(self.scenario, {}).loop
         position = loop.finger.layout.unpack(loop.initial_state()).position
-        return far_start_warning(
-            self.recording, starts, dict(zip(loop.finger.routing.joints, position, strict=True)), self.scenario
-        )
+        positions = dict(zip(loop.finger.routing.joints, position, strict=True))
+        return [*filter(None, [far_start_warning(self.recording, starts, positions, self.scenario)])]
 
     def check(self, nuisance: Mapping[str, float]) -> None:
         """Raise the error of offsets and scales of inputs with which the motion cannot be computed."""
@@ -110,6 +111,11 @@ class RecordedMotion:
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
         return self._run(scenario, nuisance, self._tolerance_factor)[0]
+
+    def ringing(self, scenario: Scenario, nuisance: Mapping[str, float]) -> str:
+        """Return a warning about what rings almost undamped and makes the run slow; empty without any."""
+        run = self._run(scenario, nuisance, self._tolerance_factor)[1]
+        return "" if run is None else run[0].ringing(run[1], _SLOW_STEPS_PER_ROW * len(self.rows))
 
     def scale_tolerances(self, factor: float) -> None:
         """Multiply the scenario's tolerances by a factor from now on."""
@@ -218,14 +224,11 @@ class RecordedMotion:
 
     def _outputs(self, setup: Setup, trajectory: Trajectory, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, with their offsets, scales and delays."""
-        name, settings, outputs = self.recording.name, self.recording.settings.outputs, []
-        delays = {key: each.delay + nuisance_value(nuisance, name, key, "delay") for key, each in settings.items()}
+        settings = self.recording.settings.outputs
+        corrected = {key: corrections(self.recording.name, key, nuisance) for key in settings}
+        delays = {key: each.delay + corrected[key].delay for key, each in settings.items()}
         by_delay = {delay: self._at_delay(setup, trajectory, delay, delays) for delay in dict.fromkeys(delays.values())}
-        for key, delay in delays.items():
-            scale = nuisance_value(nuisance, name, key, "scale", 1.0)
-            offset = nuisance_value(nuisance, name, key, "offset")
-            outputs.append(np.asarray(scale * self._column(by_delay[delay], key) + offset))
-        return outputs
+        return [corrected[key].column(self._column(by_delay[delay], key)) for key, delay in delays.items()]
 
     def _at_delay(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> RunArrays:
         """Return the variables of the outputs with a delay, at the instants before it."""

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.threads import in_threads
-from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.likelihood import NoiseGrowth, block_means, minus_twice_likelihood
@@ -26,6 +25,7 @@ from finger_pin.identification.scenario_parameters import (
     is_scenario_key,
     key_in,
     recording_pattern,
+    with_parameters,
 )
 from finger_pin.typing import Array
 
@@ -95,7 +95,7 @@ class Problem:
             scenario = model.scenario
             check_shadowing(model.recording.name, model.recording.settings, [*keys, *self.fixed])
             if self.fixed:
-                scenario = ParametrisedScenario(scenario, tuple(self.fixed)).with_values(list(self.fixed.values()))
+                scenario = with_parameters(scenario, self.fixed)
             return ScenarioPart.from_keys(scenario, model.recording.name, keys)
 
         self._parts = [part(model) for model in self.models]
@@ -177,7 +177,7 @@ class Problem:
         self.evaluations += 1
         values = self.values(z)
         try:
-            points = [scenario_map(values) for scenario_map in self._scenario_maps()]
+            points = [scenario_map(values) for scenario_map in self.scenario_maps()]
         except InputError:
             return [np.full(len(s.measured), np.inf) for s in self.signals]
         pairs = list(zip(self.models, points, strict=True))
@@ -204,7 +204,7 @@ class Problem:
         sizes = np.where(self.logarithmic, values, self.high - self.low)
         derivatives = [
             each
-            for model, scenario_map in zip(self.models, self._scenario_maps(), strict=True)
+            for model, scenario_map in zip(self.models, self.scenario_maps(), strict=True)
             for each in model.slopes(scenario_map, values, sizes)
         ]
         self.evaluations += 2 * len(z)
@@ -268,7 +268,7 @@ class Problem:
         self._slopes = twin._slopes or self._slopes
         self.best = min(self.best, twin.best, key=lambda point: point[0])
 
-    def _scenario_maps(self) -> list[ScenarioMap]:
+    def scenario_maps(self) -> list[ScenarioMap]:
         """Return, for every model, the map from values to its scenario and nuisance parameters."""
         nuisance_indices = sorted({*range(len(self.keys))} - {*self._scenario_indices.tolist()})
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from finger_pin.description.tables import Series
 from finger_pin.description.winding import BY_NAME, WINDINGS
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import Recording, check_tension_sign
-from finger_pin.identification.scenario_parameters import nuisance_value
+from finger_pin.identification.scenario_parameters import Corrections, corrections
 
 # Section and entry of a scenario for every input of a motion, by variable.
 _SCENARIO_ENTRIES = {
@@ -25,6 +25,12 @@ _SCENARIO_ENTRIES = {
     "actuator_input": ("controller", "inputs"),
     "joint_reference": ("reference", "joints"),
     "fingertip_force": ("environment", "fingertip_force_signal"),
+}
+# Inputs that pull or push, by their table of a controller; a supply only limits what a loop asks for.
+_COMMANDS = {
+    group: variable
+    for variable, (section, group) in _SCENARIO_ENTRIES.items()
+    if section == "controller" and variable != "supply_voltage"
 }
 # Inputs of motors, of which each may have one.
 _MOTOR_INPUTS = ("spool_angle", "motor_voltage")
@@ -55,9 +61,9 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
         if variable == "tendon_command":
             check_tension_sign(f"{entry}.inputs.{name}", values)
             values = np.maximum(values, 0.0)
-        delay = recording.settings.inputs[name].delay
-        times = (recording.time - delay + scenario.simulation.start_time).tolist()
-        samples = {"kind": "samples", "times": times, "values": values.tolist()}
+        column = recording.settings.inputs[name]
+        times = (recording.time - column.delay + scenario.simulation.start_time).tolist()
+        samples = {"kind": column.signal_kind, "times": times, "values": values.tolist()}
         finger, is_of_hand, finger_label = label.partition(".")
         signals = entries.setdefault(group, {})
         if variable in _MOTOR_INPUTS:
@@ -73,6 +79,42 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
     if controller.get("kind") == "tensions" and {*scenario.finger.actuated_names} <= {*controller.get("tensions", {})}:
         # No tendon is left without a recorded tension.
         controller.pop("minimum_tension", None)
+
+
+def without_commands(scenario: Scenario, recording: Recording) -> tuple[Scenario, list[str]]:
+    """Return a scenario with zero in place of its own commands, and the names of those that a recording does not give.
+
+    What pulled while efforts were recorded is among the recording's inputs or `values`. A controller stays where it
+    reads recorded goals of joints.
+    """
+    controller = scenario.controller
+    given = (*recording.inputs, *recording.settings.values)
+    dropped: list[str] = []
+    if controller.kind == "proportional" and not any(name.startswith("joint_reference.") for name in given):
+        controller = type(controller)(kind="tensions")
+        dropped = [f"tendon_command.{tendon}" for tendon in scenario.finger.actuated_names]
+
+    def without(settings: Any, path: str) -> Any:
+        entries: dict[str, Any] = {}
+        for group, variable in _COMMANDS.items():
+            signals = getattr(settings, group) or {}
+            kept = {
+                label: each
+                for label, each in signals.items()
+                if any(f"{key}.".startswith(f"{path}.{group}.{label}.") for key in given)
+            }
+            if len(kept) < len(signals):
+                entries[group] = kept
+                dropped.extend(f"{variable}.{label}" for label in signals if label not in kept)
+        if settings.kind == "tensions" and f"{path}.minimum_tension" not in given:
+            entries["minimum_tension"] = 0.0
+            if "minimum_tension" in settings.model_fields_set and np.any(settings.minimum_tension):
+                dropped.append(f"{path}.minimum_tension")
+        return settings.updated(**entries) if entries else settings
+
+    fingers = {name: without(each, f"controller.fingers.{name}") for name, each in (controller.fingers or {}).items()}
+    controller = without(controller, "controller").updated(**({"fingers": fingers} if fingers else {}))
+    return scenario.updated(controller=controller), [name for name in dropped if name not in recording.inputs]
 
 
 def check_references(recording: Recording, scenario: Scenario) -> None:
@@ -99,20 +141,6 @@ def check_references(recording: Recording, scenario: Scenario) -> None:
             raise InputError(f"identify.recordings.{recording.name}.inputs.{name}", allowed)
 
 
-class Corrections(NamedTuple):
-    """Scale, offset and delay, s, of a column that are being found."""
-
-    scale: float = 1.0
-    offset: float = 0.0
-    delay: float = 0.0
-
-
-def corrections(recording: str, column: str, nuisance: Mapping[str, float]) -> Corrections:
-    """Return the corrections of a column of a recording."""
-    neutral = Corrections()._asdict().items()
-    return Corrections(*(nuisance_value(nuisance, recording, column, name, default) for name, default in neutral))
-
-
 def with_corrected_inputs(scenario: Scenario, recording: Recording, nuisance: Mapping[str, float]) -> Scenario:
     """Return a scenario with the scales, offsets and delays of a motion's inputs that are being found.
 
@@ -130,7 +158,7 @@ def with_corrected_inputs(scenario: Scenario, recording: Recording, nuisance: Ma
         if label not in signals:
             allowed = "has no scale, offset or delay to be found: it is of one finger of a hand"
             raise InputError(f"identify.recordings.{recording.name}.inputs.{name}", allowed)
-        corrected = correction.scale * values + correction.offset
+        corrected = correction.quantity(values)
         if name.startswith("tendon_command."):
             # A tendon only pulls: a tension below zero by a wrong zero is that of a slack one.
             corrected = np.maximum(corrected, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -93,10 +94,11 @@ class Recording:
         settings: As described.
         inputs: By variable.label, shape (m,).
         outputs: By variable.label, shape (m,); not a number where nothing was measured.
-        time: Of a motion, shape (m,), s, from zero.
+        time: Of a motion, shape (m,), s, from zero; zero of steady readings.
         speed: Of steady readings, shape (m,), m/s.
         unitless: Names of inputs and outputs that are read as SI because nothing names their unit.
         held_out: Rows that are held out by a column, shape (m,); empty where none are.
+        turns: Of angles, by how much the numbers of the column differ after a turn.
     """
 
     name: str
@@ -107,6 +109,7 @@ class Recording:
     speed: Array
     unitless: frozenset[str] = frozenset()
     held_out: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    turns: Mapping[str, float] = field(default_factory=dict)
 
     def repeats(self, other: Recording) -> bool:
         """Return whether this is a motion like another one, with equal times, inputs, values and start."""
@@ -136,8 +139,8 @@ class RecordingModel(Protocol):
     def nuisance_parameters(self) -> tuple[NuisanceParameter, ...]:
         """The parameters of this recording alone."""
 
-    def warning(self, searched_keys: Collection[str]) -> str:
-        """Return a warning about a recording for the parameters to be found; empty if there is none."""
+    def warnings(self, searched_keys: Collection[str]) -> list[str]:
+        """Return warnings about a recording for the parameters to be found."""
 
     def check(self, nuisance: Mapping[str, float]) -> None:
         """Raise the error of offsets and scales of inputs with which the recording cannot be computed."""
@@ -147,6 +150,9 @@ class RecordingModel(Protocol):
 
     def slopes(self, scenario_map: ScenarioMap, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of the outputs by the values, shape (m, p) each, by changes of given sizes."""
+
+    def ringing(self, scenario: Scenario, nuisance: Mapping[str, float]) -> str:
+        """Return a warning about what rings almost undamped and makes the run slow; empty without any."""
 
     def scale_tolerances(self, factor: float) -> None:
         """Multiply the tolerances of further computations by a factor."""
@@ -189,7 +195,7 @@ def read_recording(
         held_out = row_mask(f"{entry}.held_out", columns, settings.held_out)
         if held_out.all():
             raise InputError(f"{entry}.held_out", "leaves no row to be fitted; write true", settings.held_out)
-    time = np.zeros(table.rows)
+    time = np.arange(table.rows) / (settings.sample_rate or math.inf)
     if settings.time is not None:
         time = table.times("time", settings.time, settings.repeated_times)
         time = time - time[0]
@@ -201,29 +207,34 @@ def read_recording(
             raise InputError(f"{entry}.speed", "must not be zero: friction has the sign of sliding")
     elif settings.speed is not None:
         speed = np.full(table.rows, settings.speed)
+    columns_of = {group: getattr(settings, group) for group in ("inputs", "outputs")}
+    signals = {
+        group: {key: _signal(table, f"{group}.{key}", column) for key, column in each.items()}
+        for group, each in columns_of.items()
+    }
+    all_columns = [(group, key, column) for group, each in columns_of.items() for key, column in each.items()]
     return Recording(
         name,
         settings,
-        {key: _signal(table, f"inputs.{key}", column) for key, column in settings.inputs.items()},
-        {key: _signal(table, f"outputs.{key}", column) for key, column in settings.outputs.items()},
+        signals["inputs"],
+        signals["outputs"],
         time,
         speed,
-        frozenset(
-            key for key, column in {**settings.inputs, **settings.outputs}.items() if not table.names_unit(column)
-        ),
+        frozenset(key for _, key, column in all_columns if not table.names_unit(column)),
         held_out,
+        {key: table.turn(f"{group}.{key}", column) for group, key, column in all_columns if unit_of(key) == "rad"},
     )
 
 
 def wraparound_warning(recording: Recording) -> str:
     """Return a warning about an angle that jumps by a turn between two samples; empty without any."""
-    for name, values in recording.outputs.items():
+    for name, values in {**recording.inputs, **recording.outputs}.items():
         finite_rows = np.flatnonzero(np.isfinite(values))
         turns = np.abs(np.diff(values[finite_rows])) / (2.0 * np.pi)
         jumps = np.flatnonzero(np.abs(turns - 1.0) < _TURN_TOLERANCE)
         if unit_of(name) == "rad" and len(jumps):
             where = f"{recording.name}.{name} jumps by a turn after row {finite_rows[jumps[0]] + 1}"
-            return f"{where}: where its numbers come round, write their period, such as period = 4096"
+            return f"{where}: if its numbers come round there, write period = {recording.turns[name]:.6g}"
     return ""
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import tomli_w
 import xarray as xr
 
-from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario, to_toml
+from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
 from finger_pin.identification.comparison import LawComparison, bic
@@ -21,7 +21,12 @@ from finger_pin.identification.intervals import CHI2_95, ProfileBound, SmallSamp
 from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.misfit import jackknife_covariance, outliers, repeats
 from finger_pin.identification.problem import Problem
-from finger_pin.identification.scenario_parameters import corrected_column, recording_pattern, scenario_key
+from finger_pin.identification.scenario_parameters import (
+    corrected_column,
+    recording_pattern,
+    tied_entries,
+    with_parameters,
+)
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.keys import describe
 from finger_pin.typing import Array
@@ -142,7 +147,7 @@ def _profiles(problem: Problem, best: Fit, bounds: Mapping[tuple[int, int], Prof
 def _units(problem: Problem, key: str) -> str:
     column = corrected_column(key, problem.units)
     if column is None:
-        return describe(scenario_key(key))["units"]
+        return describe(tied_entries(key)[0][0])["units"]
     return {"offset": problem.units[column], "delay": "s"}.get(key.rpartition(".")[2], "1")
 
 
@@ -226,7 +231,7 @@ def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, probl
     """
     recordings = ", ".join(dict.fromkeys(signal.recording for signal in problem.signals))
     keys = problem.keys[: problem.requested_count]
-    single = all(recording_pattern(key) is not None or not {*"*{["} & {*key} for key in keys)
+    single = all(recording_pattern(key) is not None or not {*"*{[&"} & {*key} for key in keys)
     extended = single and not isinstance(bench, Scenario) and load_scenario(bench) == problem.scenario
     lines = ["# What an identification has found; intervals at 95 %."]
     if extended:
@@ -243,12 +248,7 @@ def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, probl
             continue
         lines.append(f"{key} = {value!r} # {ends}, from {recordings}")
     if not extended:
-        lines += [
-            "",
-            to_toml(
-                ParametrisedScenario(problem.scenario, tuple(numbers)).with_values(list(numbers.values()))
-            ).rstrip(),
-        ]
+        lines += ["", to_toml(with_parameters(problem.scenario, numbers)).rstrip()]
     return "\n".join(lines) + "\n"
 
 

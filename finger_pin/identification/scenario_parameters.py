@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,6 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import split
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
-
-#: Corrections of a column that may be estimated, besides parameters of the scenario.
-COLUMN_CORRECTIONS = ("offset", "scale", "delay")
 
 
 @dataclass(frozen=True)
@@ -35,12 +33,14 @@ class ScenarioPart:
     """Scenarios of one recording, by the parameters that act on it.
 
     Attributes:
-        family: The scenarios.
-        indices: Which of the parameters that are keys of a scenario, shape (k,).
+        family: The scenarios, by every entry that one of the parameters sets.
+        indices: Which of the parameters that are keys of a scenario sets each entry, shape (k,).
+        factors: Each entry over its parameter, shape (k,).
     """
 
     family: ParametrisedScenario
     indices: NDArray[np.intp]
+    factors: Array
 
     def scenario_at(self, values: Array) -> Scenario:
         """Return the scenario at values of all parameters that are keys of a scenario.
@@ -48,31 +48,86 @@ class ScenarioPart:
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        return self.family.with_values(values[self.indices].tolist())
+        return self.family.with_values((self.factors * values[self.indices]).tolist())
 
     @classmethod
-    def from_keys(cls, scenario: Scenario, recording: str, keys: Sequence[str]) -> ScenarioPart:
+    def from_keys(cls, scenario: Scenario, recording: str | None, keys: Sequence[str]) -> ScenarioPart:
         """Return the scenarios of a recording, by the keys that are shared or of this recording.
 
         Raises:
             InputError: If the scenario has no such key.
         """
-        indices = [k for k, key in enumerate(keys) if acts_on(key, recording)]
-        for key in (keys[k] for k in indices if recording_pattern(keys[k])):
+        acting = [k for k, key in enumerate(keys) if recording is None or acts_on(key, recording)]
+        # The first entry of a key comes last: a search starts from its value.
+        entries = [(k, *entry) for k in acting for entry in reversed(tied_entries(keys[k]))]
+        for k, entry, _ in entries:
+            if not recording_pattern(keys[k]):
+                continue
             try:
-                ParametrisedScenario(scenario, (scenario_key(key),))
+                ParametrisedScenario(scenario, (entry,))
             except InputError as error:
-                named = "" if error.entry == scenario_key(key) else f"{error.entry}: "
-                raise InputError(entry_of(key), f"{named}{error.allowed}") from None
-        family = ParametrisedScenario(scenario, [scenario_key(keys[k]) for k in indices])
-        return cls(family, np.array(indices, dtype=np.intp))
+                named = "" if error.entry == entry else f"{error.entry}: "
+                raise InputError(entry_of(keys[k]), f"{named}{error.allowed}") from None
+        family = ParametrisedScenario(scenario, [entry for _, entry, _ in entries])
+        factors = np.array([factor for *_, factor in entries], dtype=float)
+        return cls(family, np.array([k for k, *_ in entries], dtype=np.intp), factors)
 
 
-def nuisance_value(
-    nuisance: Mapping[str, float], recording: str, output: str, correction: str, default: float = 0.0
-) -> float:
-    """Return the offset, scale or delay of an input or output that is being found."""
-    return nuisance.get(f"recordings.{recording}.{output}.{correction}", default)
+def with_parameters(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
+    """Return a scenario with values of parameters that all recordings share, by key.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    for key in filter(recording_pattern, values):
+        raise InputError(key, "is of recordings, and this is a number of the scenario for all of them")
+    return ScenarioPart.from_keys(scenario, None, tuple(values)).scenario_at(np.array([*values.values()], dtype=float))
+
+
+def tied_entries(key: str) -> list[tuple[str, float]]:
+    """Return the entries of a scenario that a parameter sets, ``A & 0.5 * B`` both, and the factor of each on it.
+
+    Raises:
+        InputError: If a factor is no number or zero, or an entry is set twice.
+    """
+    entries: dict[str, float] = {}
+    for number, part in enumerate(scenario_key(key).split("&")):
+        factor, star, entry = part.strip().partition(" * ")
+        try:
+            value = float(factor) if star else 1.0
+        except ValueError:
+            value = 0.0
+        name = (entry if star else factor).strip()
+        if not (0.0 < abs(value) < np.inf) or (star and not number) or name in entries or not name:
+            allowed = "must be one key, or several with a factor from the second on: A & B & 0.5 * C, each once"
+            raise InputError(entry_of(key), allowed)
+        entries[name] = value
+    return [*entries.items()]
+
+
+class Corrections(NamedTuple):
+    """Scale, offset and delay, s, of a column that are being found: its quantity is scale times the column plus offset.
+
+    What is written at a column means the same, so that what is found may be written there.
+    """
+
+    scale: float = 1.0
+    offset: float = 0.0
+    delay: float = 0.0
+
+    def quantity(self, column: Array) -> Array:
+        """Return the quantity whose column is given, in SI."""
+        return self.scale * column + self.offset
+
+    def column(self, quantity: Array) -> Array:
+        """Return the column of a quantity in SI: outputs are compared as they were read, with the noise they have."""
+        return (quantity - self.offset) / self.scale
+
+
+def corrections(recording: str, column: str, nuisance: Mapping[str, float]) -> Corrections:
+    """Return the corrections of a column of a recording."""
+    neutral = Corrections()._asdict().items()
+    return Corrections(*(nuisance.get(f"recordings.{recording}.{column}.{name}", each) for name, each in neutral))
 
 
 def recording_pattern(key: str) -> str | None:
@@ -101,9 +156,12 @@ def check_duplicates(keys: Sequence[str], recordings: Iterable[str]) -> None:
     for recording in recordings:
         keys_by_target: dict[str, str] = {}
         for key in keys:
-            first = keys_by_target.setdefault(key_in(key, recording), key)
-            if first != key:
-                raise InputError(entry_of(key), f"is found for {recording} as {first} too; leave out one of them")
+            named = key_in(key, recording)
+            prefix = named.removesuffix(scenario_key(named))
+            for entry, _ in tied_entries(key):
+                first = keys_by_target.setdefault(prefix + entry, key)
+                if first != key:
+                    raise InputError(entry_of(key), f"is found for {recording} as {first} too; leave out one of them")
 
 
 def scenario_key(key: str) -> str:
@@ -123,7 +181,7 @@ def corrected_column(key: str, columns: Iterable[str]) -> str | None:
     name, _, correction = scenario_key(key).rpartition(".")
     parts = ((each, *each.split(".", 1)) for each in columns)
     matching = (each for each, recording, column in parts if column == name and acts_on(key, recording))
-    return next(matching, None) if recording_pattern(key) and correction in COLUMN_CORRECTIONS else None
+    return next(matching, None) if recording_pattern(key) and correction in Corrections._fields else None
 
 
 def is_scenario_key(key: str, columns: Iterable[str]) -> bool:
@@ -142,7 +200,7 @@ def is_scenario_key(key: str, columns: Iterable[str]) -> bool:
     acts_somewhere = any(acts_on(key, each.partition(".")[0]) for each in names)
     if acts_somewhere and scenario_key(key).partition(".")[0] in Scenario.model_fields:
         return True
-    allowed = f"must be a key of the scenario, or variable.label and .{', '.join(COLUMN_CORRECTIONS)}; there are"
+    allowed = f"must be a key of the scenario, or variable.label and .{', '.join(Corrections._fields)}; there are"
     raise InputError(entry_of(key), f"{allowed} {', '.join(names)}")
 
 
@@ -156,7 +214,9 @@ def check_shadowing(recording: str, settings: RecordingSettings, keys: Sequence[
     recording_keys = [scenario_key(key) for key in keys if recording_pattern(key) and acts_on(key, recording)]
     for group, names in (("values", settings.values), ("parameters", recording_keys)):
         for key in names:
-            hidden = next((each for each in shared if _overlap(key, each)), None)
+            entries = [entry for entry, _ in tied_entries(key)] if group == "parameters" else [key]
+            pairs = ((one, other, each) for each in shared for other, _ in tied_entries(each) for one in entries)
+            hidden = next((each for one, other, each in pairs if _overlap(one, other)), None)
             if hidden is not None:
                 allowed = f"is found or held for all recordings as {hidden}; leave out one of them"
                 raise InputError(f"identify.recordings.{recording}.{group}.{key}", allowed)

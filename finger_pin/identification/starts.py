@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import RANGE_MARGIN, Recording
-from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
+from finger_pin.identification.scenario_parameters import NuisanceParameter, corrections
 
 # Half range of an estimated start about the recorded one, rad.
 _START_MARGIN = 0.3
@@ -39,11 +39,8 @@ class RecordedStart:
 
     def corrected(self, recording: str, nuisance: Mapping[str, float]) -> tuple[float, float]:
         """Return angle, rad, and speed, rad/s, of the joint with a scale, offset and delay that are being found."""
-        scale, offset, delay = (
-            nuisance_value(nuisance, recording, self.column, correction, default)
-            for correction, default in (("scale", 1.0), ("offset", 0.0), ("delay", 0.0))
-        )
-        return (self.angle + self.speed * (self.delay + delay) - offset) / scale, self.speed / scale
+        scale, offset, delay = corrections(recording, self.column, nuisance)
+        return scale * (self.angle + self.speed * (self.delay + delay)) + offset, scale * self.speed
 
 
 def recorded_starts(recording: Recording, rows: NDArray[np.intp], joints: Collection[str]) -> dict[str, RecordedStart]:

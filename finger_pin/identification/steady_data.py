@@ -13,7 +13,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import Recording, ScenarioMap, check_tension_sign
 from finger_pin.identification.resting_finger import resting_finger, wound_length
-from finger_pin.identification.scenario_parameters import NuisanceParameter, nuisance_value
+from finger_pin.identification.scenario_parameters import NuisanceParameter, corrections
 from finger_pin.mechanism.coerce import FingerLike, with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
@@ -121,8 +121,7 @@ class SteadyReadings:
             }
         name = self.recording.name
         return [
-            nuisance_value(nuisance, name, output, "scale", 1.0) * by_name[variable][:, index]
-            + nuisance_value(nuisance, name, output, "offset")
+            corrections(name, output, nuisance).column(by_name[variable][:, index])
             for output, (variable, index) in zip(self.recording.outputs, self._outputs, strict=True)
         ]
 
@@ -148,8 +147,12 @@ class SteadyReadings:
             columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
-    def warning(self, searched_keys: Collection[str]) -> str:
-        """Return an empty text: readings have no start."""
+    def warnings(self, searched_keys: Collection[str]) -> list[str]:
+        """Return no warnings: readings have no start."""
+        return []
+
+    def ringing(self, scenario: Scenario, nuisance: Mapping[str, float]) -> str:
+        """Return an empty text: nothing rings at rest."""
         return ""
 
     def check(self, nuisance: Mapping[str, float]) -> None:
@@ -173,8 +176,7 @@ class SteadyReadings:
         """Return tensions, shape (m, a), N, and angles, (m, n), rad, with scales and offsets that are being found."""
         load, position = self.load.copy(), self._position.copy()
         for name, group, index in self._inputs:
-            scale = nuisance_value(nuisance, self.recording.name, name, "scale", 1.0)
-            values = scale * group[:, index] + nuisance_value(nuisance, self.recording.name, name, "offset")
+            values = corrections(self.recording.name, name, nuisance).quantity(group[:, index])
             if group is self.load and name not in self.wound_tendons:
                 # A tendon only pulls: a tension below zero by a wrong zero is that of a slack one.
                 load[:, index] = np.maximum(values, 0.0)

@@ -1,4 +1,4 @@
-"""Piecewise polynomials of the kinds of signals: steps, ramps, points, half cosines and samples, about shared knots."""
+"""Piecewise polynomials of the kinds of signals: steps, ramps, points, half cosines, samples, holds, shared knots."""
 
 from __future__ import annotations
 
@@ -49,6 +49,8 @@ def _polynomial(settings: SignalSettings) -> PPoly | None:
         times, values = np.array(settings.times), np.array(settings.values)
         if settings.kind == "cosine":
             return _half_cosines(times, values)
+        if settings.kind == "hold":
+            return PPoly(values[None], np.append(times, times[-1] + 1.0))
         length, change = np.diff(times), np.diff(values)
         zeros = np.zeros_like(change)
         terms = [6.0 / length**5, -15.0 / length**4, 10.0 / length**3]

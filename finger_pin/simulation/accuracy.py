@@ -71,14 +71,19 @@ def account_warning(result: xr.Dataset, share: float) -> str:
     )
 
 
-def ringing_warning(loop: ClosedLoop, trajectory: Trajectory) -> str:
+def ringing_warning(loop: ClosedLoop, trajectory: Trajectory, slow_steps: int | None = None) -> str:
     """Return the warning about what rings or swings and makes steps short, with its frequency, or empty.
 
     Undamped modes are those of the Jacobian of the whole at the last state. A swing of another frequency is a limit
     cycle of control and friction.
+
+    Args:
+        loop: The loop.
+        trajectory: Its run.
+        slow_steps: Number of steps from which on a run is slow, whatever their length; that of one run without it.
     """
     end, steps = float(trajectory.breakpoints[-1]), trajectory.statistics.steps
-    if steps < _SLOW_STEPS or end > _SHORT_STEP * steps:
+    if steps < (slow_steps or _SLOW_STEPS) or (slow_steps is None and end > _SHORT_STEP * steps):
         return ""
     x, layout, step = trajectory.interpolate(np.array([end]))[0], loop.finger.layout, end / steps
     values, modes = np.linalg.eig(_jacobian(loop, end, x, layout.scales()))

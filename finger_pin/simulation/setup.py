@@ -23,7 +23,7 @@ from finger_pin.core.stepping.trajectory import Trajectory, Watch
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.accuracy import CHUNK_STEPS
+from finger_pin.simulation.accuracy import CHUNK_STEPS, ringing_warning
 from finger_pin.simulation.initial_state import check_motors
 
 #: What to try where an integrator cannot go on.
@@ -191,6 +191,10 @@ class Setup:
             rtol=tolerances.rtol,
             atol_scale=tolerances.atol_scale,
         )
+
+    def ringing(self, trajectory: Trajectory, slow_steps: int) -> str:
+        """Return the warning about what rings or swings in a run of so many steps or more; empty without any."""
+        return ringing_warning(self.loop, trajectory, slow_steps)
 
     def failure(self, trajectory: Trajectory, cause: str = "") -> tuple[str, str]:
         """Return the reason of a trajectory's early end, and advice.

@@ -13,7 +13,13 @@ import xarray as xr
 from finger_pin.files import write_text
 from finger_pin.identification.misfit import SIGNIFICANCE
 from finger_pin.views.document import document, image
-from finger_pin.views.plots.identification import plot_identification, plot_predictions, plot_profiles, short_name
+from finger_pin.views.plots.identification import (
+    plot_identification,
+    plot_predictions,
+    plot_profiles,
+    profiled_parameters,
+    short_name,
+)
 
 # From which correlation of neighbours residuals are said to follow each other.
 _MAX_CORRELATION = 0.9
@@ -34,19 +40,21 @@ def summarize_identification(result: xr.Dataset) -> str:
         for name, value, lower, upper, unit in rows
     ]
     predictions = _predictions(result)
-    return "\n".join([*predictions, *([""] if predictions else []), *doubts, *lines, "", *_remarks(result)])
+    return "\n".join([*doubts, *lines, "", *predictions, *([""] if predictions else []), *_remarks(result)])
 
 
 def write_report(result: xr.Dataset, path: str | Path) -> Path:
     """Write the page, whole or not at all: figures are inside it, nothing is loaded from anywhere."""
     head = ["signal", "rms left over", "samples", "of them independent", "unit"]
+    profiles = ""
+    if profiled_parameters(result):
+        profiles = image(plot_profiles(result), "Profiles") + f"<p class='soft'>{_PROFILES_NOTE}</p>"
     sections = [
         (
             "What was found",
             "".join(f"<p class='doubt'><strong>{escape(doubt)}</strong></p>" for doubt in _doubts(result))
             + _table(["parameter", "estimate", "lower (95 %)", "upper (95 %)", "unit"], _parameters(result))
-            + image(plot_profiles(result), "Profiles")
-            + f"<p class='soft'>{_PROFILES_NOTE}</p>",
+            + profiles,
         ),
         ("What the recordings leave open", "".join(f"<p>{escape(line)}</p>" for line in _remarks(result))),
         (
@@ -56,7 +64,7 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
     ]
     predictions = "".join(f"<p>{escape(line)}</p>" for line in _predictions(result))
     if predictions:
-        sections.insert(0, ("What was predicted", predictions + image(plot_predictions(result), "Predictions")))
+        sections.insert(1, ("What was predicted", predictions + image(plot_predictions(result), "Predictions")))
     if "law" in result.dims:
         sections.append(("Which law", _law_table(result)))
     if result.sizes["parameter"] > 1:
@@ -162,12 +170,8 @@ def _remarks(result: xr.Dataset) -> list[str]:
         )
     if _confirmed(result):
         sentences.append(_agreement(result))
-    undamped = result.attrs.get("undamped", "")
-    if undamped:
-        sentences.append(
-            f"Nothing damps {undamped}: where friction holds a joint it rings, and runs take ten times the steps. "
-            "A little viscous friction of joints or tendons would change that."
-        )
+    if result.attrs.get("ringing", ""):
+        sentences.append(f"Runs take long: {result.attrs['ringing']}.")
     if not result.attrs.get("profiles", 1):
         sentences.append("The intervals are those of slopes at the estimate: where they are wide, profiles are surer.")
     sentences += _outliers(result) + _misfit_remarks(result)

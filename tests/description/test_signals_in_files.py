@@ -132,7 +132,7 @@ COLUMNS = [
     ("time,medial\n0,1\n1,\n", "column medial has no number in row 2"),
     ("time,medial\n1,1\n\n1,1\n", "times must increase, two rows at least, and do not from row 1 to the next"),
     ("time,medial (mm)\n0,1\n1,1\n", "is a unit of what is in m, and this is in rad"),
-    ("t,medial\n0,1\n500,1\n1000,1\n", 'write { column = "t", unit = "ms" }, or unit = "s"'),
+    ("t,medial\n0,1\n500,1\n1000,1\n", "its 3 rows take 0.001 s in us or 1 s in ms or 1000 s in s: write {"),
     ("t,medial\n0,10\n1,30\n", "rad (is it in degrees?)"),
     ("time,distal\n0,1\n1,1\n", "follows from the passive tendon (20); leave it out"),
     ("time,medail\n0,1\n1,1\n", "did you mean medial?"),

@@ -109,3 +109,41 @@ def test_starts_fill_the_bounds_evenly_and_again_alike_from_the_same_seed():
     eighths = np.sort(np.floor(8.0 * (first - low) / (high - low)), axis=0)
     np.testing.assert_array_equal(eighths, np.transpose([np.arange(8.0)] * 2))
     assert len(starting_points(problem, 1, 0)) == 1
+
+
+@pytest.mark.parametrize("gain", [1.0, 1.1])
+def test_what_is_found_of_an_output_leaves_the_same_when_it_is_written_at_its_column(gain):
+    """A load cell that tells gain (f + 0.5 N): f is its column over the gain less 0.5 N."""
+    noise = np.random.default_rng(8).normal(0.0, 0.01, LOAD.size)
+    measured = gain * (delivered((0.12, 0.4)) + 0.5 + noise)
+
+    def fitted(column, bounds):
+        recording = {"kind": "steady", "speed": 0.05, **COLUMNS}
+        recording["outputs"] = {"tendon_tension.T1": {"column": "out", **column}}
+        if bounds:
+            recording["parameters"] = {f"tendon_tension.T1.{key}": each for key, each in bounds.items()}
+        return fp.identify(
+            "canal",
+            # Coefficient and gain are one slope: beside a gain it is known.
+            parameters={COULOMB: (0.005, 1.0) if gain == 1.0 else (0.1199, 0.1201)},
+            recordings={"pull": recording},
+            data={"pull": {"in": LOAD, "out": measured}},
+            overrides={DRAG: 0.4, "finger.tendons.T1.curvature_offset": TURN},
+            starts=1,
+            profiles=False,
+        )
+
+    bounds = {"offset": (-2.0, 2.0)} | ({"scale": (0.5, 2.0)} if gain != 1.0 else {})
+    sought = fitted({}, bounds)
+    found = dict(zip(bounds, sought.estimate.values[1:].tolist(), strict=True))
+    assert found["offset"] == pytest.approx(-0.5, abs=0.05)
+    assert found.get("scale", 1.0) == pytest.approx(1.0 / gain, abs=0.01)
+    written = fitted(found, {})
+    np.testing.assert_allclose(written.estimate[0], sought.estimate[0], rtol=1e-5)
+    # Residuals are those of the column as it is compared: in its own numbers, or in those that it is led to.
+    np.testing.assert_allclose(written.residual, found.get("scale", 1.0) * sought.residual, atol=1e-6)
+
+
+def test_a_scale_of_an_output_that_may_be_zero_is_refused():
+    with pytest.raises(fp.InputError, match=r"T1\.scale = \[-1\.0, 1\.0\]: must not reach 0"):
+        problem_of(LOAD, {COULOMB: (0.005, 1.0), "recordings.*.tendon_tension.T1.scale": (-1.0, 1.0)})

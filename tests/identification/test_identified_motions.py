@@ -209,7 +209,7 @@ def test_an_offset_and_a_delay_of_an_output_are_found():
     recordings = {"pull": {**MOTION, "outputs": columns}}
     given = {"data": {"pull": data}, "starts": 1, "overrides": {DRAG: 0.5}}
     result = fp.identify("canal", parameters=parameters, recordings=recordings, **given)
-    np.testing.assert_allclose(result.estimate, [0.15, 0.2], rtol=0.05)
+    np.testing.assert_allclose(result.estimate, [0.15, -0.2], rtol=0.05)
     assert result.units.values.tolist() == ["1", "N"]
     with pytest.raises(fp.InputError, match="must be a key of the scenario, or variable"):
         wrong = {**parameters, f"{key}.gain": (0.1, 2.0)}
@@ -251,7 +251,7 @@ def test_columns_of_a_recording_have_the_unit_of_their_header_and_are_asked_abou
     bare = {name.partition(" ")[0]: values for name, values in data.items()}
     change = {"time": "t", "inputs": {"tendon_command.T1": "in"}, "outputs": {"joint_position.medial": "q"}}
     for more, said in [
-        ({}, r'recordings.pull.time = "t": its 3 rows take 100000 s \(is it in microseconds\?\); write { column = "t"'),
+        ({}, r'recordings.pull.time = "t": names no unit, and its 3 rows take 0.1 s in us or 100000 s in s: write {'),
         (
             {"time": {"column": "t", "unit": "ms"}},
             r"medial = 180.0: angles must be at most 12.5 rad \(is it in degrees",

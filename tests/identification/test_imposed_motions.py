@@ -1,5 +1,7 @@
 """Motions that are given and efforts that are compared, against Newton and Euler by Pinocchio and closed forms."""
 
+import warnings
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,6 +11,7 @@ import finger_pin as fp
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.validation import validate
 from finger_pin.identification.models import recording_models
+from finger_pin.identification.recorded_inputs import without_commands
 from finger_pin.identification.recordings import read_recording
 
 LENGTH, WIDTH, MASS = (
@@ -173,7 +176,7 @@ def test_mass_and_frictions_come_back_from_a_noisy_log_with_what_the_encoder_err
     # Six intervals of 95 % are asked for at once: 1.5 of their widths, three standard deviations.
     assert np.all(error < 1.5 * width)
     assert np.all(width < [0.005, 0.006, 0.05, 0.01, 0.01, 0.002])
-    assert found.attrs["undamped"] == ""
+    assert found.attrs["ringing"] == ""
 
 
 def test_the_tension_of_a_winch_follows_from_the_joint_that_is_given(arm):
@@ -217,3 +220,92 @@ def test_motions_that_are_not_given_are_refused_in_one_line(arm, change, rows, s
     with pytest.raises(fp.InputError) as error:
         efforts(arm, {}, data, {name: each for name, each in settings.items() if each is not None})
     assert said in str(error.value) and "\n" not in str(error.value)
+
+
+DRUM = {
+    "time": "t",
+    "settle": 0.1,
+    "inputs": {"joint_position.drum": {"column": "q", "smoothing": 1e-4}},
+    "outputs": {"joint_effort.drum": "tau"},
+}
+STIFFNESS = "finger.joints.drum.spring.stiffness"
+
+
+def drum_log():
+    """Angles of a drum on a spring of 0.2 N m/rad that is turned slowly, and its efforts; the bearing's 2e-3 N m s."""
+    time = np.arange(0.0, 5.0, 0.01)
+    angle, speed = np.sin(2.0 * time), 2.0 * np.cos(2.0 * time)
+    # A square rod of 40 mm and 20 g that is turned about its end, as a cylinder of 20 mm.
+    inertia = 0.02 * (0.04**2 / 3.0 + 0.02**2 / 16.0)
+    return {"t": time, "q": angle, "tau": 0.2 * angle + 2e-3 * speed - 4.0 * inertia * angle}
+
+
+def test_a_controller_and_a_minimum_tension_that_no_recording_gives_are_dropped_and_named(arm):
+    time = np.arange(0.0, 1.0, 0.01)
+    settings = validate(RecordingSettings, recording(LENGTH), ())
+    read = read_recording("log", settings, dict.fromkeys(("q_shoulder", "q_elbow", "e_shoulder", "e_elbow", "t"), time))
+
+    def dropped(overrides, bench=arm):
+        scenario, names = without_commands(fp.load_scenario(bench, overrides), read)
+        assert scenario.controller.kind == "tensions" and not np.any(scenario.controller.minimum_tension)
+        return names
+
+    assert dropped({}) == []
+    assert dropped({"controller.minimum_tension": 2.0}) == ["controller.minimum_tension"]
+    assert dropped({"controller.tensions.cord.offset": 2.0}) == ["tendon_command.cord"]
+    assert dropped({}, "reversals") == [f"tendon_command.T{k}" for k in (1, 2, 3, 4)]
+
+
+@pytest.mark.parametrize(("values", "pull"), [({}, 0.0), ({"controller.tensions.T1.height": 3.0}, 3.0)])
+def test_only_commands_that_a_recording_gives_pull_where_efforts_are_compared(values, pull):
+    """The scenario's ramp of 18 N is dropped and named; one among the recording's values stays."""
+    data = drum_log()
+    # 20 mm of drum; a canal that does not rub.
+    data["tau"] = data["tau"] - 0.02 * pull * np.clip((data["t"] - 0.2) / 3.0, 0.0, 1.0)
+    overrides = {"finger.tendon_friction.coulomb": 0.0}
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        found = fp.identify(
+            "canal",
+            parameters={STIFFNESS: (0.05, 1.0)},
+            recordings={"log": DRUM | {"values": values}},
+            data={"log": data},
+            overrides=overrides,
+            starts=1,
+            profiles=False,
+        )
+    said = [str(each.message) for each in seen if "of the scenario is zero here" in str(each.message)]
+    assert float(found.estimate[0]) == pytest.approx(0.2, rel=2e-4)
+    assert len(said) == (0 if values else 1) and all("log: tendon_command.T1 of" in each for each in said)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 2e-3])
+def test_a_spline_that_follows_the_noise_is_told_with_the_smoothing_that_does_not(jitter):
+    """The angle's noise is that of its encoder, and speed times the error of its times; uneven times alone are none."""
+    rng, data = np.random.default_rng(4), drum_log()
+    late = rng.normal(0.0, jitter, data["t"].size)
+    even = np.sort(data["t"] + rng.uniform(-2e-3, 2e-3, data["t"].size))
+    data |= {"t": even, "q": np.sin(2.0 * (even + late)) + rng.normal(0.0, 3e-4, even.size)}
+    noise = np.hypot(3e-4, jitter * 2.0 / np.sqrt(2.0))
+
+    def said(smoothing):
+        column = {"column": "q", "smoothing": smoothing}
+        settings = validate(RecordingSettings, DRUM | {"inputs": {"joint_position.drum": column}}, ())
+        models, _ = recording_models(
+            fp.load_scenario("canal"), [read_recording("log", settings, data)], None, [np.ones(even.size, dtype=bool)]
+        )
+        return [each for each in models[0].warnings([STIFFNESS]) if "follows the noise" in each]
+
+    (told,) = said(1e-4)
+    assert float(told.split("readings scatter by ")[1].split()[0]) == pytest.approx(noise, rel=0.15)
+    assert said(0.0) and not said(noise)
+
+
+def test_a_goal_that_a_position_drive_has_from_the_scenario_alone_is_asked_for():
+    time = np.arange(0.0, 1.0, 0.01)
+    settings = {"time": "t", "inputs": {"joint_position.drum": {"column": "q", "smoothing": 0.0}}}
+    settings["outputs"] = {"joint_effort.drum": "q"}
+    servo = {"finger.actuators.M1.drive": "position", "controller.tensions": "none"}
+    servo["controller.spool_angle.M1.offset"] = 0.5
+    with pytest.raises(fp.InputError, match=r"inputs: lack spool_angle\.M1, the goal of a position drive"):
+        efforts("servo_bench", servo, {"t": time, "q": 0.1 * time}, settings)

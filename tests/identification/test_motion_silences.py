@@ -48,7 +48,7 @@ def _nothing(trajectory):
 
 @pytest.mark.parametrize("late", [0.0, 0.1])
 def test_a_recorded_start_is_that_of_a_joint_whose_column_has_a_wrong_zero(late):
-    """The drum turns at 0.2 rad/s; its camera tells 0.3 rad too much, and tells it late."""
+    """The drum turns at 0.2 rad/s; its camera tells 0.3 rad too much, late: to its column -0.3 rad is to be added."""
     data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
     data["angle"] = 0.5 + 0.2 * (data["t"] - late) + 0.3
     columns = {"joint_position.drum": {"column": "angle", "delay": late}}
@@ -57,12 +57,12 @@ def test_a_recorded_start_is_that_of_a_joint_whose_column_has_a_wrong_zero(late)
     key = "recordings.pull.joint_position.drum"
     for nuisance, angle in (
         ({}, 0.8),
-        ({f"{key}.offset": 0.3}, 0.5),
-        ({f"{key}.offset": 0.3, f"{key}.scale": 2.0}, 0.25),
+        ({f"{key}.offset": -0.3}, 0.5),
+        ({f"{key}.offset": -1.1, f"{key}.scale": 2.0}, 0.5),
     ):
         initial = model._with_nuisance(model.scenario, nuisance).simulation.initial
         assert initial.position["drum"] == pytest.approx(angle, abs=1e-9)
-        assert initial.velocity["drum"] == pytest.approx(0.2 / nuisance.get(f"{key}.scale", 1.0), abs=1e-9)
+        assert initial.velocity["drum"] == pytest.approx(0.2 * nuisance.get(f"{key}.scale", 1.0), abs=1e-9)
 
 
 @pytest.mark.slow

@@ -6,10 +6,11 @@ from intervals import COULOMB, DRAG, MOTION, STEADY, TURN, motion, readings
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
+from finger_pin.description.loading import load_bench
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.validation import validate
+from finger_pin.identification.models import build_problem
 from finger_pin.identification.recordings import read_recording
-from finger_pin.views.report import summarize_identification
 
 BENT = {"finger.tendons.T1.curvature_offset": TURN}
 
@@ -67,17 +68,18 @@ def test_a_stop_is_found_though_where_the_search_starts_nothing_touches_it():
     assert float(found.estimate[0]) == pytest.approx(1.2, abs=2e-3)
 
 
-@pytest.mark.slow
-def test_a_joint_that_nothing_damps_is_said_as_its_runs_take_long():
+@pytest.mark.parametrize(
+    ("viscous", "rows", "rings"), [(0.0, 400, True), (0.0, 60, False), (2e-3, 400, False)], ids=["", "short", "damped"]
+)
+def test_what_rings_undamped_is_said_only_where_steps_follow_it(viscous, rows, rings):
+    """Undamped, four seconds take four times the steps of a damped drum, and the first half second 1.4 times."""
     data = motion(np.random.default_rng(6), 0.15, 0.4, 0.0)
-    given = {"parameters": {COULOMB: (0.1, 0.2)}, "recordings": {"pull": {**MOTION, "settle": 0.2}}, "starts": 1}
-    given |= {"data": {"pull": {name: values[:60] for name, values in data.items()}}, "profiles": False}
-    bare = {**BENT, DRAG: 0.4, "finger.joint_friction.viscous": 0.0}
-    said = [
-        summarize_identification(fp.identify("canal", overrides=overrides, **given))
-        for overrides in (bare, {**bare, "finger.joint_friction.viscous": 2e-3})
-    ]
-    assert "Nothing damps drum" in said[0] and "Nothing damps" not in said[1]
+    entries = {"parameters": {COULOMB: (0.1, 0.2)}, "recordings": {"pull": MOTION}}
+    scenario, settings = load_bench("canal", {**BENT, DRAG: 0.4, "finger.joint_friction.viscous": viscous}, entries)
+    table = {name: values[:rows] for name, values in data.items()}
+    problem = build_problem(scenario, settings, [read_recording("pull", settings.recordings["pull"], table)])
+    said = problem.models[0].ringing(problem.models[0].scenario, {})
+    assert ("tendon_stiction[T1] rings almost undamped at" in said) == rings and bool(said) == rings
 
 
 @pytest.mark.slow
@@ -157,7 +159,7 @@ PWM = {
 }
 TABLE = {
     "trial": ["slow", "fast", "slow"],
-    "t": [0.0, 0.0, 1.0],
+    "t": [0.0, 0.0, 0.1],
     "pwm": [50.0, 80.0, -100.0],
     "volts": [7.0, 7.2, 6.0],
     "angle": [0.0, 0.1, 0.2],
@@ -181,7 +183,7 @@ def test_a_pulse_width_is_its_part_of_the_supply_in_the_rows_of_its_trial():
     [
         ({"rows": {"trail": "slow"}}, r"rows\.trail: no such column; there are trial.*did you mean trial"),
         ({"rows": {"trial": "slwo"}}, r"rows\.trial = .slwo.: no row has it; there are slow, fast"),
-        ({"rows": {"trial": "fast", "t": 1.0}}, "rows: no row has all of them"),
+        ({"rows": {"trial": "fast", "t": 0.1}}, "rows: no row has all of them"),
         (
             {"inputs": {"spool_angle.M1": {"column": "pwm", "supply": "volts"}}},
             r"inputs\.spool_angle\.M1\.supply = .volts.: is for a part of a voltage, without a unit",
@@ -203,7 +205,7 @@ def test_rows_and_supplies_that_are_not_there_are_refused_by_their_entry(change,
 
 def test_what_a_motion_cannot_be_given_is_refused_with_what_it_can():
     told = {**MOTION, "inputs": {"motor_position.M1": "in"}}
-    data = {"pull": dict.fromkeys(("t", "in", "out", "angle"), np.arange(5.0))}
+    data = {"pull": dict.fromkeys(("t", "in", "out", "angle"), 0.1 * np.arange(5.0))}
     with pytest.raises(
         fp.InputError, match=r"inputs\.motor_position\.M1: a motion is given tendon_command, spool_angle"
     ):

@@ -115,12 +115,40 @@ def test_times_are_dates_epochs_and_timers_that_come_round(cells, column):
 
 
 @pytest.mark.parametrize(
-    ("apart", "unit"), [(20.0, "milliseconds"), (5e4, "microseconds"), (2e7, "nanoseconds"), (2e13, "nanoseconds")]
+    ("start", "apart", "rows", "spans"),
+    [
+        # 100 Hz in ms, 1 kHz in ms of half a second, 1 kHz in us, and what may be 1 Hz in us or 1 kHz in ns.
+        (0.0, 10.0, 10, "0.09 s in ms or 90 s in s"),
+        (0.0, 1.0, 501, "0.5 s in ms or 500 s in s"),
+        (84213.0, 1e3, 501, "0.5 s in us or 500 s in ms or 500000 s in s"),
+        (7e9, 1e6, 501, "0.5 s in ns or 500 s in us or 5e+08 s in s"),
+        # An epoch tells its unit: 2025 in ns, us and ms.
+        (1.7633e18, 1e6, 501, "0.5 s in ns or 5e+08 s in s"),
+        (1.7633e15, 1e5, 501, "50 s in us or 5e+07 s in s"),
+        (1.7633e12, 1e2, 501, "50 s in ms or 50000 s in s"),
+        # Half a second of a clock that has run for two seconds, in ns: no epoch has rows a thousand seconds apart.
+        (2e9, 1e6, 501, "0.5 s in ns or 500 s in us or 5e+08 s in s"),
+    ],
 )
-def test_times_a_minute_long_are_asked_about_in_the_unit_that_makes_samples_of_them(apart, unit):
-    with pytest.raises(InputError, match=f"is it in {unit}"):
-        Table("x", {"t": apart * np.arange(10.0)}).times("time", Column(column="t"))
-    assert Table("x", {"t": apart * np.arange(10.0)}).times("time", Column(column="t", unit="s"))[1] == apart
+def test_times_of_no_unit_are_asked_about_with_the_time_that_they_take_in_each_unit(start, apart, rows, spans):
+    table = Table("x", {"t": start + apart * np.arange(rows)})
+    with pytest.raises(InputError) as error:
+        table.times("time", Column(column="t"))
+    assert f"its {rows} rows take {spans}: write" in str(error.value)
+    assert f'unit = "{spans.split(" s in ")[1].split()[0]}"' in str(error.value)
+    times = table.times("time", Column(column="t", unit="s"))
+    assert times[-1] - times[0] == pytest.approx(apart * (rows - 1), rel=1e-6)
+
+
+@pytest.mark.parametrize(("start", "apart"), [(0.0, 0.99), (1.7633e9, 2.0)])
+def test_seconds_that_samples_take_are_not_asked_about(start, apart):
+    times = Table("x", {"t": start + apart * np.arange(10)}).times("time", Column(column="t"))
+    assert times[-1] - times[0] == pytest.approx(9.0 * apart, rel=1e-6)
+
+
+def test_rows_without_times_follow_each_other_at_their_rate():
+    data = {"pull": [1.0, 2.0, 3.0], "angle": [0.0, 0.1, 0.2]}
+    np.testing.assert_allclose(recording(data, time=None, sample_rate=50.0).time, [0.0, 0.02, 0.04], rtol=1e-12)
 
 
 def test_an_epoch_in_a_file_of_signals_begins_at_zero(tmp_path):
@@ -139,15 +167,15 @@ def recording(data, **change):
 
 
 def test_rows_of_one_time_are_refused_or_their_mean_is_one_row():
-    data = {"t": [0, 1, 1, 1, 2], "pull": [1, 2, 3, 7, 9], "angle": [0.5, 0.1, np.nan, 0.3, np.nan]}
+    data = {"t": [0.0, 0.25, 0.25, 0.25, 0.5], "pull": [1, 2, 3, 7, 9], "angle": [0.5, 0.1, np.nan, 0.3, np.nan]}
     with pytest.raises(InputError, match='row 2 to the next, which has the same time; repeated_times = "mean"'):
         recording(data)
     one = recording(data, repeated_times="mean")
-    np.testing.assert_array_equal([one.time, one.inputs["tendon_command.T1"]], [[0, 1, 2], [1, 4, 9]])
+    np.testing.assert_array_equal([one.time, one.inputs["tendon_command.T1"]], [[0.0, 0.25, 0.5], [1, 4, 9]])
     np.testing.assert_allclose(one.outputs["joint_position.drum"], [0.5, 0.2, np.nan])
     assert one.speed.shape == (3,)
     with pytest.raises(InputError, match="times must increase"):
-        recording({**data, "t": [0, 1, 1, 0.5, 2]}, repeated_times="mean")
+        recording({**data, "t": [0.0, 0.25, 0.25, 0.1, 0.5]}, repeated_times="mean")
 
 
 def test_ticks_that_come_round_are_unwrapped_and_told_without_a_period():
@@ -160,7 +188,12 @@ def test_ticks_that_come_round_are_unwrapped_and_told_without_a_period():
     np.testing.assert_allclose(one.outputs["motor_position.M1"], known, rtol=1e-12)
     # 0.9 + 0.064 turns are below one, a further step is not.
     assert not wraparound_warning(one)
-    assert "jumps by a turn after row 2:" in wraparound_warning(recording(data, outputs={"motor_position.M1": column}))
+    said = wraparound_warning(recording(data, outputs={"motor_position.M1": column}))
+    assert "jumps by a turn after row 2:" in said and said.endswith("write period = 4096")
+    # Goals jump as angles do, and degrees by 360.
+    goals = {"time": "t", "inputs": {"spool_angle.M1": "goal (deg)"}, "outputs": {"motor_current.M1": "pull"}}
+    wrapped = {"t": data["t"], "pull": data["pull"], "goal (deg)": 360.0 * (turns % 1.0)}
+    assert wraparound_warning(recording(wrapped, **goals)).endswith("write period = 360")
 
 
 REFUSED = [
@@ -176,12 +209,18 @@ REFUSED = [
     ({"time": "mixed"}, "dates with a zone and dates without one"),
     ({"time": {"column": "date", "unit": "s"}}, "time.unit: is for numbers"),
     ({"kind": "steady", "time": None, "repeated_times": "mean"}, "repeated_times: is for motions only"),
+    ({"time": None}, "time: is missing: the column of times"),
+    ({"sample_rate": 100.0}, "sample_rate = 100.0: is for rows without times: leave out this or time"),
+    ({"time": None, "sample_rate": 9.0, "repeated_times": "mean"}, "leave out this or repeated_times"),
+    ({"kind": "steady", "time": None, "sample_rate": 9.0, "speed": 1.0}, "sample_rate: is for motions only"),
+    ({"outputs": {"joint_position.drum": {"column": "angle", "hold": True}}}, "hold = true: is for inputs of motions"),
+    ({"time": {"column": "t", "hold": True}}, "time.hold = true: is for inputs of motions"),
 ]
 
 
 @pytest.mark.parametrize(("change", "said"), REFUSED)
 def test_a_format_that_says_nothing_sensible_is_refused(change, said):
-    data = {"t": [0, 1, 2], "pull": [1, 2, 3], "angle": [0.0, 0.4, 0.5], "word": ["now", "then", "later"]}
+    data = {"t": [0.0, 0.1, 0.2], "pull": [1, 2, 3], "angle": [0.0, 0.4, 0.5], "word": ["now", "then", "later"]}
     data |= {"date": DATES, "mixed": [*DATES[:2], f"{DATES[2]}Z"]}
     with pytest.raises(InputError) as error:
         recording(data, **change)
@@ -208,7 +247,7 @@ def test_units_are_read_as_others_spell_them(unit, si, factor):
 
 
 def test_a_scale_leads_from_any_unit_in_brackets_to_si():
-    data = {"t": [0.0, 1.0], "pull [counts]": [10.0, 20.0], "angle": [0.0, 0.1]}
+    data = {"t": [0.0, 0.1], "pull [counts]": [10.0, 20.0], "angle": [0.0, 0.1]}
     one = recording(data, inputs={"tendon_command.T1": {"column": "pull", "scale": 0.5}})
     np.testing.assert_array_equal(one.inputs["tendon_command.T1"], [5.0, 10.0])
     with pytest.raises(InputError, match="is in counts, which is no unit known here"):

@@ -120,3 +120,48 @@ def test_entries_of_one_recording_act_on_it_alone_and_count_for_what_is_resumed(
     slopes = problem.slopes(problem.start)
     # The last parameter is the gain of a.
     assert np.abs(slopes[0][:, 2]).max() > 1e-3 and not slopes[1][:, 2].any()
+
+
+def test_one_number_in_two_keys_is_found_once_with_its_factor(bench):
+    """Of two cords that turn by 1.5 rad one rubs with half the other's coefficient mu: exp(-1.5 mu), exp(-0.75 mu)."""
+    rng, load = np.random.default_rng(3), np.repeat([3.0, 6.0, 9.0, 12.0], 6)
+    data = {"in": load, **{name: load * np.exp(-mu * 1.5) for name, mu in (("T1", 0.2), ("T2", 0.1))}}
+    data |= {name: data[name] + rng.normal(0.0, 0.02, load.size) for name in ("T1", "T2")}
+    key = "finger.tendon_friction.coulomb[0] & 0.5 * finger.tendon_friction.coulomb[1]"
+    recording = {"kind": "steady", "speed": 0.05, "inputs": {f"tendon_command.{name}": "in" for name in ("T1", "T2")}}
+    recording["outputs"] = {f"tendon_tension.{name}": name for name in ("T1", "T2")}
+    friction = {"finger.tendon_friction": {"coulomb": [0.3, 0.3], "viscous": 0.0, "stiction_ratio": 1.0}}
+    result = fp.identify(
+        bench,
+        parameters={key: (0.01, 1.0)},
+        recordings={"pull": recording},
+        data={"pull": data},
+        overrides=friction,
+        starts=1,
+    )
+    found = float(result.estimate[0])
+    assert result.sizes["parameter"] == 1 and str(result.units[0].values) == "1"
+    assert float(result.lower[0]) < 0.2 < float(result.upper[0]) and found == pytest.approx(0.2, abs=2e-3)
+    later = fp.predict(result, {"pull": recording}, data={"pull": data})
+    expected = np.concatenate([load * np.exp(-share * 1.5 * found) for share in (1.0, 0.5)])
+    np.testing.assert_allclose(later.predicted_value, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ((f"{SPRING} & 0.0 * {MASS}",), "must be one key, or several with a factor from the second on"),
+        ((f"2.0 * {SPRING}",), "must be one key, or several with a factor from the second on"),
+        ((f"{SPRING} & {SPRING}",), "each once"),
+        ((f"{SPRING} & {MASS}", MASS), f"is found for a as {SPRING} & {MASS} too"),
+        ((f"{SPRING} & finger.joints.pin.link.mess",), "finger.joints.pin.link.mess"),
+        ((f"{SPRING} & 1e6 * {MASS}",), "must be at most"),
+    ],
+)
+def test_keys_that_do_not_share_a_number_are_refused_in_one_line(bench, keys, said):
+    entries = {"parameters": dict.fromkeys(keys, (0.01, 0.5)), "recordings": {"a": recording()}}
+    scenario, settings = load_bench(bench, {}, entries)
+    data = {"t": TIME, "goal": GOAL, "q": GOAL}
+    with pytest.raises(fp.InputError) as refused:
+        build_problem(scenario, settings, [read_recording("a", settings.recordings["a"], data)])
+    assert said in str(refused.value) and "\n" not in str(refused.value)

@@ -189,3 +189,12 @@ def test_samples_of_a_wrong_shape_are_refused_in_one_line(samples, said):
     with pytest.raises(InputError, match=said) as caught:
         Signal.from_samples("reference", samples, ["a", "b"])
     assert caught.value.entry == "reference" and "\n" not in str(caught.value)
+
+
+def test_a_held_value_stays_until_the_next_and_the_last_one_for_ever():
+    settings = JointReference(kind="hold", times=(0.0, 0.3, 0.4), values=(0.2, 0.9, -0.1), offset=0.1)
+    instants = [-1.0, 0.0, 0.29, 0.3, 0.39, 0.4, 9.0]
+    np.testing.assert_allclose(values(settings, instants), [0.3, 0.3, 0.3, 1.0, 1.0, 0.0, 0.0], atol=1e-15)
+    # Beside a signal with other knots as well.
+    beside = Signal.from_settings([settings, SAMPLES]).at(np.array(instants))[0]
+    np.testing.assert_allclose(beside[:, 0], [0.3, 0.3, 0.3, 1.0, 1.0, 0.0, 0.0], atol=1e-15)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.text import Text
 
-from finger_pin.views.plots.identification import plot_identification
+from finger_pin.exceptions import InputError
+from finger_pin.views.plots.identification import plot_identification, plot_profiles
 
 
 @pytest.mark.parametrize("sides", [(1.0,), (1.0, -1.0)], ids=["one way", "to and fro"])
@@ -22,3 +24,15 @@ def test_what_is_computed_of_steady_readings_is_a_curve_only_where_every_load_ha
     x, y = drawn.get_data()
     np.testing.assert_allclose(sorted(zip(x, y, strict=True)), sorted(zip(load, computed, strict=True)))
     assert len(sides) > 1 or (np.diff(x) >= 0.0).all()
+
+
+def test_parameters_without_a_profile_have_no_panel():
+    """Of two parameters one has three points, and of the other only the estimate is known."""
+    value, rise = np.array([[0.1, 0.2, 0.3], [1.0, np.nan, np.nan]]), np.array([[4.0, 0.0, 4.0], [0.0, np.nan, np.nan]])
+    data = {"profile_value": (("parameter", "point"), value), "profile_rise": (("parameter", "point"), rise)}
+    data |= {name: ("parameter", [0.2, 1.0]) for name in ("estimate", "lower", "upper")}
+    result = xr.Dataset(data | {"units": ("parameter", ["1", "N"])}, {"parameter": ["a.b", "c.d"]})
+    said = [text.get_text() for text in plot_profiles(result).findobj(Text)]
+    assert "a.b" in said and "c.d" not in said
+    with pytest.raises(InputError, match="has no profiles"):
+        plot_profiles(result.isel(parameter=[1]))

@@ -50,7 +50,7 @@ def moved():
     return plots.plot_hand_motion(hand.assign(joint_position=(("time", "joint"), angles)))
 
 
-@pytest.mark.parametrize("draw", [swept, searched, identified, checked, moved])
+@pytest.mark.parametrize("draw", [swept, searched, checked, moved])
 def test_angles_are_drawn_in_degrees_and_no_text_says_rad(draw):
     figure = draw()
     drawn = [line.get_ydata() for axes in figure.axes for line in axes.lines]
@@ -58,6 +58,13 @@ def test_angles_are_drawn_in_degrees_and_no_text_says_rad(draw):
     said = [text.get_text() for text in figure.findobj(Text)]
     assert any("°" in text for text in said)
     assert not [text for text in said if "rad" in text.replace("N m/rad", "")]
+
+
+def test_an_identification_is_drawn_in_the_units_of_its_tables_and_its_bench():
+    figure = identified()
+    assert any(np.array_equal(line.get_ydata(), ANGLES) for line in figure.axes[0].lines)
+    said = [text.get_text() for text in figure.findobj(Text)]
+    assert "(rad)" in said and not [text for text in said if "°" in text]
 
 
 @pytest.mark.slow

@@ -75,13 +75,22 @@ class Column(Description):
     delay: Annotated[float, real(-10.0, 10.0)] = quantity(
         0.0, unit="s", source="calibration", doc="Delay of the column behind its quantity; motions only."
     )
-
+    hold: bool = Field(
+        False,
+        strict=True,
+        description="Inputs of motions: each reading holds until the next, as the goal that a servo was sent.",
+    )
     smoothing: Annotated[float, real(0.0, 1e3)] | None = quantity(
         None,
         unit="rad",
         source="the encoder",
         doc="Inputs joint_position of motions: rms by which a smooth curve passes beside the readings; 0: through all.",
     )
+
+    @property
+    def signal_kind(self) -> str:
+        """The kind of the signal through its readings."""
+        return "hold" if self.hold else "samples"
 
     @model_validator(mode="after")
     def _has_floor(self) -> Self:
@@ -114,6 +123,9 @@ class RecordingSettings(TableFormat):
     )
     at_rest: bool = Field(False, strict=True, description="Steady: read at rest, after having slid at that speed.")
     time: Column | None = Field(None, description="Motion: the column of times.")
+    sample_rate: Annotated[float, real(0.0, 1e9, above=True)] | None = quantity(
+        None, unit="Hz", source="the recording", doc="Motion: rows per second, where no column has times."
+    )
     start: Annotated[Literal["rest", "recorded", "found"], choice("rest", "recorded", "found")] = quantity(
         "rest",
         unit="1",
@@ -141,12 +153,17 @@ class RecordingSettings(TableFormat):
         """Whether the motion of the joints is an input, so that nothing of it is computed."""
         return self.kind == "motion" and any(name.partition(".")[0] == IMPOSED for name in self.inputs)
 
+    def _is_motion_input(self, name: str) -> bool:
+        return self.kind == "motion" and name.startswith("inputs.")
+
     @model_validator(mode="after")
     def _imposes(self) -> Self:
         columns = {f"inputs.{name}": each for name, each in self.inputs.items()}
         columns |= {f"outputs.{name}": each for name, each in self.outputs.items()}
         for name, column in {**columns, "time": self.time, "speed": self.speed}.items():
             smooth = self.imposed and name.startswith(f"inputs.{IMPOSED}.")
+            if isinstance(column, Column) and column.hold and (smooth or not self._is_motion_input(name)):
+                raise problem(f"{name}.hold", f"is for inputs of motions other than {IMPOSED} only", True)
             if isinstance(column, Column) and not smooth and column.smoothing is not None:
                 raise problem(f"{name}.smoothing", f"is for inputs {IMPOSED} of motions only", column.smoothing)
             if isinstance(column, Column) and smooth and column.smoothing is None:
@@ -183,7 +200,7 @@ class RecordingSettings(TableFormat):
         if self.kind == "steady":
             if self.speed is None and not all(name.startswith("joint_position.") for name in self.outputs):
                 raise problem("speed", "is missing: of sliding, m/s, positive where the tendon is drawn in")
-            for name in ("time", "window"):
+            for name in ("time", "sample_rate", "window"):
                 if getattr(self, name) is not None:
                     raise problem(name, "is for motions only")
             if self.repeated_times != "refuse":
@@ -198,8 +215,11 @@ class RecordingSettings(TableFormat):
             if isinstance(self.speed, float) and (not math.isfinite(self.speed) or self.speed == 0.0):
                 raise problem("speed", "must be finite and not zero: friction has the sign of sliding", self.speed)
         else:
-            if self.time is None:
-                raise problem("time", 'is missing: the column of times, such as time = "t"')
+            if self.time is None and self.sample_rate is None:
+                raise problem("time", 'is missing: the column of times, such as time = "t", or sample_rate, Hz')
+            if self.sample_rate is not None and (self.time is not None or self.repeated_times != "refuse"):
+                key = "time" if self.time is not None else "repeated_times"
+                raise problem("sample_rate", f"is for rows without times: leave out this or {key}", self.sample_rate)
             if self.speed is not None or self.at_rest:
                 raise problem("speed" if self.speed is not None else "at_rest", "is for steady readings only")
         return self

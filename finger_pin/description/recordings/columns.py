@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,28 +12,16 @@ from pydantic import Field, model_validator
 
 from finger_pin.description.recordings.bench import Column
 from finger_pin.description.recordings.csv_files import TableFormat, read_columns
-from finger_pin.description.recordings.units import (
-    APPENDED,
-    BRACKETED,
-    UNITS,
-    check_header,
-    in_si,
-    parse_unit,
-    split_unit,
-)
+from finger_pin.description.recordings.times import check_seconds, seconds_of_dates
+from finger_pin.description.recordings.units import APPENDED, BRACKETED, check_header, in_si, parse_unit, split_unit
 from finger_pin.description.tables import Series
 from finger_pin.description.validation import suggestion, validate
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand
 
 _TIMES = ("time", "t")
-# Rows that are so far apart on average, s, over so long a time are asked about; the units that they may be in.
-_LARGE_PERIOD, _LARGE_DURATION = 1.0, 60.0
-_SMALL_UNITS = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 # Times from here on, s, are of an epoch, and counted from the first: three years are no motion.
 _EPOCH = 1e8
-# A date and a time of ISO 8601, and the difference of its zone from UTC.
-_ISO_DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)\s*(?:Z|(?:([+-])(\d\d):?(\d\d)?))?")
 # The part of a period, from one sample to the next, from which on the way round is not clear.
 _AMBIGUOUS = 0.45
 
@@ -94,20 +81,12 @@ class Table:
     def _all_rows(self, key: str, column: Column, si: str, *, missing: bool = False) -> NDArray[np.float64]:
         """Return a column in SI with a number for every row, of those of one time as well."""
         entry = f"{self.entry}.{key}"
-        name, header_unit = self._find(entry, column)
+        name, _ = self._find(entry, column)
         cells = self._columns[name]
         if cells.dtype == object:
             row = next(k for k, cell in enumerate(cells) if isinstance(cell, str))
             raise InputError(entry, f"column {name} has no number in row {row + 1}", cells[row])
-        unit = column.unit or header_unit
-        if column.unit is None and not (column.scale != 1.0 and header_unit and parse_unit(header_unit) is None):
-            check_header(entry, name, header_unit, si, asked=column.scale == 1.0)
-        elif column.unit is None:
-            # The scale leads from a unit of its own, such as ticks, to SI.
-            unit = None
-        factor = 1.0 if unit is None else in_si(f"{entry}.unit" if column.unit else entry, unit, si)
-        if column.unit is None and factor != 1.0 and column.scale != 1.0:
-            raise InputError(entry, f"has a scale, and its header a unit; write unit too, such as {unit}", column.scale)
+        unit, factor = self._unit(entry, column, si)
         wrong = np.flatnonzero(np.isinf(cells) if missing else ~np.isfinite(cells))
         if len(wrong):
             raise InputError(entry, f"column {name} has no number in row {wrong[0] + 1}")
@@ -120,6 +99,28 @@ class Table:
             values = values * self._all_rows(f"{key}.supply", Column(column=column.supply), "V")
         return values + column.offset
 
+    def _unit(self, entry: str, column: Column, si: str) -> tuple[str | None, float]:
+        """Return the unit of a column, None if it has none or one that its scale leads to SI from, and its factor.
+
+        Raises:
+            InputError: If it does not fit.
+        """
+        name, header_unit = self._find(entry, column)
+        unit = column.unit or header_unit
+        if column.unit is None and not (column.scale != 1.0 and header_unit and parse_unit(header_unit) is None):
+            check_header(entry, name, header_unit, si, asked=column.scale == 1.0)
+        elif column.unit is None:
+            # The scale leads from a unit of its own, such as ticks, to SI.
+            unit = None
+        factor = 1.0 if unit is None else in_si(f"{entry}.unit" if column.unit else entry, unit, si)
+        if column.unit is None and factor != 1.0 and column.scale != 1.0:
+            raise InputError(entry, f"has a scale, and its header a unit; write unit too, such as {unit}", column.scale)
+        return unit, factor
+
+    def turn(self, key: str, column: Column) -> float:
+        """Return by how much a column of angles differs after a turn: its period where it tells angles within one."""
+        return 2.0 * np.pi / abs(column.scale * self._unit(f"{self.entry}.{key}", column, "rad")[1])
+
     def _find(self, entry: str, column: Column) -> tuple[str, str | None]:
         """Return the name of a column in the header, and its unit there."""
         if column.column not in self._headers:
@@ -131,24 +132,29 @@ class Table:
         """Return whether a column that is there has a unit or a scale, in its header or beside its name."""
         return column.unit is not None or column.scale != 1.0 or self._headers[column.column][1] is not None
 
-    def times(self, key: str, column: Column, repeated: str = "refuse") -> NDArray[np.float64]:
+    def times(
+        self, key: str, column: Column, repeated: str = "refuse", *, by_hand: bool = False
+    ) -> NDArray[np.float64]:
         """Return a column of times, s, shape (m,); dates, and seconds of an epoch, are counted from the first.
 
         Args:
             key: Where it is asked for, below the table's entry.
             column: Numbers, or dates and times of ISO 8601.
             repeated: ``mean`` where the mean of rows of one time is one row from now on, in all columns.
+            by_hand: Whether a few rows may be written by hand, so that nothing is asked about whole seconds.
 
         Raises:
-            InputError: Also if they do not increase, or seem to be milliseconds and no unit says that they are not.
+            InputError: Also if they do not increase, or may be milliseconds or less and no unit says which.
         """
         entry = f"{self.entry}.{key}"
-        if column.delay:
-            raise InputError(f"{entry}.delay", "is for signals, not for their times", column.delay)
+        for key in ("delay", "hold"):
+            if getattr(column, key):
+                raise InputError(f"{entry}.{key}", "is for signals, not for their times", getattr(column, key))
         name, header_unit = self._find(entry, column)
         dated = self._columns[name].dtype == object
-        times = _dates(entry, column, name, self._columns[name]) if dated else self.column(key, column, "s")
-        if abs(times[0]) >= _EPOCH:
+        times = seconds_of_dates(entry, column, name, self._columns[name]) if dated else self.column(key, column, "s")
+        start = abs(times[0])
+        if start >= _EPOCH:
             times = times - times[0]
         steps = np.diff(times)
         if repeated == "mean" and np.any(steps == 0.0) and not np.any(steps < 0.0):
@@ -161,13 +167,8 @@ class Table:
             if len(back) and steps[back[0]] == 0.0:
                 where += ', which has the same time; repeated_times = "mean" takes the mean of such rows'
             raise InputError(entry, f"times must increase, two rows at least{where}")
-        length, unknown = times[-1] - times[0], not dated and (column.unit or header_unit) is None
-        period = length / (len(times) - 1)
-        if unknown and column.scale == 1.0 and length >= _LARGE_DURATION and period >= _LARGE_PERIOD:
-            unit = next((unit for unit in _SMALL_UNITS if period * UNITS["s"][unit] < _LARGE_PERIOD), "ns")
-            hint = f"its {len(times)} rows take {length:g} s (is it in {_SMALL_UNITS[unit]}?)"
-            answer = f'write {{ column = "{column.column}", unit = "{unit}" }}, or unit = "s" if they do'
-            raise InputError(entry, f"{hint}; {answer}", column.column)
+        if not (dated or column.unit or header_unit or column.scale != 1.0):
+            check_seconds(entry, column.column, start, times, by_hand=by_hand)
         return times
 
     def signals(self, file: SignalFile) -> Iterator[tuple[str, Column]]:
@@ -206,7 +207,7 @@ def read_signals(entry: str, source: Any, folder: Path, unit_of: Callable[[str],
     file = validate(SignalFile, source, tuple(entry.split(".")))
     table = Table(entry, read_columns(f"{entry} {file.path}", folder / expand(file.path), file))
     (_, time), *signals = table.signals(file)
-    times = table.times("time", time, file.repeated_times)
+    times = table.times("time", time, file.repeated_times, by_hand=True)
     shared = Series(times)
     samples: dict[str, dict[str, Any]] = {}
     for name, column in signals:
@@ -215,37 +216,8 @@ def read_signals(entry: str, source: Any, folder: Path, unit_of: Callable[[str],
         values = Series(table.column(f"columns.{name}", column, unit_of(name)))
         # A column that lags behind its quantity is of earlier times.
         at = Series(times - column.delay) if column.delay else shared
-        samples[name] = {"kind": "samples", "times": at, "values": values}
+        samples[name] = {"kind": column.signal_kind, "times": at, "values": values}
     return samples
-
-
-def _dates(entry: str, column: Column, name: str, cells: NDArray[Any]) -> NDArray[np.float64]:
-    """Return dates and times of ISO 8601 in seconds from the first, shape (m,); those without a zone are all of one.
-
-    Raises:
-        InputError: If one is no such date, or has what only numbers have.
-    """
-    for key, default in (("unit", None), ("period", None), ("supply", None), ("scale", 1.0), ("offset", 0.0)):
-        if getattr(column, key) != default:
-            raise InputError(f"{entry}.{key}", f"is for numbers, and column {name} has dates", getattr(column, key))
-    instants = np.zeros(len(cells), dtype="datetime64[ns]")
-    zones = set()
-    for row, cell in enumerate(cells):
-        match = _ISO_DATE.fullmatch(cell.strip()) if isinstance(cell, str) else None
-        try:
-            instants[row] = np.datetime64(match[1].replace(",", "."), "ns")  # type: ignore[index]
-        except (TypeError, ValueError):
-            allowed = f"column {name} has no number and no date of ISO 8601 in row {row + 1}"
-            raise InputError(entry, allowed, cell) from None
-        assert match is not None
-        zones.add(match[1] == match[0].strip())
-        if match[2]:
-            ahead = np.timedelta64(60 * int(match[3]) + int(match[4] or 0), "m")
-            instants[row] += ahead if match[2] == "-" else -ahead
-    if len(zones) > 1:
-        raise InputError(entry, f"column {name} has dates with a zone and dates without one")
-    seconds: NDArray[np.float64] = (instants - instants[0]).astype(float) * 1e-9
-    return seconds
 
 
 def _unwrapped(entry: str, cells: NDArray[np.float64], period: float) -> NDArray[np.float64]:

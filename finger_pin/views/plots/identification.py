@@ -1,4 +1,4 @@
-"""Figures of an identification: measured and computed signals, residuals, profiles."""
+"""Figures of an identification in SI, as its bench and tables are: signals, residuals, predictions, profiles."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import trace
 from finger_pin.views.plots.panels import grid, title
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, Width, styled
-from finger_pin.views.shown_units import shown_unit
 
 #: Rise of minus twice the likelihood at the ends of a 95 % interval.
 _CHI_SQUARE_95 = 3.841
@@ -38,8 +38,7 @@ def plot_identification(result: xr.Dataset, *, width: Width = None, titles: bool
         steady = bool(result["signal_steady"].values[index])
         by_load = steady and bool(np.isfinite(load).all())
         x, label = (load, "load (N)") if by_load else (instant, "reading" if steady else "time (s)")
-        factor, unit = shown_unit(str(result["signal_units"].values[index]))
-        measured, residual = factor * measured, factor * residual
+        unit = str(result["signal_units"].values[index])
         if steady:
             fit_axes.plot(x, measured, "o", color=BLUE, markersize=3.5, alpha=0.6, label="measured")
             _draw_computed(fit_axes, x, measured - residual)
@@ -52,7 +51,7 @@ def plot_identification(result: xr.Dataset, *, width: Width = None, titles: bool
         fit_axes.set(xlabel=label, ylabel=f"({unit})" if unit else "")
         residual_axes.set(xlabel=label)
         title(fit_axes, str(signals[index]))
-        title(residual_axes, f"left over, rms {factor * result['noise'].values[index]:.3g} {unit}")
+        title(residual_axes, f"left over, rms {result['noise'].values[index]:.3g} {unit}")
     panels[0].legend(loc="best")
     return figure
 
@@ -77,8 +76,8 @@ def plot_predictions(result: xr.Dataset, *, width: Width = None, titles: bool = 
         by_load = steady and bool(np.isfinite(load).all())
         x = load if by_load else instant
         order = np.argsort(x, kind="stable")
-        factor, unit = shown_unit(str(result["prediction_units"].values[index]))
-        x, measured, value, band = (each[order] for each in (x, factor * measured, factor * value, factor * band))
+        unit = str(result["prediction_units"].values[index])
+        x, measured, value, band = (each[order] for each in (x, measured, value, band))
         if steady:
             axes.errorbar(x, value, band, fmt="_", color=VERMILLION, label="predicted, 95 %")
             axes.plot(x, measured, "o", color=BLUE, markersize=3.5, alpha=0.6, label="measured")
@@ -86,7 +85,7 @@ def plot_predictions(result: xr.Dataset, *, width: Width = None, titles: bool = 
             axes.fill_between(x, value - band, value + band, color=VERMILLION, alpha=0.2, linewidth=0.0)
             trace(axes, x, measured, color=BLUE, label="measured")
             trace(axes, x, value, color=VERMILLION, label="predicted, 95 %", linewidth=1.0)
-        rms = f"rms {factor * result['prediction_rms'].values[index]:.3g} {unit}"
+        rms = f"rms {result['prediction_rms'].values[index]:.3g} {unit}"
         label = "load (N)" if by_load else "reading" if steady else "time (s)"
         axes.set(xlabel=label, ylabel=f"({unit})" if unit else "")
         title(axes, f"{names[index]}, held out, {rms}")
@@ -107,33 +106,43 @@ def _draw_computed(axes: Axes, abscissa: Array, computed: Array) -> None:
 
 @styled
 def plot_profiles(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw the profile of every parameter: the misfit of the recordings with it held at other values.
+    """Draw the profile of every parameter that has one: the misfit of the recordings with it held at other values.
 
     Args:
         result: Dataset of `identify`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
+
+    Raises:
+        InputError: If no parameter has a profile.
     """
-    names = result["parameter"].values
-    figure, panels = grid(len(names), 2 if len(names) == 4 else 3, (3.0, 2.5), width, titles)
-    for k, axes in enumerate(panels):
+    shown = profiled_parameters(result)
+    if not shown:
+        raise InputError("result", "has no profiles: identify with profiles")
+    figure, panels = grid(len(shown), 2 if len(shown) == 4 else 3, (3.0, 2.5), width, titles)
+    for k, axes in zip(shown, panels, strict=True):
         _draw_profile(axes, result.isel(parameter=k))
     return figure
 
 
+def profiled_parameters(result: xr.Dataset) -> list[int]:
+    """Return the indices of the parameters that have a profile: values beside the estimate."""
+    return np.flatnonzero(np.sum(np.isfinite(result["profile_rise"].values), axis=1) > 1).tolist()
+
+
 def _draw_profile(axes: Axes, parameter: xr.Dataset) -> None:
-    factor, unit = shown_unit(str(parameter["units"].values))
-    value, rise = factor * parameter["profile_value"].values, parameter["profile_rise"].values
+    unit = str(parameter["units"].values)
+    value, rise = parameter["profile_value"].values, parameter["profile_rise"].values
     finite = np.isfinite(value) & np.isfinite(rise)
     value, rise = value[finite], np.maximum(rise[finite], 0.0)
-    estimate = factor * float(parameter["estimate"])
+    estimate = float(parameter["estimate"])
     # The root of the rise is nearly straight on either side.
     fine_values = np.linspace(value.min(), value.max(), 81)
     root = np.interp(fine_values, value, np.where(value < estimate, -1.0, 1.0) * np.sqrt(rise))
     axes.plot(fine_values, root**2, color=BLUE)
     axes.plot(value, rise, "o", color=BLUE, markersize=3.0)
     axes.axhline(_CHI_SQUARE_95, color=GREY, linewidth=0.8, linestyle="--")
-    for end in (factor * float(parameter["lower"]), factor * float(parameter["upper"])):
+    for end in (float(parameter["lower"]), float(parameter["upper"])):
         if math.isfinite(end):
             axes.axvline(end, color=GREY, linewidth=0.8)
     axes.plot([estimate], [0.0], "o", color=VERMILLION, markersize=5.0)
@@ -143,6 +152,6 @@ def _draw_profile(axes: Axes, parameter: xr.Dataset) -> None:
 
 
 def short_name(key: str) -> str:
-    """Return the end of a parameter's key, after the name of its recording if it is of one."""
-    parts = key.split(".")
+    """Return the end of a parameter's key, its first one, after the name of its recording if it is of one."""
+    parts = key.partition(" &")[0].split(".")
     return f"{parts[1]}: {'.'.join(parts[-2:])}" if parts[0] == "recordings" else ".".join(parts[-2:])
