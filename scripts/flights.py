@@ -18,10 +18,10 @@ import numpy as np
 import pinocchio as pin
 from validation.flight_scenarios import FALLEN_ON, FALLING, FAMILIES, Flight, falls
 
-from finger_pin.core.inputs import core_signal, held_control
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
+from finger_pin.core.tables.inputs import core_signal, held_control
 from finger_pin.description.parameters import Link
 from finger_pin.description.placement import PathSignal
 from finger_pin.mechanism.contact_rows import contact_rows

@@ -12,12 +12,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.integrator import integrate_compiled
-from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
-from finger_pin.core.stepping.tableaus import rodas5p
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.repetition import Steps
+from finger_pin.core.steps.tableaus import rodas5p
+from finger_pin.core.steps.trajectory import Trajectory
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array

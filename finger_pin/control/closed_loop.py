@@ -17,8 +17,8 @@ from finger_pin.control.palm import (
 )
 from finger_pin.control.position_drive import DriveSignals, LoopMemory
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.inputs import InputTable, core_signal, held_control
+from finger_pin.core.signals.compiled_finger import CompiledFinger
+from finger_pin.core.tables.inputs import InputTable, core_signal, held_control
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError

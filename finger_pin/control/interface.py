@@ -9,7 +9,7 @@ from typing import ClassVar, Protocol, Self
 
 from numpy.typing import ArrayLike
 
-from finger_pin.core.inputs import InputTable
+from finger_pin.core.tables.inputs import InputTable
 from finger_pin.description.caching import cached_property
 from finger_pin.description.routing import Routing
 from finger_pin.mechanism.evaluation import Outputs

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.input_queue import input_delays
 from finger_pin.control.interface import ControlSignals, LoopController
-from finger_pin.core.inputs import InputTable, core_signal, scheduled_control
+from finger_pin.core.tables.inputs import InputTable, core_signal, scheduled_control
 from finger_pin.description.effects import wound_tendons
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.inputs import InputTable, core_signal
+from finger_pin.core.tables.inputs import InputTable, core_signal
 from finger_pin.description.finger_description import HandSettings
 from finger_pin.description.objects import PATH as OBJECT_PATH
 from finger_pin.description.placement import PATH, PathSignal

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.motor_signals import sampled_voltages
-from finger_pin.core.drives import Drives, sample
+from finger_pin.core.stepping.drives import Drives, sample
 from finger_pin.description.actuators import Actuator
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.torque import FingertipForce, TorqueLaw
-from finger_pin.core.inputs import InputTable, core_signal, planned_control
+from finger_pin.core.tables.inputs import InputTable, core_signal, planned_control
 from finger_pin.description.routing import ForceClosure, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.laws.input_functions import internal_level, proportional_torque

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario

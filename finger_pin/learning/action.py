@@ -14,7 +14,7 @@ from finger_pin.control.input_queue import InputQueue, input_delays
 from finger_pin.control.input_ranges import input_ranges, spool_ranges
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.position_drive import build_drives, loop_period
-from finger_pin.core.drives import Drives
+from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.exceptions import InputError

@@ -10,9 +10,9 @@ import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import ControlSignals
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.compiled_fingers import CompiledFingers
-from finger_pin.core.stepping.trajectory import Statistics, Trajectory
+from finger_pin.core.signals.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_fingers import CompiledFingers
+from finger_pin.core.steps.trajectory import Statistics, Trajectory
 from finger_pin.learning.action import Action
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.state import Motion, State

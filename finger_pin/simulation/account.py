@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.mechanism.state import Motion
 from finger_pin.simulation.energy import Flows, energies, powers
 from finger_pin.typing import Array

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import LEAST_ATOL_SCALE, LEAST_RTOL
 from finger_pin.laws.contact_law import CONTACT

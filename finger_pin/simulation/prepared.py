@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.stepper import TABLEAUS
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.core.threads import physical_memory
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario

@@ -13,7 +13,7 @@ from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import (

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import ControlSignals
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.evaluation import ContactPoints, Outputs
 from finger_pin.mechanism.finger_signals import FingerSignals

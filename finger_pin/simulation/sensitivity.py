@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from finger_pin.core.stepping.trajectory import Trajectory
+from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError

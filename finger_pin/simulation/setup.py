@@ -14,12 +14,12 @@ from finger_pin.control.motor_signals import spool_windings, voltage_signals
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.collision.interpolants import meetings
-from finger_pin.core.inputs import InputTable
 from finger_pin.core.stepping.integrator import integrate_compiled
-from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.stepping.trajectory import Trajectory, Watch
+from finger_pin.core.steps.repetition import Steps
+from finger_pin.core.steps.trajectory import Trajectory, Watch
+from finger_pin.core.tables.inputs import InputTable
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError

@@ -14,10 +14,10 @@ from finger_pin.control.input_queue import InputQueue, input_delays
 from finger_pin.control.named_inputs import Inputs, inputs_by_name
 from finger_pin.control.palm import PalmPath, PrescribedPaths, start_state, with_paths
 from finger_pin.control.user_controllers import Samples
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.inputs import held_control
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.batch_stepper import BatchStepper
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError

@@ -15,7 +15,7 @@ from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.palm import PalmPath
 from finger_pin.control.position_drive import PrescribedVoltages
 from finger_pin.control.user_controllers import Samples
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.coupling import PassiveCoupling

@@ -13,10 +13,10 @@ import finger_pin as fp
 from benchmarks.timing import clocked
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
 from finger_pin.core.jit import CompiledFunction, call_at, unpack
-from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables.model import MODEL
 from finger_pin.description.scenario import Scenario
 from finger_pin.typing import Array
 

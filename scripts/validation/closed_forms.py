@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import ellipj, ellipk
 
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulator import Simulator

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
-from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.steps import integration
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.typing import Array

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import load_finger
 from finger_pin.mechanism.finger import Finger

@@ -5,7 +5,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.proportional import RoutedController
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import ClosureWarning
 from finger_pin.references.reference import ReferenceSignals

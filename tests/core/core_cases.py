@@ -8,13 +8,13 @@ import pinocchio as pin
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
-from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.inputs import held_control
 from finger_pin.core.jit import CompiledFunction, Matrix, StructType, Vector, call, call_at, unpack
-from finger_pin.core.mechanism_parameters import compile_mechanism
-from finger_pin.core.model import MODEL
+from finger_pin.core.signals.bound_models import BoundModel
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables.inputs import held_control
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
+from finger_pin.core.tables.model import MODEL
 from finger_pin.mechanism.state import State
 
 BODIES = ("ub_stand_in", "planar", "dexmart_index", "tree", "hand")

@@ -10,10 +10,10 @@ from random_mechanisms import by_listing, kinds_of, random_mechanism, random_sta
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_finger import CompiledMechanism
-from finger_pin.core.inputs import held_control
+from finger_pin.core.signals.compiled_finger import CompiledMechanism
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows

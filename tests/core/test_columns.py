@@ -5,8 +5,7 @@ import ctypes
 import numpy as np
 import pytest
 
-from finger_pin.core.chains import BODY
-from finger_pin.core.evaluation.law_code import (
+from finger_pin.core.addresses.law_code import (
     ROW,
     SLOPE,
     SLOPE_COLUMNS,
@@ -16,7 +15,8 @@ from finger_pin.core.evaluation.law_code import (
     TouchSlopeColumns,
     addresses,
 )
-from finger_pin.core.mechanism_parameters import compile_mechanism
+from finger_pin.core.tables.chains import BODY
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
 from finger_pin.exchange.mujoco_friction import ELEMENT, PIN, TENDON, Coefficients, ElementPlaces, PluginFriction
 from finger_pin.laws.law import Law, Row, Touch
 from finger_pin.mechanism.finger import Finger

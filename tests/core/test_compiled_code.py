@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import finger_pin as fp
-from finger_pin.core.evaluation.law_code import addresses
+from finger_pin.core.addresses.law_code import addresses
 from finger_pin.core.jit import CompiledFunction, functions, njit_inline, njit_reassociate
 from finger_pin.laws.law import Law
 
@@ -254,6 +254,6 @@ def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
 @pytest.mark.slow
 def test_importing_the_core_compiles_nothing(tmp_path):
     environment = os.environ | {"FINGER_PIN_CACHE_DIR": str(tmp_path)}
-    code = "import finger_pin.core.evaluation.state_batches, finger_pin.core.stepping.rosenbrock"
+    code = "import finger_pin.core.signals.state_batches, finger_pin.core.steps.rosenbrock"
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr, list(tmp_path.iterdir())) == ("", "", [])

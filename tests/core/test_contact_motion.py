@@ -5,10 +5,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from finger_pin.core.inputs import held_control
-from finger_pin.core.stepping import integration
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.steps import integration
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.description.objects import Object
 from finger_pin.mechanism.contact_rows import contact_rows
 from finger_pin.mechanism.mechanism import Mechanism

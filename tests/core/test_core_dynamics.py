@@ -6,9 +6,9 @@ import pytest
 from core_cases import BODIES, LOOPS, relative
 
 import finger_pin as fp
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.inputs import held_control
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import Rows

@@ -8,7 +8,7 @@ from core_cases import LOOPS, Case
 from numpy.linalg import norm
 
 from finger_pin.control.interface import ControlSignals
-from finger_pin.core.inputs import HELD
+from finger_pin.core.tables.inputs import HELD
 
 pytestmark = pytest.mark.slow
 

@@ -6,8 +6,8 @@ import pytest
 from core_cases import BODIES, Bound, relative
 
 import finger_pin as fp
-from finger_pin.core.compiled_finger import CompiledFinger, CompiledMechanism
-from finger_pin.core.inputs import held_control
+from finger_pin.core.signals.compiled_finger import CompiledFinger, CompiledMechanism
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mechanism import Mechanism
 

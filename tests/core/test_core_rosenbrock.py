@@ -8,10 +8,10 @@ from validation.order import END, mean_order, smooth_motion, step_errors
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping import error_norm, integration
 from finger_pin.core.stepping.integrator import _Recorder
 from finger_pin.core.stepping.island_stepper import failure
 from finger_pin.core.stepping.stepper import TABLEAUS
+from finger_pin.core.steps import error_norm, integration
 
 
 @pytest.fixture(scope="module", params=TABLEAUS)

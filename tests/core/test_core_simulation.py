@@ -221,8 +221,8 @@ def test_the_same_simulation_twice_gives_the_same_bits(scenarios, period):
 
 def test_a_failure_of_the_core_tells_time_reason_and_advice_and_keeps_what_was_computed(scenarios, monkeypatch):
     """Whatever the reason: here the integrator is told that its steps have become too short."""
-    from finger_pin.core.stepping import integration
     from finger_pin.core.stepping.island_stepper import IslandIntegrator
+    from finger_pin.core.steps import integration
 
     advance = IslandIntegrator.advance
 

@@ -5,9 +5,9 @@ import pytest
 from core_cases import condensed
 from test_contact_motion import G, plane, scene
 
-from finger_pin.core.evaluation.law_code import ROW
-from finger_pin.core.inputs import held_control
+from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.description.objects import Object
 
 HARD = {"stiffness": 1e4, "damping": 1.0, "friction": 0.5}

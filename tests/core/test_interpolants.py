@@ -5,7 +5,7 @@ import pytest
 from test_contact_motion import G, scene
 
 from finger_pin.core.collision.interpolants import meetings
-from finger_pin.core.compiled_finger import CompiledMechanism
+from finger_pin.core.signals.compiled_finger import CompiledMechanism
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.description.objects import Object
 

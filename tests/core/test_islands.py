@@ -10,15 +10,15 @@ from test_any_mechanism import assert_same
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_finger import CompiledMechanism
-from finger_pin.core.evaluation.time_functions import SignalTable
-from finger_pin.core.inputs import held_control, planned_control
-from finger_pin.core.islands import find_islands
+from finger_pin.core.addresses.time_functions import SignalTable
 from finger_pin.core.jit import pack
-from finger_pin.core.mechanism_parameters import compile_mechanism
-from finger_pin.core.stepping import integration
+from finger_pin.core.signals.compiled_finger import CompiledMechanism
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.steps import integration
+from finger_pin.core.tables.inputs import held_control, planned_control
+from finger_pin.core.tables.islands import find_islands
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import InputError

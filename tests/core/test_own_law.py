@@ -9,8 +9,8 @@ from core_cases import Bound
 from law_cases import random_parameters, random_rows
 
 import finger_pin as fp
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.inputs import held_control
+from finger_pin.core.signals.compiled_finger import CompiledFinger
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.laws.law import Law
 from finger_pin.mechanism.rows import Rows
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.core.stepping.integration import DONE
+from finger_pin.core.steps.integration import DONE
 from finger_pin.simulation.setup import Setup
 
 TOLERANCE = 1e-5

@@ -8,10 +8,10 @@ from random_mechanisms import random_mechanism, random_states
 from test_any_mechanism import assert_same
 
 import finger_pin as fp
-from finger_pin.core.compiled_finger import CompiledMechanism
-from finger_pin.core.inputs import held_control
-from finger_pin.core.islands import Selection, selections
-from finger_pin.core.mechanism_parameters import compile_mechanism
+from finger_pin.core.signals.compiled_finger import CompiledMechanism
+from finger_pin.core.tables.inputs import held_control
+from finger_pin.core.tables.islands import Selection, selections
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
 from finger_pin.mechanism.mechanism import Mechanism
 
 

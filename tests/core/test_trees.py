@@ -6,9 +6,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.mechanism import Mechanism

@@ -8,7 +8,7 @@ import pytest
 from mujoco_models import FIXED, LINK, MODELS, ROUTED, arms, model_of, posture
 
 import finger_pin as fp
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
 

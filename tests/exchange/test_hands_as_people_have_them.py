@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 import finger_pin as fp
 from finger_pin.analysis import equilibrium, inverse_kinematics
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from law_cases import every_law, for_complex, random_parameters, random_rows
 
-from finger_pin.core.evaluation import law_code
+from finger_pin.core.addresses import law_code
 from finger_pin.laws.law import Law, Row
 
 LAWS, COUNT, STEP = every_law(), 3000, 1e-30

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import finger_pin as fp
 from finger_pin.analysis import steady_state
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.laws.capstan import DRIVEN_TENDON, capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import GEARBOX
 from finger_pin.laws.law import Row

@@ -9,7 +9,7 @@ from scalar_model import NUMBERS, UB, controller, random_states, scalar_model
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.exceptions import InputError
 
 TENDON_SIGNALS = (

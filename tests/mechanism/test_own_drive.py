@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 
 LAG, PULLED, TENSION = 0.02, ("T3", "T4"), np.array([1.0, 1.0, 4.4, 3.1])  # s, N
 

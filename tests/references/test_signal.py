@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from finger_pin.core.evaluation import time_functions as core
+from finger_pin.core.addresses import time_functions as core
 from finger_pin.description.signals import ForceSignal, JointReference
 from finger_pin.exceptions import InputError
 from finger_pin.references.signal import Signal

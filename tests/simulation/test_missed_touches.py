@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 import finger_pin as fp
-from finger_pin.core.stepping.integration import DONE
+from finger_pin.core.steps.integration import DONE
 from finger_pin.description.loading import read_scenario
 from finger_pin.simulation.setup import Setup
 

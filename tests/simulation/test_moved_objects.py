@@ -6,7 +6,7 @@ from core_cases import condensed
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 
 G, MASS, STIFFNESS = 9.81, 0.05, 1e4

@@ -9,7 +9,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control
-from finger_pin.core.mechanism_parameters import compile_mechanism
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
 from finger_pin.description.loading import ParametrisedScenario, read_scenario
 from finger_pin.exceptions import InputError, Interrupted
 

@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from servo_cases import INERTIA, LINK, LINK_INERTIA, RADIUS, SMOOTH, SPOOL, finger, scenario, together
 
 import finger_pin as fp
-from finger_pin.core.inputs import held_control
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables.inputs import held_control
 
 K, D, G = 6000.0 / 0.3, 10.0, 9.81
 

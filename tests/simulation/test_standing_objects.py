@@ -5,7 +5,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 
 HAND = """
 [hand]

@@ -5,7 +5,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.exceptions import AccuracyWarning
 from finger_pin.simulation.initial_state import packed_state
 from finger_pin.views.summary import summarize

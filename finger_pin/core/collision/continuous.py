@@ -14,6 +14,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.addresses.shape_code import GAP_OUT
 from finger_pin.core.collision.broad_phase import (
     GAP_ACCURACY,
     add_turning,
@@ -22,14 +24,12 @@ from finger_pin.core.collision.broad_phase import (
     distance,
     set_culled,
 )
-from finger_pin.core.evaluation.law_code import ROW
-from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import Model
-from finger_pin.core.path_tables import LOOK, MAX_LOOKS, PIECE, PathWork
-from finger_pin.core.stepping.integration import Integration
-from finger_pin.core.structure import Structure
+from finger_pin.core.steps.integration import Integration
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import Model
+from finger_pin.core.tables.path_tables import LOOK, MAX_LOOKS, PIECE, PathWork
+from finger_pin.core.tables.structure import Structure
 
 # Bernstein coefficients of a coordinate over a step.
 _Coefficients: TypeAlias = tuple[float, float, float, float, float]

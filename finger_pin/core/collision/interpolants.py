@@ -11,13 +11,13 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import comb
 
+from finger_pin.core.addresses.shape_code import GAP_OUT, OUT
 from finger_pin.core.collision.broad_phase import GAP_ACCURACY
 from finger_pin.core.collision.continuous import MIN_PARTING_PATH, PARTING_PATH_PER_DEPTH
 from finger_pin.core.evaluation.attitude_charts import Charts
-from finger_pin.core.evaluation.shape_code import GAP_OUT, OUT
-from finger_pin.core.mechanism_parameters import compile_mechanism
-from finger_pin.core.path_tables import PIECE
-from finger_pin.core.stepping.trajectory import Meeting
+from finger_pin.core.steps.trajectory import Meeting
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
+from finger_pin.core.tables.path_tables import PIECE
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 

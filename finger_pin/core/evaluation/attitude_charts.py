@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.chains import BODY
-from finger_pin.core.evaluation.law_code import inlined
+from finger_pin.core.addresses.law_code import inlined
 from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.chains import BODY
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 

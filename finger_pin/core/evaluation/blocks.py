@@ -7,11 +7,11 @@ each of its states decays on its own.
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import Work
-from finger_pin.core.evaluation.law_code import ROW, TOUCH_SLOPE
+from finger_pin.core.addresses.law_code import ROW, TOUCH_SLOPE
 from finger_pin.core.jit import Indices, Matrix, njit_always_inline, njit_inline
-from finger_pin.core.linear_systems import Blocks
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.linear_systems import Blocks
+from finger_pin.core.tables.structure import Structure
 
 
 @njit_inline

@@ -13,8 +13,8 @@ r, so the solution is kept as one matrix, and a stage costs one product with it.
 
 from __future__ import annotations
 
+from finger_pin.core.addresses.law_code import SLOPE
 from finger_pin.core.evaluation.blocks import extent, factorise, substitute
-from finger_pin.core.evaluation.law_code import SLOPE
 from finger_pin.core.evaluation.readings import add_readings, resolve_readings
 from finger_pin.core.jit import (
     CompiledFunction,
@@ -26,9 +26,9 @@ from finger_pin.core.jit import (
     njit_reassociate,
     unpack,
 )
-from finger_pin.core.linear_systems import Linear
-from finger_pin.core.model import MODEL, Model
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.linear_systems import Linear
+from finger_pin.core.tables.model import MODEL, Model
+from finger_pin.core.tables.structure import Structure
 
 
 @njit_always_inline

@@ -5,16 +5,16 @@ A contact has a row along the normal, and for every slip a row and a state.
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import Work
+from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.addresses.law_code import TOUCH_SLOPE as AT
 from finger_pin.core.evaluation.blocks import extent
-from finger_pin.core.evaluation.law_code import ROW
-from finger_pin.core.evaluation.law_code import TOUCH_SLOPE as AT
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_value, njit_always_inline, njit_inline, unpack
-from finger_pin.core.linear_systems import Linear
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import MODEL
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.linear_systems import Linear
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import MODEL
+from finger_pin.core.tables.structure import Structure
 
 
 @CompiledFunction

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import Work
+from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.addresses.time_functions import signal_derivatives
 from finger_pin.core.evaluation.input_values import inputs, tip_forces
-from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body_dynamics import (
     factorise_mass,
@@ -15,11 +15,11 @@ from finger_pin.core.evaluation.rigid_body_dynamics import (
     move,
     solve_mass,
 )
-from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, Vector, call_at, call_value, njit_always_inline, njit_inline, unpack
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import MODEL
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import MODEL
+from finger_pin.core.tables.structure import Structure
 
 
 @njit_always_inline

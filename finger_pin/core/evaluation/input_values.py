@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.evaluation.law_code import inlined
-from finger_pin.core.evaluation.time_functions import signal_derivative, signal_derivatives, signal_values
-from finger_pin.core.inputs import HELD, SCHEDULED, InputTable
+from finger_pin.core.addresses.law_code import inlined
+from finger_pin.core.addresses.time_functions import signal_derivative, signal_derivatives, signal_values
 from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
+from finger_pin.core.tables.inputs import HELD, SCHEDULED, InputTable
 from finger_pin.laws import input_functions as controller_laws
 
 _proportional_torque = inlined(controller_laws.proportional_torque)

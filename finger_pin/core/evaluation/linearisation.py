@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import Work
+from finger_pin.core.addresses.time_functions import signal_derivatives
 from finger_pin.core.evaluation.input_values import input_slopes, tip_forces
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.evaluation.rigid_body_dynamics import inverse_dynamics
-from finger_pin.core.evaluation.time_functions import signal_derivatives
 from finger_pin.core.jit import CompiledFunction, call_at, call_filling, njit_always_inline, unpack
-from finger_pin.core.linear_systems import Linear
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import MODEL
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.linear_systems import Linear
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import MODEL
+from finger_pin.core.tables.structure import Structure
 
 
 @njit_always_inline

@@ -5,17 +5,17 @@ The wrenches of a piece turn with the body that carries its frame, and change wi
 
 from __future__ import annotations
 
-from finger_pin.core.buffers import Work
+from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.addresses.shape_code import GAP_OUT, SPAN_OUT
+from finger_pin.core.addresses.spatial import add_force_cross, dot, motion_cross
 from finger_pin.core.evaluation.blocks import partition
-from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
-from finger_pin.core.evaluation.shape_code import GAP_OUT, SPAN_OUT
-from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, njit_always_inline, njit_inline, unpack
-from finger_pin.core.linear_systems import Linear
-from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import PIECE, WRENCH, PathParameters, PathStructure
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.linear_systems import Linear
+from finger_pin.core.tables.model import MODEL
+from finger_pin.core.tables.path_tables import PIECE, WRENCH, PathParameters, PathStructure
+from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.spans.span import COINCIDENT
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import Work
-from finger_pin.core.evaluation.law_code import ROW
+from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.addresses.shape_code import GAP_OUT, SPAN_OUT
+from finger_pin.core.addresses.spatial import dot
 from finger_pin.core.evaluation.rigid_body_dynamics import move
-from finger_pin.core.evaluation.shape_code import GAP_OUT, SPAN_OUT
-from finger_pin.core.evaluation.spatial import dot
 from finger_pin.core.jit import (
     CompiledFunction,
     Indices,
@@ -19,10 +18,11 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import MODEL
-from finger_pin.core.path_tables import PIECE, WRENCH, PathParameters, PathStructure
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import MODEL
+from finger_pin.core.tables.path_tables import PIECE, WRENCH, PathParameters, PathStructure
+from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.spans.span import COINCIDENT
 
 

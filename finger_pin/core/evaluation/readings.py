@@ -6,9 +6,9 @@ import numpy as np
 
 from finger_pin.core.evaluation.blocks import factorise, substitute
 from finger_pin.core.jit import Vector, njit_inline
-from finger_pin.core.linear_systems import Linear
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.linear_systems import Linear
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.structure import Structure
 
 
 @njit_inline

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.buffers import Work
-from finger_pin.core.chains import BODY, PRISMATIC
-from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
+from finger_pin.core.addresses.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.chains import BODY, PRISMATIC
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.structure import Structure
 
 
 @njit_always_inline

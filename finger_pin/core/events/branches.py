@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.collision.broad_phase import record_start_gaps
-from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_at, copy, njit_always_inline, njit_inline, unpack
-from finger_pin.core.model import MODEL, Model
-from finger_pin.core.stepping.error_norm import step_error
-from finger_pin.core.stepping.integration import INTEGRATION, Integration
-from finger_pin.core.stepping.interpolation import cut_to_share, interpolate_share
-from finger_pin.core.stepping.tableaus import Tableau
-from finger_pin.core.structure import Structure
+from finger_pin.core.steps.error_norm import step_error
+from finger_pin.core.steps.integration import INTEGRATION, Integration
+from finger_pin.core.steps.interpolation import cut_to_share, interpolate_share
+from finger_pin.core.steps.tableaus import Tableau
+from finger_pin.core.tables.model import MODEL, Model
+from finger_pin.core.tables.structure import Structure
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Safety factor of the maximum step after an event, 1: a rejected step costs as much as the two in which it grows back.

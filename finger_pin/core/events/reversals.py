@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.evaluation.law_code import ROW
+from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.jit import Matrix, call_value, njit_always_inline, njit_inline
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import Model
-from finger_pin.core.stepping.integration import Integration
-from finger_pin.core.structure import Structure
+from finger_pin.core.steps.integration import Integration
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import Model
+from finger_pin.core.tables.structure import Structure
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Greatest reversal error of a step that is taken as a whole, in tolerances: beside an error of 1 it adds 1.6 %.

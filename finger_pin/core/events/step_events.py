@@ -18,9 +18,9 @@ from finger_pin.core.events.branches import (
 )
 from finger_pin.core.events.reversals import before_reversal, bristles_over_limit
 from finger_pin.core.jit import CompiledFunction, call_at, njit_always_inline, unpack
-from finger_pin.core.model import MODEL, Model
-from finger_pin.core.stepping.integration import INTEGRATION, LEFT_BRANCH, Events, Integration
-from finger_pin.core.stepping.interpolation import cut_to_share, interpolant
+from finger_pin.core.steps.integration import INTEGRATION, LEFT_BRANCH, Events, Integration
+from finger_pin.core.steps.interpolation import cut_to_share, interpolant
+from finger_pin.core.tables.model import MODEL, Model
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Least and greatest length of another try that is to end at a kink, in parts of the step.

@@ -10,12 +10,12 @@ from typing import Protocol
 import numpy as np
 
 from finger_pin.cancellation import Stop
-from finger_pin.core.stepping import integration as core
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, failure
-from finger_pin.core.stepping.repetition import Steps
 from finger_pin.core.stepping.stepper import Stepper
-from finger_pin.core.stepping.trajectory import Statistics, Trajectory, Watch
+from finger_pin.core.steps import integration as core
+from finger_pin.core.steps.repetition import Steps
+from finger_pin.core.steps.trajectory import Statistics, Trajectory, Watch
 from finger_pin.core.threads import in_threads
 from finger_pin.typing import Array
 

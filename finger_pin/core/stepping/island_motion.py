@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.core.bound_models import MIN_STATES_PER_THREAD, BoundModel
-from finger_pin.core.evaluation.law_code import ROW
-from finger_pin.core.evaluation.powers import POWERS, Powers, power_many
+from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.jit import call, copied
-from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate_many
+from finger_pin.core.signals.bound_models import MIN_STATES_PER_THREAD, BoundModel
+from finger_pin.core.signals.powers import POWERS, Powers, power_many
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, Record
+from finger_pin.core.steps.interpolation import BETWEEN, Between, interpolate_many
 from finger_pin.core.threads import in_threads, threads
 from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.mechanism import Mechanism

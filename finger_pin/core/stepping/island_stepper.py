@@ -8,20 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.core.bound_models import BoundModel
-from finger_pin.core.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.events.step_events import activate_contacts, step_events
-from finger_pin.core.inputs import InputTable
-from finger_pin.core.islands import Island
 from finger_pin.core.jit import Block, CompiledFunction, copied, pack
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.stepping import integration as core
-from finger_pin.core.stepping.adaptive import advance
+from finger_pin.core.signals.bound_models import BoundModel
+from finger_pin.core.stepping.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
 from finger_pin.core.stepping.knots import ADVANCE_KNOTTED_ARGS, AdvanceKnottedArgs, advance_knotted
-from finger_pin.core.stepping.repetition import REPEAT_STEPS_ARGS, RepeatStepsArgs, Steps, repeat_steps
-from finger_pin.core.stepping.tableaus import Tableau
-from finger_pin.core.structure import Structure
+from finger_pin.core.steps import integration as core
+from finger_pin.core.steps.adaptive import advance
+from finger_pin.core.steps.repetition import REPEAT_STEPS_ARGS, RepeatStepsArgs, Steps, repeat_steps
+from finger_pin.core.steps.tableaus import Tableau
+from finger_pin.core.tables.inputs import InputTable
+from finger_pin.core.tables.islands import Island
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.structure import Structure
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.typing import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from finger_pin.core.jit import CompiledFunction, Indices, StructType, Vector, call_at, unpack
-from finger_pin.core.stepping.integration import ADVANCE_ARGS, DONE, FULL, INTEGRATION
+from finger_pin.core.steps.integration import ADVANCE_ARGS, DONE, FULL, INTEGRATION
 
 # Times it, a positive number becomes the one before it.
 _PREVIOUS_FLOAT_FACTOR = 1.0 - 2.0**-53

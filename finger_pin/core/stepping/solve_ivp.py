@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from finger_pin.cancellation import Stop
-from finger_pin.core.stepping.trajectory import Meeting, Statistics, Trajectory, Watch
+from finger_pin.core.steps.trajectory import Meeting, Statistics, Trajectory, Watch
 from finger_pin.typing import Array
 
 # So many steps in a row must advance by so much time each on average, s, and so many are kept in memory at most.

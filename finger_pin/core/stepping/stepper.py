@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.drives import Drives
 from finger_pin.core.evaluation.attitude_charts import Charts
-from finger_pin.core.inputs import HELD, InputTable
-from finger_pin.core.islands import Island, selections
 from finger_pin.core.jit import copied
-from finger_pin.core.mechanism_parameters import compile_mechanism
-from finger_pin.core.stepping import integration as core
+from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, failure
-from finger_pin.core.stepping.repetition import Steps
-from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
+from finger_pin.core.steps import integration as core
+from finger_pin.core.steps.repetition import Steps
+from finger_pin.core.steps.tableaus import Tableau, rodas4, rodas5p
+from finger_pin.core.tables.inputs import HELD, InputTable
+from finger_pin.core.tables.islands import Island, selections
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
 from finger_pin.core.threads import in_threads
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.mechanism import Mechanism

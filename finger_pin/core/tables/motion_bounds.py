@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.chains import BODY, PRISMATIC, Chains
+from finger_pin.core.tables.chains import BODY, PRISMATIC, Chains
 from finger_pin.mechanism.path_elements import PathElement
 from finger_pin.typing import Array
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.buffers import build_work
 from finger_pin.core.evaluation.condensation import condense
 from finger_pin.core.evaluation.contacts import add_pushes, fill_contact_gains, measure
 from finger_pin.core.evaluation.dynamics import evaluate, exert
@@ -16,13 +15,14 @@ from finger_pin.core.evaluation.linearisation import linearise
 from finger_pin.core.evaluation.moving_base import base_power, bias_rate, move_base
 from finger_pin.core.evaluation.path_derivatives import linearise_paths
 from finger_pin.core.evaluation.paths import look
-from finger_pin.core.evaluation.state_batches import STATES, States, evaluate_many
-from finger_pin.core.inputs import InputTable, held_control
 from finger_pin.core.jit import call, empty_table, pack
-from finger_pin.core.linear_systems import Linear, build_linear
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import MODEL, Model
-from finger_pin.core.structure import Structure
+from finger_pin.core.signals.state_batches import STATES, States, evaluate_many
+from finger_pin.core.tables.buffers import build_work
+from finger_pin.core.tables.inputs import InputTable, held_control
+from finger_pin.core.tables.linear_systems import Linear, build_linear
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import MODEL, Model
+from finger_pin.core.tables.structure import Structure
 from finger_pin.core.threads import in_threads, threads
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import PRESCRIBED_ACCELERATIONS

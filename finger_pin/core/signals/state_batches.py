@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.buffers import Work
-from finger_pin.core.chains import BODY
+from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.addresses.shape_code import GAP_OUT
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
-from finger_pin.core.evaluation.law_code import ROW
 from finger_pin.core.evaluation.paths import turn_out
 from finger_pin.core.evaluation.rigid_body_dynamics import move
-from finger_pin.core.evaluation.shape_code import GAP_OUT
 from finger_pin.core.jit import (
     CompiledFunction,
     Layers,
@@ -25,9 +23,11 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import MODEL, Model
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.chains import BODY
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import MODEL, Model
+from finger_pin.core.tables.structure import Structure
 
 
 class States(NamedTuple):

@@ -7,7 +7,7 @@ from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from finger_pin.core.evaluation.law_code import inlined
+from finger_pin.core.addresses.law_code import inlined
 from finger_pin.core.jit import Pointer, address_of
 
 # Numbers that a shape gives, and their derivatives, at most.

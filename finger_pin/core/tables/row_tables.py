@@ -8,9 +8,9 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.axes import along
-from finger_pin.core.evaluation.law_code import addresses, kink_column
+from finger_pin.core.addresses.law_code import addresses, kink_column
 from finger_pin.core.jit import Indices
+from finger_pin.core.tables.axes import along
 from finger_pin.laws.contact_law import CONTACT
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows

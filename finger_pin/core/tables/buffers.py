@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.evaluation.law_code import SLOPE_COLUMNS, column_counts
+from finger_pin.core.addresses.law_code import SLOPE_COLUMNS, column_counts
 from finger_pin.core.jit import Layers, Matrix, Vector
-from finger_pin.core.path_tables import PathWork, build_path_work
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.path_tables import PathWork, build_path_work
+from finger_pin.core.tables.structure import Structure
 from finger_pin.laws.law import ContactLaw, Law
 
 

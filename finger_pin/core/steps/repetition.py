@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from finger_pin.core.jit import CompiledFunction, Indices, Matrix, StructType, Vector, call_at, unpack
-from finger_pin.core.model import MODEL
-from finger_pin.core.stepping import integration as at
-from finger_pin.core.stepping.adaptive import accept_step, try_counted
-from finger_pin.core.stepping.interpolation import cut_to_share, interpolant
+from finger_pin.core.steps import integration as at
+from finger_pin.core.steps.adaptive import accept_step, try_counted
+from finger_pin.core.steps.interpolation import cut_to_share, interpolant
+from finger_pin.core.tables.model import MODEL
 from finger_pin.typing import Array
 
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from finger_pin.core.buffers import Work
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.input_values import inputs
-from finger_pin.core.evaluation.state_batches import exert_alone, fill_base_power, fill_energy_terms
 from finger_pin.core.jit import (
     CompiledFunction,
     Matrix,
@@ -19,10 +17,12 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.interpolation import Between, interpolate_within, step_at
-from finger_pin.core.structure import Structure
+from finger_pin.core.signals.state_batches import exert_alone, fill_base_power, fill_energy_terms
+from finger_pin.core.steps.interpolation import Between, interpolate_within, step_at
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.model import MODEL
+from finger_pin.core.tables.structure import Structure
 
 
 class Powers(NamedTuple):

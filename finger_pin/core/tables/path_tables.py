@@ -8,11 +8,11 @@ from typing import Annotated, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.axes import along
-from finger_pin.core.chains import Chains
-from finger_pin.core.collision.motion_bounds import Carrying, motion_bounds
-from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_address
+from finger_pin.core.addresses.shape_code import OUT, SLOPES, shape_address
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
+from finger_pin.core.tables.axes import along
+from finger_pin.core.tables.chains import Chains
+from finger_pin.core.tables.motion_bounds import Carrying, motion_bounds
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from finger_pin.core.jit import Indices, Layers, Matrix, StructType, Vector
-from finger_pin.core.stepping.tableaus import Tableau
+from finger_pin.core.steps.tableaus import Tableau
 from finger_pin.typing import Array
 
 DONE, FULL, UNDERFLOW, NOT_FINITE, STALLED, RUNAWAY = range(6)

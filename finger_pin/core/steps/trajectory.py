@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from finger_pin.core.stepping.repetition import Steps
+from finger_pin.core.steps.repetition import Steps
 from finger_pin.typing import Array
 
 Watch = Callable[[float, Array], None]

@@ -6,12 +6,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from finger_pin.core.bound_models import MIN_STATES_PER_THREAD, Models, SignalBuffer, as_core_array, fill, path_motions
+from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.evaluation.attitude_charts import Charts
-from finger_pin.core.evaluation.law_code import ROW
-from finger_pin.core.evaluation.state_batches import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import Block, pack
-from finger_pin.core.mechanism_parameters import compile_mechanism
+from finger_pin.core.signals.bound_models import (
+    MIN_STATES_PER_THREAD,
+    Models,
+    SignalBuffer,
+    as_core_array,
+    fill,
+    path_motions,
+)
+from finger_pin.core.signals.state_batches import MOTIONS, Motions, motion_many
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
 from finger_pin.description.caching import cached_property
 from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.evaluation.attitude_charts import rechart
-from finger_pin.core.inputs import HELD
 from finger_pin.core.jit import CompiledFunction, call_at, copy, copy_matrix, njit_always_inline, njit_inline, unpack
-from finger_pin.core.model import MODEL, Model
-from finger_pin.core.stepping import integration as at
-from finger_pin.core.stepping.error_norm import largest_error_state, step_error
-from finger_pin.core.stepping.integration import AdvanceArgs, Integration
-from finger_pin.core.stepping.rosenbrock import try_step
+from finger_pin.core.steps import integration as at
+from finger_pin.core.steps.error_norm import largest_error_state, step_error
+from finger_pin.core.steps.integration import AdvanceArgs, Integration
+from finger_pin.core.steps.rosenbrock import try_step
+from finger_pin.core.tables.inputs import HELD
+from finger_pin.core.tables.model import MODEL, Model
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 

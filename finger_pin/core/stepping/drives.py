@@ -16,8 +16,8 @@ from finger_pin.core.jit import (
     njit_always_inline,
     unpack,
 )
-from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.integration import ADVANCE_ARGS, DONE, FULL, INTEGRATION
+from finger_pin.core.steps.integration import ADVANCE_ARGS, DONE, FULL, INTEGRATION
+from finger_pin.core.tables.model import MODEL
 from finger_pin.laws.motor import OPEN_CIRCUIT
 from finger_pin.typing import Array
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.axes import Subset
-from finger_pin.core.evaluation.time_functions import SignalTable
-from finger_pin.core.inputs import PLANNED, InputTable
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.structure import Structure
+from finger_pin.core.addresses.time_functions import SignalTable
+from finger_pin.core.tables.axes import Subset
+from finger_pin.core.tables.inputs import PLANNED, InputTable
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.structure import Structure
 from finger_pin.description.caching import memoised
 
 Indices = NDArray[np.int64]

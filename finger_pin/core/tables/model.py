@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.buffers import Work
-from finger_pin.core.inputs import InputTable
 from finger_pin.core.jit import StructType, Vector
-from finger_pin.core.linear_systems import Linear
-from finger_pin.core.mechanism_parameters import Parameters
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.buffers import Work
+from finger_pin.core.tables.inputs import InputTable
+from finger_pin.core.tables.linear_systems import Linear
+from finger_pin.core.tables.mechanism_parameters import Parameters
+from finger_pin.core.tables.structure import Structure
 
 
 class Model(NamedTuple):

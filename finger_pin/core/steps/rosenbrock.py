@@ -6,8 +6,8 @@ import numpy as np
 
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import call_at, njit_always_inline
-from finger_pin.core.model import Model
-from finger_pin.core.stepping.integration import LEFT_BRANCH, NOT_FINITE_AT_START, SINGULAR, TRIED, Integration
+from finger_pin.core.steps.integration import LEFT_BRANCH, NOT_FINITE_AT_START, SINGULAR, TRIED, Integration
+from finger_pin.core.tables.model import Model
 
 
 @njit_always_inline

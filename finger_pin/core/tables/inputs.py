@@ -7,9 +7,9 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.axes import along
-from finger_pin.core.evaluation.time_functions import SignalTable, no_signal
+from finger_pin.core.addresses.time_functions import SignalTable, no_signal
 from finger_pin.core.jit import Indices, Matrix, Vector
+from finger_pin.core.tables.axes import along
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 

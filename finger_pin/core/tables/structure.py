@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple, NoReturn
 
-from finger_pin.core.axes import along
 from finger_pin.core.jit import IndexTable, Indices, Matrix, refuse_copy
-from finger_pin.core.path_tables import PathStructure
-from finger_pin.core.row_tables import Groups
+from finger_pin.core.tables.axes import along
+from finger_pin.core.tables.path_tables import PathStructure
+from finger_pin.core.tables.row_tables import Groups
 
 
 class Structure(NamedTuple):

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.inputs import InputTable
-from finger_pin.core.islands import find_islands
 from finger_pin.core.jit import Indices, Matrix, Vector
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.inputs import InputTable
+from finger_pin.core.tables.islands import find_islands
+from finger_pin.core.tables.structure import Structure
 from finger_pin.core.threads import physical_memory
 from finger_pin.exceptions import InputError
 

@@ -7,12 +7,12 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.axes import along
-from finger_pin.core.chains import Chains, read_chains, tree_arrays, weighed
 from finger_pin.core.jit import Layers, Matrix, Vector
-from finger_pin.core.path_tables import PathParameters, coordinates_of_paths, read_paths
-from finger_pin.core.row_tables import row_arrays, stacked, term_weights
-from finger_pin.core.structure import Structure
+from finger_pin.core.tables.axes import along
+from finger_pin.core.tables.chains import Chains, read_chains, tree_arrays, weighed
+from finger_pin.core.tables.path_tables import PathParameters, coordinates_of_paths, read_paths
+from finger_pin.core.tables.row_tables import row_arrays, stacked, term_weights
+from finger_pin.core.tables.structure import Structure
 from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows

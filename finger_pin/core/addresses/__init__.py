@@ -1,0 +1,1 @@
+"""Addresses of compiled laws, shapes and functions of time."""

@@ -1,0 +1,1 @@
+"""Signals of many states, for results."""

@@ -1,0 +1,1 @@
+"""One step of a Rosenbrock method, its error and its interpolant."""

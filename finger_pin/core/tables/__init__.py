@@ -1,0 +1,1 @@
+"""The mechanism as plain arrays: structure, parameters, inputs and memory."""
