@@ -38,16 +38,23 @@ FAMILIES = {
 def validate(
     only: Annotated[str, typer.Option(metavar="NAMES", help=f"Some of {','.join(FAMILIES)}.")] = ",".join(FAMILIES),
     output: Output = Path("results/validation"),
+    random: Annotated[int, typer.Option(metavar="N", min=0, help="Check N random models instead.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first random model.")] = 0,
 ) -> int:
     """Compare the simulator with independent sources, and write a report.
 
-    Closed forms, published experiments, Pinocchio, yourdfpy, MuJoCo, and the simulator against itself.
+    Closed forms, published experiments, Pinocchio, yourdfpy, MuJoCo, and the simulator against itself. With --random,
+    random models are computed in two ways each, nothing is written, and what fails is printed with its seed.
 
     Exit codes: 0 every check passed, differs by a known amount, or was skipped because an optional package is not
     installed; 1 some failed, or the report cannot be written; 2 wrong options; 130 interrupted, nothing written.
     """
     names = chosen(only)
     shows_progress(quiet=False)
+    if random:
+        from validation import random_models
+
+        return 1 if random_models.check(random, seed) else 0
     from validation import report
     from validation.check import Verdict
 

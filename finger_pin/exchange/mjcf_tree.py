@@ -76,6 +76,8 @@ def _header(description: FingerDescription) -> str:
     left_out += ["servos, their spools and what stretches on the way;"] if description.actuators else []
     if np.any(description.joint_friction.drag_asymmetry):
         left_out += ["by how much the drag of joints differs by direction (drag_asymmetry): frictionloss is the mean;"]
+    if any(each.slack is not None and each.damping for each in description.tree.tendons.values()):
+        left_out += ["that cords with slack are not damped while they are slack: dampers act at any length;"]
     left_out += (
         ["paths of joints, whose bodies are mocap bodies: lead them by mocap_pos;"] if description.tree.on_paths else []
     )

@@ -205,3 +205,19 @@ def test_where_mujoco_is_missing_its_family_says_so_in_a_line(monkeypatch):
     (check,) = mujoco_motion.measure().checks
     assert check.verdict is Verdict.SKIPPED
     assert check == replace(check, note="mujoco is not installed")
+
+
+def test_random_models_that_fail_are_named_with_seed_door_and_the_features_that_matter(run, monkeypatch):
+    import random_table
+
+    def fails(model):
+        assert "springs" not in model.features, "two answers"
+
+    seed = next(k for k in range(99) if "springs" in random_table.random_model(k).features)
+    monkeypatch.setattr(random_table, "DOORS", {"sound": random_table.Door(str), "broken": random_table.Door(fails)})
+    code, out, err = run("--random", "1", "--seed", str(seed))
+    assert (code, err) == (1, "")
+    assert f"seed {seed}, broken: AssertionError: two answers" in out and "with springs\n" in out
+    assert "2 doors: 1 checks failed" in out and "sound" not in out
+    monkeypatch.setattr(random_table, "DOORS", {"sound": random_table.Door(str)})
+    assert run("--random", "2")[0] == 0

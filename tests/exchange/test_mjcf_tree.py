@@ -196,6 +196,20 @@ def test_what_mujoco_has_not_is_refused_by_name(tree, message):
         fp.to_mjcf(arm(**tree))
 
 
+def test_the_damper_of_a_slack_cord_is_named_as_one_that_mujoco_has_at_any_length():
+    """Here a slack cord exerts nothing; MuJoCo damps it: 3 N s/m along its path."""
+    (cord,) = OWN["slack"]["tendons"].values()
+    finger = arm(tendons={"t": {**cord, "damping": 3.0}})
+    text = fp.to_mjcf(finger)
+    assert "not damped while they are slack" in text and "not damped" not in fp.to_mjcf(arm(**OWN["slack"]))
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qvel[0] = -1.0
+    mujoco.mj_forward(model, data)
+    assert data.ten_length[0] < model.tendon_lengthspring[0, 1]
+    assert data.qfrc_damper[0] == pytest.approx(2e-3 + 3.0 * data.ten_J.ravel()[0] ** 2, rel=1e-6)
+
+
 def test_friction_of_a_tree_is_added_to_what_is_written_without():
     from finger_pin.mujoco import add_friction
 

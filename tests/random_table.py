@@ -1,0 +1,80 @@
+"""The table of doors: every check of random models, with the kinds of models that it is for and what it leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import random_doors as doors
+import random_runs as runs
+from random_models import RandomModel, random_model
+
+
+class Door(NamedTuple):
+    """A check of random models.
+
+    Attributes:
+        check: Raises where a model fails.
+        kinds: Of the models that it is for; all if empty.
+        without: Features that its models have not.
+    """
+
+    check: Callable[[RandomModel], None]
+    kinds: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+    def model(self, seed: int) -> RandomModel:
+        """Return the model of a seed, of one of the kinds."""
+        return random_model(seed, self.without, self.kinds[seed % len(self.kinds)] if self.kinds else None)
+
+    def fails(self, model: RandomModel) -> str:
+        """Return why a model fails, in one line, or nothing."""
+        try:
+            self.check(model)
+        except Exception as error:
+            return f"{type(error).__name__}: {error}".splitlines()[0]
+        return ""
+
+    def smallest(self, model: RandomModel) -> RandomModel:
+        """Return the model with as few of its features as fail."""
+        for feature in model.features:
+            fewer = model.without(feature)
+            if self.fails(fewer):
+                return self.smallest(fewer)
+        return model
+
+
+# Objects among the coordinates, and what moves along paths, are not in MuJoCo's file, or as soft constraints; servos
+# and winches are not, either, and delays are of steps.
+_NOT_IN_MUJOCO = (
+    *("servo", "play", "position drive", "winch", "maximum tension", "delay", "slew", "moved object", "free object"),
+    *("fixed object", "joint path", "coupling", "loop", "tendon range"),
+)
+# What is not given by held inputs of a step: swings, goals of position loops, and paths from a time on.
+_NOT_HELD = ("swinging inputs", "position drive", "moved object", "joint path", "palm path", "start time")
+DOORS: dict[str, Door] = {
+    "readable = compiled": Door(doors.readable_is_compiled),
+    "Jacobian = differences": Door(doors.jacobian_is_that_of_differences),
+    "rigid body = energies": Door(doors.rigid_body_is_that_of_energies),
+    "linearise = Jacobian": Door(doors.linearisation_is_the_exact_jacobian),
+    "equilibrium rests": Door(doors.equilibrium_is_at_rest),
+    "URDF read = body": Door(doors.urdf_is_read_as_the_same_body),
+    "account": Door(runs.account_closes),
+    "prepared = fresh": Door(runs.prepared_is_fresh),
+    "resumed = whole": Door(runs.resumed_is_whole),
+    "Simulator = simulate": Door(runs.simulator_is_simulate, without=_NOT_HELD),
+    "simulate_many = simulate": Door(runs.simulate_many_is_simulate),
+    # A winch and a servo in position drive have actions of other kinds.
+    "environment = Simulator": Door(runs.environment_is_simulator, without=("winch", *_NOT_HELD)),
+    "renamed": Door(runs.names_do_not_matter),
+    "numbers one by one": Door(runs.numbers_may_be_written_one_by_one),
+    # A clock that begins at zero knows of no command before, one that is ahead does.
+    "clock ahead": Door(runs.clock_does_not_matter, without=("delay",)),
+    "other order": Door(runs.order_does_not_matter, ("tree",), ("any order",)),
+    "mirror image": Door(runs.mirror_image_moves_alike, ("tree",)),
+    # The load of a pin on the base counts the base's own x axis as the link before it.
+    "turned as a whole": Door(runs.place_in_the_world_does_not_matter, ("tree",), ("tip force",)),
+    "welded halves": Door(runs.welded_halves_are_one_body, ("tree",)),
+    "palm askew = weight askew": Door(runs.palm_askew_is_weight_askew, ("hand",), ("palm path",)),
+    "MuJoCo": Door(runs.mujoco_accelerates_alike, ("tree",), _NOT_IN_MUJOCO),
+}

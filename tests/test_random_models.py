@@ -1,0 +1,35 @@
+"""Random models through the table of doors; `scripts/validate.py --random N` takes thousands of seeds."""
+
+import pytest
+from random_models import FEATURES, random_model
+from random_table import DOORS
+
+SEEDS = (0, 2)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::finger_pin.exceptions.ScenarioWarning")
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("name", DOORS)
+def test_two_computations_of_one_thing_agree_on_a_random_model(name, seed):
+    # Every door has models of its own.
+    door = DOORS[name]
+    door.check(door.model(100 * list(DOORS).index(name) + seed))
+
+
+def test_a_model_without_a_feature_keeps_all_its_other_numbers():
+    model = random_model(5, kind="tree")
+    assert len(model.features) > 3
+    fewer = model.without("armatures", "motor")
+    bodies, others = (each.table["finger"]["tree"]["bodies"] for each in (model, fewer))
+    assert bodies == others and "motor" not in fewer.features
+
+
+@pytest.mark.parametrize("kind", FEATURES)
+def test_every_feature_is_drawn_and_every_drawn_model_is_read(kind):
+    drawn = set()
+    for seed in range(60):
+        model = random_model(seed, kind=kind)
+        drawn |= {*model.features}
+        assert model.scenario.name == "random"
+    assert drawn == {*FEATURES[kind]}
