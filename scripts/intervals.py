@@ -16,7 +16,7 @@ import scipy
 import finger_pin as fp
 
 COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"
-OFFSET, DELAY = (f"recordings.pull.tendon_tension.T1.{what}" for what in ("offset", "delay"))
+OFFSET, DELAY = (f"recordings.*.tendon_tension.T1.{what}" for what in ("offset", "delay"))
 TURN, NOISE = 2.5, 0.08
 STEADY = {
     "kind": "steady",
@@ -77,8 +77,11 @@ def held(
     truths: list[tuple[float, float]],
     runs: int = 1,
     seed: int = 0,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return whether each interval holds the truth, shape (count, p), and whether the model is said to miss something.
+
+    A further recording of each data set is held out: the share of its force inside the band, and half the band over
+    1.96 times the error, rms, come third, shape (count, 2).
 
     Args:
         count: Of data sets.
@@ -89,22 +92,23 @@ def held(
         runs: How often each motion is repeated.
         seed: Of draws and noise.
     """
-    rng, rows, missed = np.random.default_rng(seed), [], []
+    rng, rows, missed, bands = np.random.default_rng(seed), [], [], []
     names = ["pull", *(f"repeat_{k}" for k in range(1, runs))]
     for _ in range(count):
         truth = [rng.uniform(*each) for each in truths]
         result = fp.identify(
             "canal",
             parameters=bounds,
-            recordings=dict.fromkeys(names, recording),
-            data={name: make(rng, *truth) for name in names},
+            recordings=dict.fromkeys(names, recording) | {"later": {**recording, "held_out": True}},
+            data={name: make(rng, *truth) for name in (*names, "later")},
             overrides={"finger.tendons.T1.curvature_offset": TURN},
             starts=1,
         )
         sought = np.array(truth[: len(bounds)])
         rows.append((result.lower.values <= sought) & (sought <= result.upper.values))
         missed.append(bool((result.lack_of_fit < 0.01).any()))
-    return np.array(rows), np.array(missed)
+        bands.append([float(result[f"prediction_{what}"][0]) for what in ("within", "band_ratio")])
+    return np.array(rows), np.array(missed), np.array(bands)
 
 
 def punctual(rng: np.random.Generator, coulomb: float, drag: float) -> Made:
@@ -130,10 +134,12 @@ def main(arguments: list[str] | None = None) -> int:
     if wrong := set(given.kinds) - set(KINDS):
         parser.error(f"KIND: {', '.join(wrong)}: must be one of {', '.join(KINDS)}")
     for kind in given.kinds or KINDS:
-        found, missed = held(given.count, *KINDS[kind])
+        found, missed, bands = held(given.count, *KINDS[kind])
         for key, share in zip(KINDS[kind][2], found.mean(axis=0), strict=True):
             print(f"{kind} {key}: {share:.1%} of {len(found)}")
         print(f"{kind}: said to miss something in {missed.mean():.1%}")
+        within, ratio = bands.mean(axis=0)
+        print(f"{kind}: {within:.1%} of held-out samples inside the band, half of which is {ratio:.2f} times 1.96 rms")
     return 0
 
 

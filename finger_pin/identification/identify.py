@@ -150,6 +150,8 @@ def _run_pipeline(
     try:
         pipeline.search(pipeline.screen_starts(points, starts))
         (pipeline.profile_all if profiles else pipeline.linearise)(pipeline.best)
+        pipeline.cross_validate()
+        pipeline.find_open_directions()
         pipeline.compare(settings)
     except Stopped:
         unfinished = "interrupted: the best so far, and the intervals that are finished"
@@ -157,8 +159,7 @@ def _run_pipeline(
         if not pipeline.fits:
             point = problem.best[1] if len(problem.best[1]) else problem.start
             pipeline.fits.append(fit(problem, point, fixed=dict(enumerate(point))))
-    ends, covariance = pipeline.interval_ends, pipeline.covariance
-    return result_dataset(problem, pipeline.fits, pipeline.best, ends, covariance, pipeline.comparison, unfinished)
+    return result_dataset(problem, pipeline, unfinished)
 
 
 def _ringing(problem: Problem, z: Array) -> str:

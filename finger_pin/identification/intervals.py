@@ -9,6 +9,7 @@ from functools import partial
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from finger_pin.identification.estimate import Fit, fit, information
@@ -17,16 +18,16 @@ from finger_pin.typing import Array
 
 #: Rise of minus twice the log-likelihood at the ends of an interval: 95 % of chi-squared with one degree of freedom.
 CHI2_95 = 3.841
+#: Half the width of a 95 % band, in deviations.
+NORMAL_95 = 1.96
 # Relative error of the rise at an end: half of it is that of the half width, as its root is straight there.
 # And the greatest number of refits in the search for an end.
 _CHI2_TOLERANCE, _MAX_REFITS = 0.06, 8
 # Fall of minus twice the log-likelihood above which a refit is another minimum: twice its jump of 0.1 by errors of fine
 # runs.
 _LOWER_MINIMUM_FALL = 0.2
-# Standard deviation, part of the range, from which on a direction is free: an interval of 95 % is as wide as the range.
-_FREE_DEVIATION = 0.25
-# Entries of a direction that are left out of its words, part of the largest.
-_SMALL_ENTRY = 0.15
+#: Least degrees of freedom of a noise whose samples follow each other, and of what settings differ by.
+LEAST_FREEDOM = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,48 +92,80 @@ class SmallSample:
         Each output has its samples less its effective number of parameters (the trace of its part of the information)
         as degrees of freedom, and a parameter the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
         """
-        groups, slopes = problem.groups, problem.slopes(minimum.z)
-        parts = np.zeros((int(groups.max()) + 1, *covariance.shape))
-        count = np.zeros(len(parts))
-        for group, w, n, e, j in zip(groups, minimum.weights, minimum.noise, minimum.residuals, slopes, strict=True):
+        slopes, first = problem.slopes(minimum.z), np.unique(problem.groups, return_index=True)[1]
+        parts = np.zeros((len(first), *covariance.shape))
+        for group, w, n, j in zip(problem.groups, minimum.weights, minimum.noise, slopes, strict=True):
             parts[group] += w / n**2 * j.T @ j
-            count[group] += w * len(e)
-        # Correlated samples may count for fewer than the parameters.
         effective_parameters = np.einsum("kl,glk->g", covariance, parts)
-        freedom_left = np.maximum(count - effective_parameters, 1.0)
+        counts = _SampleCounts.from_fit(problem, minimum, slopes)
+        ratio, freedom_left = counts.corrections(effective_parameters)
         variances = np.einsum("kl,glm,mk->gk", covariance, parts, covariance)
-        corrected = variances * (count / freedom_left)[:, None]
+        corrected = variances * ratio[:, None]
         total, corrected_total = np.maximum([variances.sum(axis=0), corrected.sum(axis=0)], 1e-300)
         square_total = np.maximum(np.sum(corrected**2 / freedom_left[:, None], axis=0), 1e-300)
         freedom = np.maximum(corrected_total**2 / square_total, 1.0)
         factor, quantile = corrected_total / total, student.ppf(0.975, freedom)
+        names = np.array([signal.name for signal in problem.signals])[first]
+        pooled = counts.pooled(names, minimum.noise[first] ** 2, effective_parameters)
+        noise, pooled_noise = (np.sqrt(q / CHI2_95) * student.ppf(0.975, f) for q, f in ((ratio, freedom_left), pooled))
         return cls(
             factor * quantile**2 / CHI2_95,
             factor * freedom * np.log1p(quantile**2 / freedom),
-            (np.sqrt(count / freedom_left / CHI2_95) * student.ppf(0.975, freedom_left))[groups],
-            _pooled_noise_factors(problem, minimum, count, effective_parameters)[groups],
+            noise[problem.groups],
+            pooled_noise[problem.groups],
         )
 
 
-def _pooled_noise_factors(problem: Problem, minimum: Fit, count: Array, effective_parameters: Array) -> Array:
-    """Return factors on the mean square noise of a name for readings of other recordings, for 95 % of them, by output.
+@dataclass(frozen=True, eq=False)
+class _SampleCounts:
+    """Numbers of samples of every output, shape (g,).
 
-    Samples that follow each other are hardly more than one, so that one recording tells its noise badly: the mean of
-    several has their degrees of freedom (Satterthwaite).
+    Of n samples that follow each other by rho fewer count: n (1 - rho) / (1 + rho) for a mean, and for a variance
+    n (1 - rho^2) / (1 + rho^2) (Bartlett, J. Roy. Stat. Soc. B 8, 1946).
 
-    Args:
-        problem: The problem that was fitted.
-        minimum: Of the problem.
-        count: Number of independent samples of every output.
-        effective_parameters: Effective number of parameters of every output.
+    Attributes:
+        size: Number of all samples.
+        of_mean: Those that count for a mean, and for parameters.
+        of_variance: Those that count for a variance.
     """
-    first = [int(np.flatnonzero(problem.groups == group)[0]) for group in range(len(count))]
-    names, square = [problem.signals[k].name for k in first], minimum.noise[first] ** 2
-    same_name = np.array([[one == other for other in names] for one in names])
-    ratio = same_name @ count / np.maximum(same_name @ (count - effective_parameters), 1.0)
-    square_total = same_name @ (square**2 / np.maximum(count, 1e-300))
-    freedom = np.maximum((same_name @ square) ** 2 / (ratio * square_total), 1.0)
-    return np.asarray(np.sqrt(ratio / CHI2_95) * student.ppf(0.975, freedom))
+
+    size: Array
+    of_mean: Array
+    of_variance: Array
+
+    @classmethod
+    def from_fit(cls, problem: Problem, minimum: Fit, slopes: Sequence[Array]) -> Self:
+        """Return the numbers of samples at a minimum."""
+        size = np.array([len(j) for j in slopes], dtype=float)
+        shares = (1.0 - minimum.correlation**2) / (1.0 + minimum.correlation**2)
+        counts = np.zeros((3, int(problem.groups.max()) + 1))
+        np.add.at(counts.T, problem.groups, np.stack([size, size * minimum.weights, size * shares], axis=1))
+        return cls(*counts)
+
+    def corrections(self, parameters: Array) -> tuple[Array, Array]:
+        """Return factors on variances that parameters have lessened, and their degrees of freedom.
+
+        What a model lacks is no noise that further recordings draw anew, though its correlation leaves few independent
+        samples: parameters take at most half of these, and no fewer than four are left if there are as many samples, of
+        which Student's t is 1.4 times that of many.
+        """
+        share, least_share = (1.0 - parameters / np.maximum(each, 1e-300) for each in (self.of_mean, self.size))
+        share = np.maximum(share, np.minimum(0.5, np.maximum(least_share, 1.0 / np.maximum(self.size, 1.0))))
+        least_freedom = np.maximum(np.minimum(LEAST_FREEDOM, self.size - parameters), 1.0)
+        return 1.0 / share, np.maximum(self.of_variance * share, least_freedom)
+
+    def pooled(self, names: NDArray[np.str_], squares: Array, parameters: Array) -> tuple[Array, Array]:
+        """Return the corrections of the mean of the variances of each name, of recordings that were not fitted.
+
+        Samples that follow each other are hardly more than one, so that one recording tells its noise badly: the mean
+        of several has their degrees of freedom (Satterthwaite).
+        """
+        same_name = (names[:, None] == names).astype(float)
+        sums = _SampleCounts(*(same_name @ each for each in (self.size, self.of_mean, self.of_variance)))
+        ratio, freedom = sums.corrections(same_name @ parameters)
+        square_total = same_name @ (squares**2 / np.maximum(self.of_variance, 1e-300))
+        unequal = (same_name @ squares) ** 2 / (ratio * square_total)
+        return ratio, np.maximum(unequal, np.minimum(LEAST_FREEDOM, freedom))
 
 
 def profile(
@@ -198,42 +231,3 @@ def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
     if math.isinf(outer[0]):
         return inner[0] * min(4.0, target / max(inner[1], 1e-3))
     return inner[0] + (target - inner[1]) / (outer[1] - inner[1]) * (outer[0] - inner[0])
-
-
-def free_directions(problem: Problem, minimum: Fit) -> list[tuple[str, list[int]]]:
-    """Return the combinations that the recordings leave open, in words and with their parameters; sorted."""
-    low, high = problem.box
-    width = high - low
-    values, vectors = np.linalg.eigh(information(problem, minimum) * np.outer(width, width))
-    directions = []
-    for value, vector in zip(values, vectors.T, strict=True):
-        if 1.0 / math.sqrt(max(value, 1e-300)) >= _FREE_DEVIATION:
-            direction = vector * width
-            size = np.abs(direction) / np.max(np.abs(direction))
-            shown = [k for k in range(len(size)) if size[k] > _SMALL_ENTRY]
-            directions.append((_direction_text(problem, direction, shown), shown))
-    return directions
-
-
-def _direction_text(problem: Problem, direction: Array, shown: list[int]) -> str:
-    """Return a direction of z in words."""
-    size = np.abs(direction) / np.max(np.abs(direction))
-    names = [problem.keys[k] for k in shown]
-    if len(shown) == 1:
-        return f"{names[0]} is not determined: the recording hardly feels it"
-    if len(shown) == 2 and all(problem.logarithmic[shown]) and min(size[shown]) > 0.8:
-        same_sign = direction[shown[0]] * direction[shown[1]] > 0.0
-        combination = "quotient" if same_sign else "product"
-        return f"of {names[0]} and {names[1]} only the {combination} is determined"
-    listed = f"{', '.join(names[:-1])} and {names[-1]}"
-    return f"only a combination of {listed} is determined: {_example(problem, direction, shown)} changes nothing"
-
-
-def _example(problem: Problem, direction: Array, shown: Sequence[int]) -> str:
-    first = shown[0]
-    step = direction / direction[first] * (math.log(1.1) if problem.logarithmic[first] else 1.0)
-    parts = []
-    for k in shown:
-        change = f"times {math.exp(step[k]):.3g}" if problem.logarithmic[k] else f"plus {step[k]:.3g}"
-        parts.append(f"{problem.keys[k]} {change}")
-    return " with ".join(parts)

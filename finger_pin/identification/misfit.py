@@ -14,7 +14,7 @@ from scipy.stats import f as f_distribution
 from scipy.stats import t as student
 
 from finger_pin.identification.estimate import Fit
-from finger_pin.identification.intervals import information_of_bounds, inverse_within_bounds
+from finger_pin.identification.intervals import information_of_bounds
 from finger_pin.identification.likelihood import robust_deviation
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.recordings import RecordedSignal, Recording
@@ -81,34 +81,6 @@ def sandwich_covariance(problem: Problem, minimum: Fit, covariance: Array) -> Ar
         autoregression = _autoregression([minimum.residuals[k] for k in unrepeated if problem.signals[k].ordered])
         total += sum(minimum.noise[k] ** 2 * _correlated_information(scores[k], autoregression) for k in unrepeated)
     return np.asarray(covariance @ total @ covariance)
-
-
-def jackknife_covariance(problem: Problem, minimum: Fit) -> Array:
-    """Return the covariance of z by leaving out one setting at a time, shape (p, p); zero of less than three settings.
-
-    Settings are the recordings or, of less than three, the loads of their readings. What a model misses is shared by
-    the samples of a setting, and no noise of samples. The estimate without one follows from its information h and score
-    s, by (H - h)^-1 s (Bell and McCaffrey, Survey Methodology 28, 2002); 1.96 deviations are as many as Student's t
-    asks for with a degree of freedom for every setting but one.
-    """
-    by_load = len({signal.recording for signal in problem.signals}) < 3
-    parts, scores = dict[tuple[str, float], Array](), dict[tuple[str, float], Array]()
-    outlier_ratios = outliers(problem, minimum.residuals)
-    inliers = [np.where(ratio > 0.0, 0.0, e) for ratio, e in zip(outlier_ratios, minimum.residuals, strict=True)]
-    by_signal = zip(problem.signals, minimum.weights, minimum.noise, inliers, problem.slopes(minimum.z), strict=True)
-    for signal, w, n, e, j in by_signal:
-        load = np.nan_to_num(signal.load) if by_load and not signal.ordered else np.zeros(len(e))
-        for level in np.unique(load):
-            rows, setting = load == level, (signal.recording, float(level))
-            parts[setting] = parts.get(setting, 0.0) + w / n**2 * j[rows].T @ j[rows]
-            scores[setting] = scores.get(setting, 0.0) + w / n**2 * j[rows].T @ e[rows]
-    count = len(parts)
-    if count < 3:
-        return np.zeros((len(minimum.z), len(minimum.z)))
-    total, mean = np.sum(list(parts.values()), axis=0), np.mean(list(scores.values()), axis=0)
-    shifts = [inverse_within_bounds(problem, total - parts[level]) @ (scores[level] - mean) for level in parts]
-    share = (count - 1) / count * (student.ppf(0.975, count - 1) / 1.96) ** 2
-    return np.asarray(share * np.transpose(shifts) @ shifts)
 
 
 def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:

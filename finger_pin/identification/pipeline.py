@@ -9,7 +9,6 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
-from scipy.linalg import eigh
 from scipy.stats import qmc
 
 from finger_pin.core.threads import in_threads
@@ -17,10 +16,13 @@ from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.exceptions import InputError
 from finger_pin.identification.checkpoint import Checkpoint
 from finger_pin.identification.comparison import LawComparison, compare_laws
+from finger_pin.identification.cross_validation import CrossValidation, cross_validation, find_settings, refit_without
 from finger_pin.identification.estimate import Fit, best_of, fit, fit_with_restarts, influential_parameters
 from finger_pin.identification.intervals import CHI2_95, ProfileBound, SmallSample, covariance, profile
 from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.misfit import sandwich_covariance
+from finger_pin.identification.neighbours import lowest_minima, neighbour_lines
+from finger_pin.identification.open_directions import OpenDirection, open_directions
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.scenario_parameters import entry_of
 from finger_pin.typing import Array
@@ -34,9 +36,6 @@ _SOBOL_PER_SEARCH = 4
 _HUNTING_JUMP, _HUNTING_CHANGE = 10.0, 1e-5
 # Minus twice the log-likelihood above that of the best rough search at which another is abandoned: exp(-50) as likely.
 _ABANDONED_RISE = 100.0
-# Lines through the best point: least and greatest ratio of the deviation by means over cycles to that by samples along
-# their directions, number of lines, and spacing of points in deviations by samples.
-_MIN_CONTRAST, _MAX_CONTRAST, _LINE_COUNT, _POINT_SPACING = 4.0, 10.0, 2, 3.0
 # Number of neighbouring minima to search from, and least fall of minus twice the log-likelihood to a lower minimum.
 _NEIGHBOUR_COUNT, _LOWER_MINIMUM_FALL = 2, 1.0
 # Values within a parameter's bounds at which its influence on outputs is tested.
@@ -54,6 +53,9 @@ class FitPipeline:
         self.fine_fit: Fit | None = None
         self.interval_ends: dict[tuple[int, int], ProfileBound] = {}
         self.covariance: Array | None = None
+        self._fine: Problem | None = None
+        self.left_out: CrossValidation | None = None
+        self.open_directions: list[OpenDirection] = []
         self.comparison: LawComparison | None = None
 
     @property
@@ -161,6 +163,7 @@ class FitPipeline:
         inflations = np.diag(sandwich) / np.diag(likelihood_covariance) * small_sample.level / CHI2_95
         self.covariance = sandwich * np.sqrt(np.outer(small_sample.variance, small_sample.variance))
         self.problem.join(fine)
+        self._fine = fine
         return fine, best, likelihood_covariance, inflations
 
     def linearise(self, start: Fit) -> None:
@@ -191,6 +194,27 @@ class FitPipeline:
         if better_minima:
             self.interval_ends.clear()
             self.profile_all(min(better_minima, key=lambda minimum: minimum.objective), turn + 1)
+
+    def cross_validate(self) -> None:
+        """Refit without one setting each."""
+        fine, best = self._fine, self.best
+        assert fine is not None
+        settings = find_settings(fine)
+        names = list(settings)
+
+        def refit(item: tuple[int, Problem]) -> Fit:
+            name, twin = names[item[0]], item[1]
+            work = partial(refit_without, twin, best, settings, name, self.loss)
+            return self.checkpoint.fit(f"without {name}", twin, work)
+
+        refits = self._side_by_side("leaving out one at a time", refit, len(names), fine)
+        self.left_out = cross_validation(settings, refits)
+
+    def find_open_directions(self) -> None:
+        """Refit along the directions that the recordings leave open by slopes."""
+        assert self._fine is not None
+        self.open_directions = open_directions(self._fine, self.best, self.loss)
+        self.problem.join(self._fine)
 
     def _side_by_side(
         self, label: str, task: Callable[[tuple[int, Problem]], _Outcome], count: int, problem: Problem | None = None
@@ -253,46 +277,3 @@ def _check_influence(problem: Problem, fits: Sequence[Fit], points: Sequence[Arr
         return
     key = problem.keys[int(np.flatnonzero(~influential)[0])]
     raise InputError(entry_of(key), "no output of any recording feels it, at no value in its bounds; leave it out")
-
-
-def neighbour_lines(problem: Problem, z: Array) -> list[Array]:
-    """Return lines of points through a minimum, shape (k, p) each, along directions with several minima.
-
-    The likelihood of samples has a minimum for every cycle; that of means over cycles covers several of them.
-    """
-    residuals, slopes = problem.residuals(z), problem.slopes(z)
-    low, high = problem.box
-    size = np.outer(high - low, high - low)
-    by_samples, by_means = (
-        size * sum(j.T @ j / max(float(np.mean(e * e)), 1e-300) for e, j in zip(*each, strict=True))
-        for each in ((residuals, slopes), (problem.block_means(residuals), problem.block_means(slopes)))
-    )
-    rounding = max(1e-12 * np.trace(by_samples), 1e-300) * np.eye(len(z))
-    values, vectors = eigh(by_means + rounding, by_samples + rounding)
-    lines = []
-    for value, vector in zip(values[:_LINE_COUNT], vectors.T[:_LINE_COUNT], strict=True):
-        contrast = min(1.0 / np.sqrt(max(value, 1e-300)), _MAX_CONTRAST)
-        if contrast < _MIN_CONTRAST:
-            continue
-        spacing = _POINT_SPACING * (high - low) * vector / np.sqrt(vector @ by_samples @ vector)
-        count = int(contrast)
-        points = z + np.arange(-count, count + 1)[:, None] * spacing
-        lines.append(points[np.all((points >= low) & (points <= high), axis=1)])
-    return lines
-
-
-def lowest_minima(lines: Sequence[Array], objectives: Sequence[float], count: int) -> list[Array]:
-    """Return the local minima along lines, lowest first; an end counts if it rises inwards.
-
-    Args:
-        lines: Places, shape (k, p) each.
-        objectives: Objective at each point of all lines in turn.
-        count: Greatest number of minima.
-    """
-    minima, first = [], 0
-    for line in lines:
-        values = np.array([np.inf, *objectives[first : first + len(line)], np.inf])
-        first += len(line)
-        dips = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] < values[2:]))
-        minima += [(values[1 + k], line[k]) for k in dips]
-    return [point for _, point in sorted(minima, key=lambda minimum: minimum[0])[:count]]

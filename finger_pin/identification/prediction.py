@@ -15,6 +15,8 @@ from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
+from finger_pin.identification.cross_validation import parameter_variance
+from finger_pin.identification.intervals import NORMAL_95
 from finger_pin.identification.misfit import scatter as scatter_of
 from finger_pin.identification.models import held_out_rows, recording_models
 from finger_pin.identification.problem import Problem
@@ -24,12 +26,11 @@ from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
-# Half the width of a 95 % band, in deviations.
-_BAND_DEVIATIONS = 1.96
 _TEXTS = {
     "rms": "rms of measured less predicted, in the unit of the signal",
     "bias": "mean of measured less predicted, in the unit of the signal",
     "within": "share of samples within the band",
+    "band_ratio": "rms of half the band over 1.96 times the rms: 1 where the band is as wide as errors ask for",
     "scatter": "rms of repeated readings or runs about their mean, in the unit of the signal",
     "beyond": "share of samples whose load is beyond those that were fitted: no band knows what the model lacks there",
     "samples": "number of samples",
@@ -48,7 +49,7 @@ def predict(
     """Compare recordings with the predictions of an identification; nothing is fitted.
 
     The band is that of 95 %: the noise of fitted signals of the same name, and what the covariance of the parameters
-    does to the prediction.
+    does to the prediction, times what recordings that were left out in turn ask for.
 
     Args:
         result: Dataset of `identify`, as returned or as `load` reads it.
@@ -59,7 +60,8 @@ def predict(
 
     Returns:
         Along ``prediction``, the signals: ``prediction_rms``, ``prediction_bias`` (measured less predicted),
-        ``prediction_within``, the share of samples in the band, ``prediction_scatter`` of equal readings of a table or
+        ``prediction_within``, the share of samples in the band, ``prediction_band_ratio``, the rms of half the band
+        over 1.96 times the rms, ``prediction_scatter`` of equal readings of a table or
         of runs with equal inputs, not a number without any, ``prediction_beyond``, the share of loads outside of those
         that were fitted; along ``predicted``, the samples: ``predicted_measured``,
         ``predicted_value`` and ``predicted_band``, half its width.
@@ -115,17 +117,19 @@ def predictions(
     fitted = result["applied"].values[np.isfinite(result["applied"].values)]
     lowest, highest = (float(fitted.min()), float(fitted.max())) if len(fitted) else (-math.inf, math.inf)
     for recording in recordings:
-        problem, z, covariances = _problem(result, scenario, recording, finger)
+        problem, z, covariance, left_out = _problem(result, scenario, recording, finger)
         residuals = problem.errors(z)
+        refits = [problem.errors(each) for each in left_out]
+        refits = [errors for errors in refits if all(np.isfinite(each).all() for each in errors)]
         growths = problem.growth.growth(residuals)
-        computed = zip(problem.signals, residuals, problem.error_slopes(z), growths, strict=True)
+        refitted = [np.array([errors[k] for errors in refits]) for k in range(len(residuals))]
+        computed = zip(problem.signals, residuals, problem.error_slopes(z), growths, refitted, strict=True)
         rows_by_signal: dict[str, list[Array]] = {}
-        for signal, residual, slopes, growth in computed:
-            noise = _noise(result, recording.name, signal.name) * growth
-            parameter_variance = np.max([np.sum(slopes @ each * slopes, axis=1) for each in covariances], axis=0)
-            deviation = np.sqrt(noise**2 + parameter_variance)
+        for signal, residual, slopes, growth, errors in computed:
+            noise, factor = _noise(result, recording.name, signal.name)
+            deviation = factor * np.sqrt((noise * growth) ** 2 + parameter_variance(slopes, covariance, errors))
             value = np.where(np.isfinite(residual), signal.measured - residual, np.nan)
-            rows = np.stack([signal.instant, signal.load, signal.measured, value, _BAND_DEVIATIONS * deviation])
+            rows = np.stack([signal.instant, signal.load, signal.measured, value, NORMAL_95 * deviation])
             rows_by_signal.setdefault(signal.name, []).append(rows)
         for name, pieces in rows_by_signal.items():
             first = next(each for each in problem.signals if each.name == name)
@@ -143,8 +147,8 @@ def predictions(
 
 def _problem(
     result: xr.Dataset, scenario: Scenario, recording: Recording, finger: Finger | None
-) -> tuple[Problem, Array, Array]:
-    """Return the problem of the held-out part of a recording, the estimate, and its covariances, shape (2, p, p)."""
+) -> tuple[Problem, Array, Array, list[Array]]:
+    """Return the problem of the held-out part of a recording, z, its covariance, and z of refits without a setting."""
     models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
 
     def applies(key: str) -> bool:
@@ -162,24 +166,31 @@ def _problem(
     count, z = len(applicable), problem.start.copy()
     z[:count] = problem.to_search(np.append(estimate, problem.values(z)[count:]))[:count]
     ends = problem.to_search(np.append(upper, problem.values(z)[count:]))[:count]
-    covariances, selection = np.zeros((2, len(z), len(z))), np.ix_(applicable, applicable)
-    correlation = result["correlation"].values[selection]
-    covariances[0, :count, :count] = np.outer(ends - z[:count], ends - z[:count]) / _BAND_DEVIATIONS**2 * correlation
-    # A result of an earlier version has none.
-    covariances[1, :count, :count] = result["jackknife"].values[selection] if "jackknife" in result else 0.0
+    covariance, left_out = np.zeros((len(z), len(z))), list[Array]()
+    correlation = result["correlation"].values[np.ix_(applicable, applicable)]
+    covariance[:count, :count] = np.outer(ends - z[:count], ends - z[:count]) / NORMAL_95**2 * correlation
+    # A result of fewer than two settings or of an earlier version has none.
+    for values in result["left_out_estimate"].values[:, applicable] if "left_out" in result.dims else ():
+        left_out.append(problem.to_search(np.append(values, problem.values(z)[count:])))
     # An identification stopped early has no covariance: the band is that of the noise alone.
-    return problem, z, np.nan_to_num(covariances, nan=0.0)
+    return problem, z, np.nan_to_num(covariance, nan=0.0), left_out
 
 
-def _noise(result: xr.Dataset, recording: str, name: str) -> float:
-    """Return the deviation of a fitted signal: of the same recording, else that for others of the same name."""
+def _noise(result: xr.Dataset, recording: str, name: str) -> tuple[float, float]:
+    """Return the deviation of a fitted signal, and the factor on its band.
+
+    The deviation is that of the same recording, else that for others of the same name. The rest of a motion that was
+    fitted has no factor: what was left out were whole motions.
+    """
     # A result of an earlier version has no other.
     pooled = "noise_elsewhere" if "noise_elsewhere" in result else "noise_deviation"
+    factors = result["band_factor"].values if "band_factor" in result else np.ones(result.sizes["signal"])
     for key, name_of_deviation in ((f"{recording}.{name}", "noise_deviation"), (name, pooled)):
-        for signal, deviation in zip(result["signal"].values, result[name_of_deviation].values, strict=True):
+        columns = (result["signal"].values, result[name_of_deviation].values, factors, result["signal_steady"].values)
+        for signal, deviation, factor, steady in zip(*columns, strict=True):
             if key in (signal, str(signal).partition(".")[2]):
-                return float(deviation)
-    return math.nan
+                return float(deviation), float(factor) if steady or key == name else 1.0
+    return math.nan, 1.0
 
 
 def _repeats(recording: Recording, name: str, recordings: Sequence[Recording]) -> float:
@@ -202,6 +213,7 @@ def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
             "bias": float(np.mean(residual)),
             # A run that fails is within no band; without noise there is no band.
             "within": float(np.mean(np.abs(residual) <= band)) if np.isfinite(band).all() else math.nan,
+            "band_ratio": float(np.sqrt(np.mean(band**2)) / NORMAL_95 / max(np.sqrt(np.mean(residual**2)), 1e-300)),
             "scatter": signal["scatter"],
             "beyond": signal["beyond"],
             "samples": len(residual),

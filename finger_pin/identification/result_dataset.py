@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,13 @@ import xarray as xr
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import write_text
-from finger_pin.identification.comparison import LawComparison, bic
+from finger_pin.identification.comparison import bic
+from finger_pin.identification.cross_validation import CrossValidation, shift_deviations
 from finger_pin.identification.estimate import Fit
-from finger_pin.identification.intervals import CHI2_95, ProfileBound, SmallSample, covariance, free_directions
+from finger_pin.identification.intervals import CHI2_95, NORMAL_95, ProfileBound, SmallSample, covariance
 from finger_pin.identification.likelihood import minus_twice_likelihood
-from finger_pin.identification.misfit import jackknife_covariance, outliers, repeats
+from finger_pin.identification.misfit import outliers, repeats
+from finger_pin.identification.pipeline import FitPipeline
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.scenario_parameters import (
     corrected_column,
@@ -32,22 +34,15 @@ from finger_pin.studies.keys import describe
 from finger_pin.typing import Array
 
 
-def result_dataset(
-    problem: Problem,
-    fits: Sequence[Fit],
-    best: Fit,
-    interval_ends: Mapping[tuple[int, int], ProfileBound],
-    z_covariance: Array | None,
-    comparison: LawComparison | None,
-    unfinished: str = "",
-) -> xr.Dataset:
+def result_dataset(problem: Problem, pipeline: FitPipeline, unfinished: str = "") -> xr.Dataset:
     """Return the Dataset of an identification; unfinished pieces are not a number."""
     count, keys = problem.requested_count, problem.keys[: problem.requested_count]
-    open_directions = free_directions(problem, best) if z_covariance is not None else []
-    undetermined = [k for _, shown in open_directions for k in shown if k < count]
+    fits, best, left_out, comparison = pipeline.fits, pipeline.best, pipeline.left_out, pipeline.comparison
+    undetermined = [k for direction in pipeline.open_directions for k in direction.parameters if k < count]
     variables: dict[str, Any] = {
-        **_estimates(problem, best, interval_ends, z_covariance, undetermined),
-        **_signals(problem, best, None if z_covariance is None else covariance(problem, best)),
+        **_estimates(problem, best, pipeline.interval_ends, pipeline.covariance, undetermined),
+        **_signals(problem, best, pipeline.covariance, left_out),
+        **_left_out(problem, best, left_out, pipeline.covariance),
         "start_objective": ("start", [each.objective for each in fits], {"units": "1"}),
         "start_estimate": (("start", "parameter"), [problem.values(each.z)[:count] for each in fits]),
     }
@@ -56,6 +51,8 @@ def result_dataset(
         "other": list(keys),
         "signal": list(dict.fromkeys(f"{signal.recording}.{signal.name}" for signal in problem.signals)),
     }
+    if left_out is not None:
+        coordinates["left_out"] = list(left_out.settings)
     if comparison is not None:
         coordinates["law"] = comparison.law
         for name in ("parameters", "bic", "rms", "held_out"):
@@ -68,7 +65,7 @@ def result_dataset(
     attrs = {
         "scenario": problem.scenario.name,
         "scenario_toml": to_toml(problem.scenario),
-        "undetermined": [words for words, _ in open_directions],
+        "undetermined": [direction.text for direction in pipeline.open_directions],
         "searches": len(fits),
         "searches_alike": sum(each < least + CHI2_95 for each in objectives),
         "evaluations": problem.evaluations,
@@ -100,7 +97,7 @@ def _estimates(
         correlation = z_covariance / np.outer(deviation, deviation)
     estimate, all_deviations = problem.values(best.z)[:count], np.zeros(len(best.z))
     all_deviations[:count] = deviation
-    linear = [problem.values(best.z + side * 1.96 * all_deviations)[:count] for side in (-1.0, 1.0)]
+    linear = [problem.values(best.z + side * NORMAL_95 * all_deviations)[:count] for side in (-1.0, 1.0)]
     profiles = _profiles(problem, best, interval_ends)
     closed = np.isfinite(ends).all(axis=0)
     closed[undetermined] = False
@@ -115,17 +112,31 @@ def _estimates(
         "least": ("parameter", problem.low[:count], {"long_name": "least value that was allowed"}),
         "greatest": ("parameter", problem.high[:count], {"long_name": "greatest value that was allowed"}),
         "correlation": (("parameter", "other"), correlation, {"units": "1", "long_name": "of the estimates"}),
-        "jackknife": (
-            ("parameter", "other"),
-            jackknife_covariance(problem, best)[:count, :count] if z_covariance is not None else unknown,
-            {"long_name": "covariance by leaving out one setting at a time; of logarithms where the least is positive"},
-        ),
         "profile_value": (("parameter", "point"), profiles[0], {"long_name": "held value of a parameter"}),
         "profile_rise": (
             ("parameter", "point"),
             profiles[1],
             {"units": "1", "long_name": "rise of minus twice the likelihood, the others fitted anew; 3.841 at 95 %"},
         ),
+    }
+
+
+def _left_out(
+    problem: Problem, best: Fit, left_out: CrossValidation | None, z_covariance: Array | None
+) -> dict[str, Any]:
+    """Return the variables of refits without one setting each, if there are any."""
+    if left_out is None or z_covariance is None:
+        return {}
+    inflation = np.sqrt(np.diag(z_covariance) / np.diag(covariance(problem, best)))
+    deviations = shift_deviations(problem, best, left_out.settings) * inflation
+    shifts = np.zeros_like(deviations)
+    np.divide(left_out.estimates - best.z, deviations, out=shifts, where=deviations > 0.0)
+    count, dims = problem.requested_count, ("left_out", "parameter")
+    estimates = [problem.values(z)[:count] for z in left_out.estimates]
+    text = "estimate without one recording, or the readings at one load"
+    return {
+        "left_out_estimate": (dims, estimates, {"long_name": text}),
+        "left_out_shift": (dims, shifts[:, :count], {"units": "1", "long_name": "its shift over that by noise"}),
     }
 
 
@@ -151,20 +162,23 @@ def _units(problem: Problem, key: str) -> str:
     return {"offset": problem.units[column], "delay": "s"}.get(key.rpartition(".")[2], "1")
 
 
-def _signals(problem: Problem, best: Fit, likelihood_covariance: Array | None) -> dict[str, Any]:
+def _signals(
+    problem: Problem, best: Fit, z_covariance: Array | None, left_out: CrossValidation | None
+) -> dict[str, Any]:
     signals, groups, errors, noise = problem.signals, problem.groups, best.residuals, best.noise
-    noise_factors = pooled_factors = np.ones(len(signals))
-    if likelihood_covariance is not None:
-        small_sample = SmallSample.from_fit(problem, best, likelihood_covariance)
+    noise_factors = pooled_factors = band_factors = np.ones(len(signals))
+    if z_covariance is not None:
+        small_sample = SmallSample.from_fit(problem, best, covariance(problem, best))
         noise_factors, pooled_factors = small_sample.noise, small_sample.pooled_noise
+        if left_out is not None:
+            pooled = _pooled_noise(problem, noise) * pooled_factors
+            band_factors = left_out.band_factors(problem, pooled, problem.slopes(best.z), z_covariance)
     if problem.growth.active:
         errors = problem.errors(best.z)
         # Noise of a reading of zero.
         noise = best.noise / problem.growth.levels(errors)
     # Windows of an output share its values: the first one has them.
     first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
-    names = np.array([signals[k].name for k in first])
-    squares = np.array([np.mean(noise[first][names == name] ** 2) for name in names])
     repeated = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}
     sample_columns = {
         "signal_index": np.repeat(groups, [len(s.measured) for s in signals]),
@@ -193,8 +207,13 @@ def _signals(problem: Problem, best: Fit, likelihood_covariance: Array | None) -
         ),
         "noise_elsewhere": (
             "signal",
-            np.sqrt(squares) * pooled_factors[first],
+            (_pooled_noise(problem, noise) * pooled_factors)[first],
             {"long_name": "deviation of readings of recordings that were not fitted, by all fitted ones of the name"},
+        ),
+        "band_factor": (
+            "signal",
+            band_factors[first],
+            {"units": "1", "long_name": "factor on bands of what was not fitted, by what was left out in turn"},
         ),
         "replicate_noise": (
             "signal",
@@ -211,6 +230,13 @@ def _signals(problem: Problem, best: Fit, likelihood_covariance: Array | None) -
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
         **{name: ("sample", values, {"long_name": long_names[name]}) for name, values in sample_columns.items()},
     }
+
+
+def _pooled_noise(problem: Problem, noise: Array) -> Array:
+    """Return the root mean square of the noises of all outputs of the same name, for every signal, shape (s,)."""
+    first = np.unique(problem.groups, return_index=True)[1]
+    names = np.array([signal.name for signal in problem.signals])
+    return np.array([np.sqrt(np.mean(noise[first][names[first] == name] ** 2)) for name in names])
 
 
 def write_results(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> None:

@@ -21,8 +21,14 @@ from finger_pin.views.plots.identification import (
     short_name,
 )
 
-# From which correlation of neighbours residuals are said to follow each other.
-_MAX_CORRELATION = 0.9
+# Ratio of the noises of one output in two recordings from which that is said: weights of 1 to 9.
+_NOISE_RATIO = 3.0
+# Shift of an estimate without a recording, over that by noise alone, from which recordings are said to disagree: one in
+# a hundred by chance.
+_SHIFT_DEVIATIONS = 2.58
+# Correlation of neighbours over its deviation of white residuals, 1 / sqrt(n), from which they are said to follow each
+# other: one in a thousand by chance.
+_CORRELATION_DEVIATIONS = 3.0
 
 
 def summarize_identification(result: xr.Dataset) -> str:
@@ -135,11 +141,12 @@ def _predictions(result: xr.Dataset) -> list[str]:
     """Return a sentence on every signal that was held out."""
     if "prediction" not in result.dims:
         return []
-    columns = ("rms", "bias", "within", "scatter", "beyond", "samples", "units")
+    columns = ("rms", "bias", "within", "band_ratio", "scatter", "beyond", "samples", "units")
     rows = zip(result["prediction"].values, *(result[f"prediction_{column}"].values for column in columns), strict=True)
     sentences = []
-    for name, rms, bias, within, scatter, beyond, count, unit in rows:
-        share = "" if math.isnan(within) else f", {within:.0%} of {count} samples within the 95 % band"
+    for name, rms, bias, within, ratio, scatter, beyond, count, unit in rows:
+        band = f", {within:.0%} of {count} samples within the 95 % band, half of which is {ratio:.2g} times 1.96 rms"
+        share = "" if math.isnan(within) else band
         repeats = "" if math.isnan(scatter) else f"; repeats scatter by {scatter:.3g}"
         sentences.append(f"Held out: {name} is predicted to {rms:.3g} {unit} rms, bias {bias:.3g}{share}{repeats}.")
         if beyond > 0.0:
@@ -164,17 +171,19 @@ def _remarks(result: xr.Dataset) -> list[str]:
         sides = [side for side, end in (("below", low), ("above", high)) if end == "open"]
         if sides:
             sentences.append(f"{name} is not bounded from {' nor from '.join(sides)} by these recordings.")
+    misfit_remarks, law_holds = _misfit_remarks(result)
     if not sentences and "unfinished" not in result.attrs:
-        sentences.append(
-            f"{'The' if _confirmed(result) else 'Near this place the'} recordings determine every parameter."
-        )
+        subject = "The" if _confirmed(result) else "Near this place the"
+        determined = f"{subject} recordings determine every parameter."
+        sentences.append(determined if law_holds else "All intervals close, under this law.")
+    sentences += _disagreements(result)
     if _confirmed(result):
         sentences.append(_agreement(result))
     if result.attrs.get("ringing", ""):
         sentences.append(f"Runs take long: {result.attrs['ringing']}.")
     if not result.attrs.get("profiles", 1):
         sentences.append("The intervals are those of slopes at the estimate: where they are wide, profiles are surer.")
-    sentences += _outliers(result) + _misfit_remarks(result)
+    sentences += _outliers(result) + misfit_remarks
     if "law" in result.dims:
         order = np.argsort(result["law_bic"].values)
         best, *others = (str(result["law"].values[index]) for index in order)
@@ -186,29 +195,59 @@ def _remarks(result: xr.Dataset) -> list[str]:
     return sentences
 
 
-def _misfit_remarks(result: xr.Dataset) -> list[str]:
-    """Return sentences on the model's misfit: by repeats, and by the correlation of residuals."""
-    sentences, correlated = [], list[str]()
-    columns = ("signal", "replicate_noise", "noise", "lack_of_fit", "signal_correlation", "signal_steady")
-    for name, repeats, noise, chance, correlation, steady in zip(
-        *(result[column].values for column in columns), strict=True
+def _misfit_remarks(result: xr.Dataset) -> tuple[list[str], bool]:
+    """Return sentences on the model's misfit, by repeats and correlation of residuals, and whether none shows."""
+    sentences, correlated, law_holds = [], list[str](), True
+    columns = ("signal", "replicate_noise", "noise", "lack_of_fit", "signal_correlation", "signal_samples")
+    for name, repeats, noise, chance, correlation, count, steady in zip(
+        *(result[column].values for column in (*columns, "signal_steady")), strict=True
     ):
         if math.isfinite(repeats):
             kind = "Equal readings" if steady else "Repeated runs"
             sentences.append(f"{kind} of {name} differ by {repeats:.3g} rms, all from the law by {noise:.3g}.")
         if chance < SIGNIFICANCE:
+            law_holds = False
             sentences.append(
                 f"The model misses something of {name}: by chance alone it would miss as much with a probability of "
                 f"{chance:.2g}. The intervals count that as noise which repeats share; numbers that take the place of "
                 "what is missing may still be off."
             )
-        elif math.isnan(chance) and correlation > _MAX_CORRELATION:
-            correlated.append(str(name))
+        elif math.isnan(chance) and correlation * math.sqrt(count) > _CORRELATION_DEVIATIONS:
+            correlated.append(f"{name} (by {correlation:.2g})")
     if correlated:
         sentences.append(
             f"Residuals of {', '.join(correlated)} follow each other: sensor or model, which repeats would tell. "
-            "The intervals count them as noise with that correlation."
+            "The intervals count them as noise with that correlation, and do not heed what the model lacks."
         )
+    return sentences, law_holds and not correlated
+
+
+def _disagreements(result: xr.Dataset) -> list[str]:
+    """Return sentences on recordings that differ: by what they are met by, and by the parameters that they want."""
+    sentences, signals = list[str](), [str(name).partition(".") for name in result["signal"].values]
+    noises = [float(noise) for noise in result["noise"].values]
+    for output in dict.fromkeys(name for _, _, name in signals):
+        pairs = zip(noises, signals, strict=True)
+        members = sorted((noise, recording) for noise, (recording, _, name) in pairs if name == output)
+        (least, best), (greatest, worst) = members[0], members[-1]
+        if greatest > _NOISE_RATIO * least:
+            sentences.append(
+                f"{output} of {worst} is met to {greatest:.3g}, that of {best} to {least:.3g}: each recording is "
+                f"weighed by its own noise, so that {worst} hardly counts where the two want different numbers."
+            )
+    if "left_out" not in result.dims:
+        return sentences
+    names = result["left_out"].values
+    columns = (result[name].values.T for name in ("left_out_estimate", "left_out_shift", "lower", "upper"))
+    for refits, shifts, low, high, (key, _, lower, upper, unit) in zip(*columns, _parameters(result), strict=True):
+        pair = int(np.argmin(refits)), int(np.argmax(refits))
+        outside = (refits < low) | (refits > high)
+        if any(outside[k] and abs(shifts[k]) > _SHIFT_DEVIATIONS for k in pair):
+            values = [f"{refits[k]:.4g}{unit and f' {unit}'} without {names[k]}" for k in pair]
+            sentences.append(
+                f"{key} is {values[0]} and {values[1]}: these want it to differ by more than noise explains, which the "
+                f"interval from {lower} to {upper} does not heed."
+            )
     return sentences
 
 

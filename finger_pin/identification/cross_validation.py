@@ -1,0 +1,179 @@
+"""Refits without one recording or load each: how far they move the parameters, and how badly they predict the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+from scipy.stats import t as student
+
+from finger_pin.identification.estimate import Fit, fit, information
+from finger_pin.identification.intervals import LEAST_FREEDOM, NORMAL_95, inverse_within_bounds
+from finger_pin.identification.misfit import outliers
+from finger_pin.identification.problem import Problem
+from finger_pin.typing import Array
+
+#: Masks of the samples of every signal that a setting has.
+Setting = list[NDArray[np.bool_]]
+# Least number of settings that tell how much they differ: a load alone says little.
+_LEAST_RECORDINGS, _LEAST_LOADS = 2, 3
+# Most settings, of motions and of readings, that are left out by a full refit; of more a single step tells each one.
+_MAX_MOTION_REFITS, _MAX_READING_REFITS = 4, 16
+# Least number of independent samples that a refit counts.
+_LEAST_COUNT = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
+    """Refits without one setting each.
+
+    Attributes:
+        settings: Samples of each setting, by name; r of them.
+        estimates: z without each setting, shape (r, p).
+        residuals: Of all samples of every signal under each refit, shape (r, m) each.
+    """
+
+    settings: Mapping[str, Setting]
+    estimates: Array
+    residuals: Sequence[Array]
+
+    def band_factors(self, problem: Problem, noise: Array, slopes: Sequence[Array], covariance: Array) -> Array:
+        """Return factors on the bands of every signal, shape (s,), by which they hold 95 % of what was left out.
+
+        Every setting counts the same, whatever its number of samples. No factor is below 1.
+
+        Args:
+            problem: The problem that was fitted.
+            noise: Deviation of further readings of every signal, shape (s,).
+            slopes: Derivatives of the residuals of every signal by z, shape (m, p) each.
+            covariance: Of z, by the likelihood, shape (p, p).
+        """
+        names = np.array([signal.name for signal in problem.signals])
+        ratios, weights = list[Array](), list[Array]()
+        for k, (residuals, j) in enumerate(zip(self.residuals, slopes, strict=True)):
+            half = NORMAL_95 * np.sqrt(noise[k] ** 2 + parameter_variance(j, covariance, residuals))
+            weight = np.zeros(len(half))
+            missed = np.zeros(len(half))
+            for errors, setting in zip(residuals, self.settings.values(), strict=True):
+                rows = setting[k]
+                missed[rows] = np.abs(errors[rows])
+                count = sum(np.count_nonzero(setting[other]) for other in np.flatnonzero(names == names[k]))
+                weight[rows] = 1.0 / max(count, 1)
+            ratios.append(missed / half)
+            weights.append(weight)
+        factors = np.ones(len(names))
+        for name in np.unique(names):
+            members = np.flatnonzero(names == name)
+            pooled, shares = (np.concatenate([each[k] for k in members]) for each in (ratios, weights))
+            factors[members] = max(1.0, _weighted_quantile(pooled, shares, 0.95))
+        return factors
+
+
+def shift_deviations(problem: Problem, minimum: Fit, settings: Mapping[str, Setting]) -> Array:
+    """Return the standard deviations by noise alone of the shifts of z without each setting, shape (r, p).
+
+    Of an efficient estimate they are those of the variance without the setting less that with it (Hausman,
+    Econometrica 46, 1978); zero where the setting tells nothing.
+    """
+    slopes, whole = problem.slopes(minimum.z), information(problem, minimum)
+    variance, rows = np.diag(inverse_within_bounds(problem, whole)), list[Array]()
+    for setting in settings.values():
+        columns = zip(minimum.weights / minimum.noise**2, slopes, setting, strict=True)
+        part = sum(factor * j[mask].T @ j[mask] for factor, j, mask in columns)
+        rows.append(np.diag(inverse_within_bounds(problem, whole - part)) - variance)
+    return np.sqrt(np.maximum(rows, 0.0))
+
+
+def parameter_variance(slopes: Array, covariance: Array, refitted: Array) -> Array:
+    """Return the variance of predictions by the parameters, shape (m,): the larger of two.
+
+    One is that of slopes and the covariance, the other (r - 1) / r times the sum of squared differences of r refits
+    without a setting each (the jackknife; Tukey, Ann. Math. Stat. 29, 1958). Of that 1.96 deviations are as many as
+    Student's t asks for with a degree of freedom for every setting but one, and no fewer than `LEAST_FREEDOM`: errors
+    of what was left out say more than a t of one or two.
+
+    Args:
+        slopes: Derivatives of the predictions by z, shape (m, p).
+        covariance: Of z, by the likelihood, shape (p, p).
+        refitted: Predictions under each refit, or their errors, shape (r, m); r may be 0.
+    """
+    variance: Array = np.sum(slopes @ covariance * slopes, axis=1)
+    count = len(refitted)
+    if count < 2:
+        return variance
+    factor = student.ppf(0.975, max(count - 1, LEAST_FREEDOM)) / NORMAL_95
+    return np.asarray(np.maximum(variance, factor**2 * (count - 1) * np.var(refitted, axis=0)))
+
+
+def find_settings(problem: Problem) -> dict[str, Setting]:
+    """Return the settings by name: recordings or, of less than three, loads of their readings; none of too few."""
+    recordings = dict.fromkeys(signal.recording for signal in problem.signals)
+    by_load = len(recordings) < 3 and not problem.has_motion
+    loads = [np.nan_to_num(s.load) if by_load else np.zeros(len(s.measured)) for s in problem.signals]
+    pairs = dict.fromkeys(
+        (signal.recording, float(level))
+        for signal, load in zip(problem.signals, loads, strict=True)
+        for level in np.unique(load)
+    )
+    if len(pairs) < (_LEAST_LOADS if by_load else _LEAST_RECORDINGS):
+        return {}
+    return {
+        f"{recording} at {level:.4g} N" if by_load else recording: [
+            (load == level) & (signal.recording == recording)
+            for signal, load in zip(problem.signals, loads, strict=True)
+        ]
+        for recording, level in pairs
+    }
+
+
+def refit_without(problem: Problem, minimum: Fit, settings: Mapping[str, Setting], name: str, loss: str) -> Fit:
+    """Return the minimum without a setting, within the bounds, with the residuals of all samples there.
+
+    Args:
+        problem: The problem that was fitted.
+        minimum: Of the problem.
+        settings: All settings.
+        name: The setting that is left out.
+        loss: As for `fit`.
+    """
+    ratios = outliers(problem, minimum.residuals)
+    kept = [~out & (ratio == 0.0) for out, ratio in zip(settings[name], ratios, strict=True)]
+    slopes = [j[rows] for j, rows in zip(problem.slopes(minimum.z), kept, strict=True)]
+    if len(settings) > (_MAX_MOTION_REFITS if problem.has_motion else _MAX_READING_REFITS):
+        z = _step(problem, minimum, kept, slopes)
+    else:
+        subset = problem.subset(kept)
+        # Of few independent samples no step would be worth its run, and the refit would stay where it starts.
+        count = sum(w * np.count_nonzero(rows) for w, rows in zip(minimum.weights, kept, strict=True))
+        weights = minimum.weights * max(1.0, _LEAST_COUNT / count)
+        z = fit(subset, minimum.z, weights=weights, loss=loss, slopes=slopes).z
+        problem.evaluations += subset.evaluations
+    return fit(problem, z, fixed=dict(enumerate(z)), weights=minimum.weights)
+
+
+def _step(problem: Problem, minimum: Fit, kept: Setting, slopes: Sequence[Array]) -> Array:
+    """Return the place to which a step of Gauss and Newton leads with some of the samples, within the bounds."""
+    low, high = problem.box
+    rows = zip(np.sqrt(minimum.weights) / minimum.noise, slopes, minimum.residuals, kept, strict=True)
+    stacked = np.concatenate([factor * np.column_stack([j, e[mask]]) for factor, j, e, mask in rows])
+    lower, upper = np.minimum(low - minimum.z, -1e-12), np.maximum(high - minimum.z, 1e-12)
+    step = lsq_linear(stacked[:, :-1], -stacked[:, -1], (lower, upper), method="bvls").x
+    return problem.feasible(np.clip(minimum.z + step, low, high))
+
+
+def cross_validation(settings: Mapping[str, Setting], refits: Sequence[Fit]) -> CrossValidation | None:
+    """Return what refits without one setting each tell; None without settings or where a motion fails."""
+    if not refits or not all(np.isfinite(each.objective) for each in refits):
+        return None
+    by_signal = zip(*(each.residuals for each in refits), strict=True)
+    return CrossValidation(settings, np.array([each.z for each in refits]), [np.stack(each) for each in by_signal])
+
+
+def _weighted_quantile(values: Array, weights: Array, share: float) -> float:
+    """Return the least value below or at which a share of the weights lies; 0 without values."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, share * total[-1])]) if len(values) else 0.0

@@ -1,0 +1,144 @@
+"""Bands, refits without a recording and what intervals say, against made-up data whose truth is known."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import norm
+from scipy.stats import t as student
+
+import finger_pin as fp
+from finger_pin.identification.cross_validation import parameter_variance
+from finger_pin.identification.intervals import SmallSample
+from finger_pin.views.report import summarize_identification
+
+COULOMB, TURN = "finger.tendon_friction.coulomb", np.pi / 2.0
+COLUMNS = {"inputs": {"tendon_command.T1": "in"}, "outputs": {"tendon_tension.T1": "out"}}
+STEADY = {"kind": "steady", "speed": 0.05, **COLUMNS}
+MOTION = {"time": "t", "settle": 0.3, **COLUMNS}
+
+
+def identify(recordings, data, **more):
+    given = {"parameters": {COULOMB: (0.01, 1.0)}, "starts": 1, **more}
+    return fp.identify("canal", recordings=recordings, data=data, **given)
+
+
+def readings(rng, coulomb, loads=(3.0, 6.0, 9.0), noise=0.05, repeats=4):
+    """Readings by the capstan law, with noise."""
+    load = np.repeat(loads, repeats)
+    return {"in": load, "out": load * np.exp(-coulomb * TURN) + rng.normal(0.0, noise, load.size)}
+
+
+def autoregressive(rng, rho, shape):
+    """A stationary process of variance one in every row."""
+    fresh = rng.normal(size=shape)
+    fresh[:, 0] /= np.sqrt(1.0 - rho**2)
+    return np.sqrt(1.0 - rho**2) * lfilter([1.0], [1.0, -rho], fresh, axis=1)
+
+
+def linear_fit(slopes, samples):
+    """One signal of a linear problem, its minimum by least squares and its covariance by the likelihood."""
+    residual = samples - slopes @ np.linalg.lstsq(slopes, samples, rcond=None)[0]
+    rho = np.clip(residual[1:] @ residual[:-1] / (residual @ residual), 0.0, 1.0 - 2.0 / len(samples))
+    noise, weight = np.sqrt(np.mean(residual**2)), (1.0 - rho) / (1.0 + rho)
+    signal = SimpleNamespace(name="out", recording="one")
+    problem = SimpleNamespace(signals=[signal], groups=np.zeros(1, dtype=int), slopes=lambda z: [slopes])
+    minimum = SimpleNamespace(
+        z=np.zeros(slopes.shape[1]), noise=np.array([noise]), correlation=np.array([rho]), weights=np.array([weight])
+    )
+    return problem, minimum, np.linalg.inv(slopes.T @ slopes * weight / noise**2)
+
+
+def test_bands_hold_95_percent_of_further_samples_that_follow_each_other():
+    """Lines through noise of known correlation and a variance of one: the share inside is that of a normal variable."""
+    rng, time = np.random.default_rng(1), np.linspace(-1.0, 1.0, 300)
+    slopes = np.stack([np.ones_like(time), time], axis=1)
+    half = []
+    for samples in autoregressive(rng, 0.9, (400, time.size)):
+        problem, minimum, covariance = linear_fit(slopes, samples)
+        half.append(1.96 * minimum.noise[0] * SmallSample.from_fit(problem, minimum, covariance).noise[0])
+    assert np.mean(2.0 * norm.cdf(half) - 1.0) == pytest.approx(0.95, abs=0.01)
+    assert np.mean(half) / 1.96 == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_band_of_few_independent_samples_is_at_most_twice_as_wide():
+    """Four degrees of freedom and half of the samples are left: t sqrt(2) / 1.96 = 2.776 * 1.414 / 1.96 = 2.003."""
+    time = np.linspace(-1.0, 1.0, 500)
+    slopes = np.stack([time**k for k in range(7)], axis=1)
+    problem, minimum, covariance = linear_fit(slopes, np.cumsum(np.random.default_rng(2).normal(size=500)))
+    minimum.correlation[:], minimum.weights[:] = 0.996, 0.004 / 1.996
+    factor = SmallSample.from_fit(problem, minimum, covariance * 0.1).noise[0]
+    assert 1.0 < factor <= 2.003
+
+
+def test_variance_by_refits_is_that_of_the_jackknife():
+    """Of a mean of r values it is their variance over r, whose t has r - 1 degrees of freedom (Tukey, 1958)."""
+    values = np.random.default_rng(3).normal(size=12)
+    refitted = np.array([[np.delete(values, k).mean()] for k in range(12)])
+    expected = values.var(ddof=1) / 12 * (student.ppf(0.975, 11) / 1.96) ** 2
+    variance = parameter_variance(np.zeros((1, 1)), np.zeros((1, 1)), refitted)
+    assert variance[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_bands_hold_the_next_recording_where_friction_differs_from_day_to_day():
+    """Canals whose coefficient is drawn anew in each of five recordings: the sixth is predicted, 10 times."""
+    rng, within, squares = np.random.default_rng(4), [], []
+    days = [f"day_{k}" for k in range(5)]
+    for _ in range(10):
+        data = {name: readings(rng, rng.normal(0.2, 0.03), noise=0.02) for name in (*days, "next")}
+        recordings = {**dict.fromkeys(days, STEADY), "next": {**STEADY, "held_out": True}}
+        result = identify(recordings, data, profiles=False)
+        within.append(float(result.prediction_within[0]))
+        error = result.predicted_measured.values - result.predicted_value.values
+        squares.append([np.mean(result.predicted_band.values**2) / 1.96**2, np.mean(error**2)])
+        ratio = np.sqrt(squares[-1][0] / squares[-1][1])
+        assert float(result.prediction_band_ratio[0]) == pytest.approx(ratio, rel=1e-9)
+    band, error = np.mean(squares, axis=0)
+    assert 0.9 < np.mean(within) < 0.98
+    assert 0.7 < np.sqrt(band / error) < 2.5
+    assert re.search(r"% of 12 samples within the 95 % band, half of which is [\d.]+ times 1.96 rms", told(result))
+
+
+def told(result):
+    return summarize_identification(result)
+
+
+def test_refits_without_a_load_stay_within_the_bounds():
+    """Without 9 N the least squares line rises above 1, a coefficient below zero: the refit ends at the bound."""
+    load = np.repeat([3.0, 6.0, 9.0], 4)
+    out = np.where(load < 9.0, 1.05, 0.6) * load + np.random.default_rng(5).normal(0.0, 0.02, 12)
+    result = identify({"pull": STEADY}, {"pull": {"in": load, "out": out}}, profiles=False)
+    refits = dict(zip(result.left_out.values, result.left_out_estimate.values[:, 0], strict=True))
+    assert list(refits) == ["pull at 3 N", "pull at 6 N", "pull at 9 N"]
+    assert refits["pull at 9 N"] == pytest.approx(0.01, rel=1e-9)
+    kept = load != 3.0
+    share = load[kept] @ out[kept] / (load[kept] @ load[kept])
+    assert refits["pull at 3 N"] == pytest.approx(-np.log(share) / TURN, rel=1e-4)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9])
+def test_recordings_are_said_to_determine_every_parameter_only_where_residuals_are_white(rho):
+    time = np.arange(0.0, 2.01, 0.02)
+    pull = 3.0 + 4.0 * time
+    noise = 0.02 * autoregressive(np.random.default_rng(7), rho, (1, time.size))[0]
+    data = {"pull": {"t": time, "in": pull, "out": pull * np.exp(-0.15 * TURN) + noise}}
+    text = told(identify({"pull": MOTION}, data, profiles=False))
+    assert ("The recordings determine every parameter" in text) == (rho == 0.0)
+    assert ("Residuals of pull.tendon_tension.T1" in text) == (rho > 0.0)
+    assert ("do not heed what the model lacks" in text) == (rho > 0.0)
+
+
+@pytest.mark.parametrize("other", [0.15, 0.154, 0.25])
+def test_recordings_that_want_different_numbers_are_named(other):
+    """By 400 readings each the coefficient is known to 0.0003: 0.154 is ten such deviations off, 0.25 makes a noise."""
+    rng = np.random.default_rng(8)
+    loads, truths = rng.uniform(3.0, 9.0, 400), {"one": 0.15, "two": 0.15, "odd": other}
+    data = {name: readings(rng, truth, loads, repeats=1) for name, truth in truths.items()}
+    text = told(identify(dict.fromkeys(data, STEADY), data))
+    named = re.search(f"{re.escape(COULOMB)} is [^:]* without odd and [^:]* without (one|two): these want", text)
+    assert (named is not None) == (other != 0.15)
+    weighed = re.search(r"of odd is met to [\d.]+, that of (one|two) to 0.0[\d.]+: each recording is weighed", text)
+    assert (weighed is not None) == (other == 0.25)
