@@ -9,8 +9,8 @@ from tree_kinematics import bias, described_tree, mass_matrix, placements, point
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_finger import CompiledFinger, CompiledMechanism
-from finger_pin.core.inputs import held_control
+from finger_pin.core.signals.compiled_finger import CompiledFinger, CompiledMechanism
+from finger_pin.core.tables.inputs import held_control
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array

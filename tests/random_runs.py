@@ -15,7 +15,7 @@ from random_models import DURATION, RandomModel
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.accuracy import residual_share
