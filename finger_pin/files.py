@@ -149,11 +149,7 @@ def _link(source: Path, target: Path) -> None:
 
 
 def read_text(what: str, path: Path, encoding: str = "utf-8-sig", hint: str = "") -> str:
-    """Return the text of a file; the hint ends the message of one in another encoding.
-
-    Raises:
-        InputError: If it cannot be read, is too large, or is no such text.
-    """
+    """Return the text of a file; the hint ends the message of one in another encoding."""
     try:
         if path.is_fifo():
             raise InputError(what, "is a pipe, which may never end; give a file")

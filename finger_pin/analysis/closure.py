@@ -73,9 +73,6 @@ def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
     Args:
         finger: A finger.
         position: theta, shape (n,), rad.
-
-    Raises:
-        InputError: If the posture is wrong, or tendons of a tree rub at several bends.
     """
     finger = as_finger(finger)
     theta = finite_vector("position", position, len(finger.routing.joints))
@@ -141,9 +138,6 @@ def locking_over_range(finger: FingerLike, samples: int = 64) -> tuple[CriticalF
     Args:
         finger: A finger.
         samples: Postures, best a power of two.
-
-    Raises:
-        InputError: If no posture has force closure.
     """
     finger = as_finger(finger)
     closure = closure_over_range(finger, samples)

@@ -86,10 +86,6 @@ def inverse_kinematics(
         point: Of the fingertip, shape (3,), m, base frame.
         near: theta that is preferred, shape (n,), rad; by default the angles of the ranges nearest to zero.
         tip: Name of the fingertip, where a tree has several.
-
-    Raises:
-        InputError: If the point or the preferred posture has a wrong size, it is a hand, there is no such fingertip, or
-            no posture keeps to the couplings of a tree.
     """
     finger = at_tip(as_finger(finger), tip)
     one_finger(finger.description)
@@ -142,11 +138,7 @@ def inverse_kinematics(
 def _project_onto_couplings(
     theta: Array, constraints: Callable[[Array], tuple[Array, Array]], low: Array, high: Array
 ) -> Array:
-    """Return the nearest posture within the ranges that satisfies a tree's couplings and loops.
-
-    Raises:
-        InputError: If there is none.
-    """
+    """Return the nearest posture within the ranges that satisfies a tree's couplings and loops."""
     for _ in range(_PROJECTION_STEPS):
         residual, by_theta = constraints(theta)
         if residual.size:

@@ -67,10 +67,6 @@ def linearise(
         those that have arrived: ``input_delay``, s, is how long each is on its way.
         ``side_by_state``, ``side_of_input`` and ``side_of_parameter`` say where a kink is near: 1 where derivatives
         hold above the number, -1 where below; 0 elsewhere, and at a kink, where they are the mean of both.
-
-    Raises:
-        InputError: If state or inputs have a wrong size, free objects are among the coordinates, ``dt`` is not
-            positive, or parameters are asked of a finger without a scenario or are not single numbers.
     """
     if isinstance(finger_or_scenario, Finger | FingerDescription):
         scenario, finger = None, as_finger(finger_or_scenario)

@@ -57,9 +57,6 @@ def critical_friction(
             ``joints`` count as at rest. By default the worst of all directions in which all ``joints`` move.
         gain: K_P, N m/rad. With it passive tendons are elastic, and the finger lags behind its reference by
             tau / K_P; by default they carry what the controller plans.
-
-    Raises:
-        InputError: If an argument has the wrong size, a joint does not exist, or there is no force closure.
     """
     description = description_of(finger)
     one_finger(description)

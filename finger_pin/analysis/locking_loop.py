@@ -88,9 +88,6 @@ class FrictionLoop:
             tendons: The tendon layer of a finger with force closure.
             gain: K_P, shape (n,), N m/rad, for passive tendons that are elastic; None for passive tendons as planned.
             gears: As in `gear_shares`; ideal sources by default.
-
-        Raises:
-            InputError: If there is no force closure.
         """
         routing = tendons.routing
         closure = routing.force_closure()

@@ -65,10 +65,6 @@ def self_locking_map(
         fixed: Angles of the others, rad; the angle of their range nearest to zero by default.
         minimum_tension: f0, N, one number or one per tendon, for the tensions of the map.
         samples: Angles along either axis.
-
-    Raises:
-        InputError: If a joint does not exist, is named twice or is driven by a passive tendon, or there is no force
-            closure.
     """
     finger = as_finger(finger)
     one_finger(finger.description)

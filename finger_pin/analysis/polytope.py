@@ -114,10 +114,6 @@ def force_polytope(
         minimum_tension: Least f^a, N, likewise.
         friction: NONE or HELPING.
         tip: Name of the fingertip, where a tree has several.
-
-    Raises:
-        InputError: If an argument is wrong, or no tensions within the limits hold the finger without a contact or with
-            one.
     """
     finger = at_tip(as_finger(finger), tip)
     if friction is Friction.HINDERING:

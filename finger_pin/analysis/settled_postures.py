@@ -34,9 +34,6 @@ def settled_posture(finger: Finger, load: Array, speed: float | None, guess: Arr
             None: there is no friction any more.
         guess: Shape (n,), rad.
         force: At the fingertip, shape (3,), N.
-
-    Raises:
-        InputError: If the finger is none that tensions alone bring to rest.
     """
     layout, joints, command = finger.layout, len(guess), as_inputs(finger, load)
     sliding = None if speed is None else sliding_tendons(finger, np.array([speed]), at_rest=True)

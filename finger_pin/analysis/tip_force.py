@@ -67,9 +67,6 @@ def largest_force(
 
     Returns:
         The force; infinite where the structure carries it, not a number where no force along this line can be held.
-
-    Raises:
-        InputError: If an argument is wrong.
     """
     finger = at_tip(as_finger(finger), tip)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
@@ -118,9 +115,6 @@ def tension_for_force(
         minimum_tension: Least f^a, N, one number or one per actuated tendon.
         friction: Of any kind; HELPING gives what holds at least, HINDERING what surely pushes.
         tip: Name of the fingertip, where a tree has several.
-
-    Raises:
-        InputError: If an argument is wrong, or no tensions whatever give this force.
     """
     finger = at_tip(as_finger(finger), tip)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, np.inf)

@@ -89,11 +89,7 @@ def _parse_value(key: str, text: str) -> Any:
 
 
 def open_pool(workers: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:
-    """Return the executor of a study's runs, open while entered: threads, or the workers of a Dask scheduler.
-
-    Raises:
-        InputError: If there are no workers; and, as it is entered, if the scheduler cannot be reached.
-    """
+    """Return the executor of a study's runs, open while entered: threads, or the workers of a Dask scheduler."""
     if scheduler is not None:
         if workers is not None:
             raise invalid("--workers", "are local; those of a scheduler are its own")

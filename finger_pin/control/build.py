@@ -42,9 +42,6 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     Args:
         scenario: The scenario, its name, or the path of a file.
         finger: Its finger, if it is built already.
-
-    Raises:
-        InputError: If the joint friction that it is to compensate is believed to lock the finger.
     """
     scenario = load_scenario(scenario)
     routing = finger.routing if finger is not None else Routing.from_description(scenario.finger)

@@ -95,10 +95,6 @@ class ClosedLoop:
                 of the k joints that no passive tendon drives.
             fingertip_force: Replaces F: times (m,), s, and forces (m, 3), N, base frame; (m, 3 f) of several fingers.
             finger: Replaces the finger that its description makes, such as one with rows of its own.
-
-        Raises:
-            InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape
-                or are not finite, or tensions are negative.
         """
         start, environments = scenario.simulation.start_time, scenario.environments()
         finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)

@@ -13,11 +13,7 @@ _DEFAULT_MAXIMUM = 20.0
 
 
 def input_ranges(finger: Finger) -> tuple[Array, Array]:
-    """Return least and largest inputs: tensions or, of winches, lengths, and what the actuators of a tree take.
-
-    Raises:
-        InputError: If an actuator's input has no range, and it holds no joint whose range would say.
-    """
+    """Return least and largest inputs: tensions or, of winches, lengths, and what the actuators of a tree take."""
     description, winched = finger.description, finger.routing.winched
     excursion = finger.excursion(_corners(finger)).T if winched.any() else np.zeros((len(winched), 1))
     ranges = [

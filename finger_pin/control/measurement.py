@@ -12,11 +12,7 @@ from finger_pin.typing import Array
 
 
 def readings(sensors: Sequence[SampledSensor], now: Instant) -> dict[str, Array]:
-    """Return the readings of sensors, by their names.
-
-    Raises:
-        InputError: If two have the same name, or one reads another number of values than it has names for.
-    """
+    """Return the readings of sensors, by their names."""
     routing, by_name = now.loop.finger.routing, {}
     for sensor in sensors:
         names = sensor.labels or {"joint": routing.joints, "tendon": routing.tendons}.get(sensor.dimension, ())

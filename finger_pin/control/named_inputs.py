@@ -41,9 +41,6 @@ def inputs_by_name(entry: str, commands: Mapping[str, Any], finger: Finger, *, w
         commands: A number by name: of `input_indices`, or of a tendon or an actuator of a tree alone.
         finger: The finger.
         with_loops: Whether motors in position drive have loops, which give them their voltages.
-
-    Raises:
-        InputError: If a name is none of an input, or one is missing.
     """
     indices = input_indices(finger)
     if with_loops:

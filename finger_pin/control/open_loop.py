@@ -67,9 +67,6 @@ class OpenLoopTensions(LoopController):
         """Return the tensions through samples: times, shape (m,), s, and tensions, shape (m, a), N, of winches m.
 
         Inputs of a tree's actuators follow in further columns.
-
-        Raises:
-            InputError: If shapes or numbers are wrong, or a tension is negative.
         """
         columns = (*routing.tendons[: routing.actuated], *scenario.finger.tree.actuators)
         signal = Signal.from_samples("controller", samples, columns, scenario.simulation.rtol)

@@ -119,9 +119,6 @@ class PositionDrives:
             voltages: From `motor_signals.voltage_signals`, in place of the loops.
             supplies: From there, in place of the motors' own.
             memory: Of the sample that was taken last, where a run goes on.
-
-        Raises:
-            InputError: If a goal is beyond what its encoder can be told, or drives differ in their period.
         """
         period = loop_period(finger)
         self._controller, actuators = controller, finger.actuators
@@ -223,11 +220,7 @@ def _positioned_actuators(finger: Finger) -> list[tuple[str, Actuator]]:
 
 
 def loop_period(finger: Finger) -> float:
-    """Return the sampling period of all motors of a finger in position drive, s.
-
-    Raises:
-        InputError: If drives differ in their period.
-    """
+    """Return the sampling period of all motors of a finger in position drive, s."""
     positioned = _positioned_actuators(finger)
     period = positioned[0][1].position_loop.period
     for name, actuator in positioned:

@@ -117,9 +117,6 @@ def sampling_settings(scenario: Scenario, period: float | None) -> SamplingSetti
     Args:
         scenario: With the entries ``controller.sampling``, if any.
         period: In place of theirs, s.
-
-    Raises:
-        InputError: If the period is not positive, or the method cannot sample.
     """
     settings, method = scenario.controller.sampling, scenario.simulation.method
     if period is not None and not 0.0 < period < math.inf:

@@ -48,22 +48,14 @@ class UserReference:
     """
 
     def __init__(self, reference: Reference, joints: Sequence[str], start: float) -> None:
-        """Take a reference.
-
-        Raises:
-            InputError: If it has no ``at``.
-        """
+        """Take a reference."""
         if not callable(getattr(reference, "at", None)):
             allowed = "must have at(time), or be a pair of arrays: times, and angles with one row for each"
             raise InputError("reference", allowed, type(reference).__name__)
         self.reference, self.joints, self.start = reference, joints, start
 
     def at(self, time: Array | float) -> ReferenceSignals:
-        """Return theta^d and its rate at one time, or at times of shape (m,).
-
-        Raises:
-            InputError: If either is not n finite numbers.
-        """
+        """Return theta^d and its rate at one time, or at times of shape (m,)."""
         if np.ndim(time) == 0:
             return self._at_instant(float(time))
         answers = [self._at_instant(float(each)) for each in np.asarray(time)]
@@ -106,11 +98,7 @@ class UserController(LoopController):
     """
 
     def __init__(self, controller: Controller, finger: Finger, start: float) -> None:
-        """Take a controller; ``start`` is its time when the simulation begins, s.
-
-        Raises:
-            InputError: If it has no ``command``.
-        """
+        """Take a controller; ``start`` is its time when the simulation begins, s."""
         if not callable(getattr(controller, "command", None)):
             allowed = (
                 "must have command(time, reference, position, velocity), or be a pair of arrays: times, and tensions"
@@ -127,11 +115,7 @@ class UserController(LoopController):
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
-        """Return the commands for shapes (..., n).
-
-        Raises:
-            InputError: If the first answer has a wrong size, or a tension that is negative or not finite.
-        """
+        """Return the commands for shapes (..., n)."""
         if np.ndim(position) == 1:
             return self._at_instant(float(time), reference, position, velocity)
         times = np.broadcast_to(time, len(position))
@@ -238,11 +222,7 @@ def with_named_samples(
 
 
 def choose_controller(controller: Controller | Samples | None, scenario: Scenario, finger: Finger) -> LoopController:
-    """Return the controller that a caller gives, ready to be asked, or the scenario's if none is given.
-
-    Raises:
-        InputError: If it does not fit the finger.
-    """
+    """Return the controller that a caller gives, ready to be asked, or the scenario's if none is given."""
     if controller is None:
         return build_controller(scenario, finger)
     if isinstance(controller, tuple | list):
@@ -253,11 +233,7 @@ def choose_controller(controller: Controller | Samples | None, scenario: Scenari
 
 
 def choose_reference(reference: Reference | Samples | None, scenario: Scenario, routing: Routing) -> LoopReference:
-    """Return the reference that a caller gives, ready to be asked, or the scenario's if none is given.
-
-    Raises:
-        InputError: If it does not fit the finger.
-    """
+    """Return the reference that a caller gives, ready to be asked, or the scenario's if none is given."""
     if reference is None:
         return SignalReference.from_scenario(scenario, routing)
     if isinstance(reference, tuple | list):

@@ -36,9 +36,6 @@ class PassiveCoupling:
             routing: The routing.
             tension: f_5^d, shape (p,), N.
             stiffness: K_t, shape (p,), N/m.
-
-        Raises:
-            InputError: If two passive tendons would determine the same joint.
         """
         size = len(routing.joints)
         rows, followers = [], []

@@ -130,11 +130,7 @@ def _joined_lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]])
 
 
 def _common_value(key: str, values: Sequence[str]) -> str:
-    """Return the value of all fingers.
-
-    Raises:
-        InputError: If they have several.
-    """
+    """Return the value of all fingers."""
     if len({*values}) > 1:
         raise InputError("hand.fingers", f"must have one {key}, not {', '.join(dict.fromkeys(values))}")
     return values[0]

@@ -193,11 +193,7 @@ def expand(value: Numbers, size: int) -> NDArray[np.float64]:
 
 
 def finite_vector(name: str, value: Sequence[float] | NDArray[np.float64], size: int) -> NDArray[np.float64]:
-    """Return an argument as an array of ``size`` numbers.
-
-    Raises:
-        InputError: If it has another shape or a number is not finite; ``name`` names the argument.
-    """
+    """Return an argument as an array of ``size`` numbers."""
     numbers = np.asarray(value, dtype=float)
     if numbers.shape != (size,) or not np.isfinite(numbers).all():
         raise InputError(name, f"must be {size} finite {'number' if size == 1 else 'numbers'}", numbers.tolist())
@@ -218,9 +214,6 @@ def validate(model: type[_Model], table: Any, prefix: tuple[str, ...]) -> _Model
         model: Which description.
         table: Keys and values as TOML has them.
         prefix: Place of the table in the whole input, for messages.
-
-    Raises:
-        InputError: Naming the first entry that is wrong.
     """
     try:
         return model.model_validate(table)

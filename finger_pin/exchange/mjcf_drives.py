@@ -36,9 +36,6 @@ def add_equalities(
         description: The finger.
         bodies: Elements by body; that of the world by None.
         mobility: Of its joints and bodies.
-
-    Raises:
-        InputError: If a coupling has a power that MuJoCo has not.
     """
     tree = description.tree
     table = ET.SubElement(root, "equality")
@@ -67,11 +64,7 @@ def _polynomial(entry: str, coupling: Coupling, description: FingerDescription) 
 
 
 def add_actuators(root: ET.Element, description: FingerDescription, step: float) -> None:
-    """Add the motors of tendons that ideal sources pull, and the actuators of a tree, for a time step, s.
-
-    Raises:
-        InputError: If MuJoCo has no actuator of an entry.
-    """
+    """Add the motors of tendons that ideal sources pull, and the actuators of a tree, for a time step, s."""
     table = ET.SubElement(root, "actuator")
     for name, tendon in description.tendons.items():
         entry = f"finger.tendons.{name}"
@@ -132,9 +125,6 @@ def add_keyframes(
     """Add the keyframes, or one called start with a posture, shape (n,), rad, on top of the first.
 
     The place of a body at a posture, shape (n,), is that of mocap bodies.
-
-    Raises:
-        InputError: If the posture has the wrong size.
     """
     tree, table = description.tree, ET.SubElement(root, "keyframe")
     keyframes = dict(tree.keyframes)

@@ -26,10 +26,6 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
     """Add friction of tendons (9), (14), (16) and of joints (9), (17) to an MJCF that has both.
 
     A passive tendon without its mass is a spring, and rubs as a driven tendon that its spring pulls.
-
-    Raises:
-        InputError: If tendons rub at several bends, as a tendon of MuJoCo has one force along all of its length, or
-            joints by another law.
     """
     check_friction(description, tendons.at_bends)
     frictions = [*_tendon_frictions(description, tendons, massless), *_joint_frictions(description, tendons)]

@@ -66,11 +66,7 @@ def add_geom(
 
 
 def add_objects(world: ET.Element, tree: Tree) -> dict[str, str]:
-    """Add objects, free bodies and geoms that stand; return the names of their geoms.
-
-    Raises:
-        InputError: If one is moved along a path.
-    """
+    """Add objects, free bodies and geoms that stand; return the names of their geoms."""
     geoms = {}
     for name, item in tree.objects.items():
         if item.path:

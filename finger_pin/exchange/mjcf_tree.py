@@ -53,11 +53,7 @@ def tree_to_mjcf(
     limits: bool,
     shapes: bool,
 ) -> str:
-    """Return the MJCF of a finger that has a tree of bodies, as text; arguments are those of `to_mjcf`.
-
-    Raises:
-        InputError: If MuJoCo cannot have an entry: it names it.
-    """
+    """Return the MJCF of a finger that has a tree of bodies, as text; arguments are those of `to_mjcf`."""
     writer = _Writer(description, limits, shapes)
     step = min(_MAX_STEP, float(f"{_STEP_SHARE / writer.fastest:.0e}")) if timestep is None else timestep
     root = ET.Element("mujoco", model=description.name)

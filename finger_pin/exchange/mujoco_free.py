@@ -96,11 +96,7 @@ class FreeBodies:
         return dict(zip(self.labels[body], [*displacement.tolist(), *angles.tolist()], strict=True))
 
     def velocity(self, joint: int, qpos: Array, qvel: Array) -> dict[str, float]:
-        """Return the speeds of a body's slides and hinges in a state of the model.
-
-        Raises:
-            InputError: If it turns while the middle hinge is at a right angle.
-        """
+        """Return the speeds of a body's slides and hinges in a state of the model."""
         body, name, _ = self._reference_pose(joint)
         address, first = int(self.model.jnt_qposadr[joint]), int(self.model.jnt_dofadr[joint])
         current, omega = _rotation(qpos[address + 3 : address + 7]), qvel[first + 3 : first + 6]

@@ -55,11 +55,7 @@ class Checkpoint:
                 self._results = {}
 
     def __enter__(self) -> Self:
-        """Make the folder.
-
-        Raises:
-            InputError: If it cannot be made.
-        """
+        """Make the folder."""
         if self._path is not None:
             try:
                 self._created = not self._path.parent.exists()

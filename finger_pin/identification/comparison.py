@@ -85,11 +85,7 @@ def bic(
 
 
 def other_laws(problem: Problem, settings: IdentifySettings) -> dict[str, Problem]:
-    """Return the problem under each of the other laws, by name.
-
-    Raises:
-        InputError: If an entry of a law is wrong.
-    """
+    """Return the problem under each of the other laws, by name."""
     return {name: _alternative(problem, name, each) for name, each in settings.compare.items()}
 
 

@@ -47,11 +47,7 @@ class ImposedMotion(RecordedMotion):
         window: int = 0,
         finger: Finger | None = None,
     ) -> None:
-        """Put the inputs into the scenario, in place of its own commands; as `RecordedMotion`.
-
-        Raises:
-            InputError: If a joint's motion, or a command that is no force, is missing.
-        """
+        """Put the inputs into the scenario, in place of its own commands; as `RecordedMotion`."""
         scenario, self._dropped = without_commands(scenario, recording)
         super().__init__(recording, scenario, rows, window, finger)
 
@@ -65,11 +61,7 @@ class ImposedMotion(RecordedMotion):
         return [*super().warnings(searched_keys), *([dropped] if self._dropped else []), *filter(None, noisy)]
 
     def _read_imposed_motion(self, scenario: Scenario) -> None:
-        """Fit the splines.
-
-        Raises:
-            InputError: If a joint's motion is missing, too short, smoothed away or beyond the joint's stops.
-        """
+        """Fit the splines."""
         recording = self.recording
         entry = f"{self._entry}.inputs"
         self._joint_columns = {joint: f"{IMPOSED}.{joint}" for joint in scenario.finger.joints}

@@ -35,11 +35,7 @@ class Limits:
 
     @classmethod
     def from_parts(cls, parts: Sequence[ScenarioPart], parameters: Sequence[str], low: Array, high: Array) -> Limits:
-        """Return the limits of parts; refuse bounds outside a range, or without any allowed values.
-
-        Raises:
-            InputError: Naming the key, its bound and what is wrong with it.
-        """
+        """Return the limits of parts; refuse bounds outside a range, or without any allowed values."""
         limits = cls(parts, [scenario_key(key) for key in parameters], low, high)
         keys, middle = limits.keys, 0.5 * (limits.low + limits.high)
         corners = limits._corners(middle, np.ones(len(keys), dtype=bool))

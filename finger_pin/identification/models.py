@@ -32,11 +32,7 @@ from finger_pin.typing import Array
 def build_problem(
     scenario: Scenario, settings: IdentifySettings, recordings: Sequence[Recording], finger: Finger | None = None
 ) -> Problem:
-    """Return the problem whose objective is to be minimised.
-
-    Raises:
-        InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
-    """
+    """Return the problem whose objective is to be minimised."""
     models, signals = recording_models(scenario, recordings, finger, [~held_out_rows(each) for each in recordings])
     bounds = settings.bounds
     low, high = np.array(list(bounds.values()), dtype=float).T
@@ -78,11 +74,7 @@ def held_out_rows(recording: Recording) -> NDArray[np.bool_]:
 def recording_models(
     scenario: Scenario, recordings: Sequence[Recording], finger: Finger | None, selected: Sequence[NDArray[np.bool_]]
 ) -> tuple[list[RecordingModel], list[RecordedSignal]]:
-    """Return the models of recordings, one for each window with selected rows, and all their outputs.
-
-    Raises:
-        InputError: If an input or output names nothing of the scenario.
-    """
+    """Return the models of recordings, one for each window with selected rows, and all their outputs."""
     models: list[RecordingModel] = []
     signals: list[RecordedSignal] = []
     for recording, selected_rows in zip(recordings, selected, strict=True):

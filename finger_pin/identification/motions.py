@@ -60,11 +60,7 @@ class RecordedMotion:
         window: int = 0,
         finger: Finger | None = None,
     ) -> None:
-        """Put the inputs into the scenario; a finger may replace the one that it describes.
-
-        Raises:
-            InputError: If an input names nothing that the scenario has, or a start cannot be reached.
-        """
+        """Put the inputs into the scenario; a finger may replace the one that it describes."""
         self.recording, self.rows = recording, rows
         self._entry = f"identify.recordings.{recording.name}"
         self._start_time = float(recording.time[rows[0]])

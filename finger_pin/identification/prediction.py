@@ -65,9 +65,6 @@ def predict(
         of runs with equal inputs, not a number without any, ``prediction_beyond``, the share of loads outside of those
         that were fitted; along ``predicted``, the samples: ``predicted_measured``,
         ``predicted_value`` and ``predicted_band``, half its width.
-
-    Raises:
-        InputError: If a recording is wrong, or a finger is missing that `identify` was given.
     """
     if result.attrs.get("custom_finger") and finger is None:
         raise InputError("finger", "is missing: this identification was given a finger that its scenario does not have")
@@ -83,11 +80,7 @@ def predict(
 
 
 def check_predictable(scenario: Scenario, recordings: Sequence[Recording], finger: Finger | None) -> None:
-    """Compute the held-out part of recordings once, under the scenario as it is, before any work.
-
-    Raises:
-        InputError: If an entry of one is wrong.
-    """
+    """Compute the held-out part of recordings once, under the scenario as it is, before any work."""
     for recording in recordings:
         models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
         if not any(len(signal.measured) for signal in signals):

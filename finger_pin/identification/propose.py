@@ -46,10 +46,6 @@ def propose(
     Returns:
         Along ``candidate``, the best first: ``log_determinant``, and by ``parameter`` the ``deviation`` that the motion
         would leave, together with what is known.
-
-    Raises:
-        InputError: If there are no candidates, parameters or outputs, or one names nothing that there is; if bounds are
-            not in order, or a noise or prior is not positive.
     """
     _check(candidates, parameters, outputs, prior or {})
     keys = list(parameters)

@@ -37,11 +37,7 @@ _MOTOR_INPUTS = ("spool_angle", "motor_voltage")
 
 
 def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) -> None:
-    """Put the inputs of a motion into the table of a scenario.
-
-    Raises:
-        InputError: If one names nothing that a motion is given, two are of one motor, or a tension pushes.
-    """
+    """Put the inputs of a motion into the table of a scenario."""
     entry = f"identify.recordings.{recording.name}"
     for name, values in recording.inputs.items():
         variable, _, label = name.partition(".")
@@ -118,11 +114,7 @@ def without_commands(scenario: Scenario, recording: Recording) -> tuple[Scenario
 
 
 def check_references(recording: Recording, scenario: Scenario) -> None:
-    """Refuse recorded goals of joints without a controller that reads them.
-
-    Raises:
-        InputError: Naming the column.
-    """
+    """Refuse recorded goals of joints without a controller that reads them."""
     parts = scenario.parts()
     for name in recording.inputs:
         variable, _, label = name.partition(".")
@@ -142,11 +134,7 @@ def check_references(recording: Recording, scenario: Scenario) -> None:
 
 
 def with_corrected_inputs(scenario: Scenario, recording: Recording, nuisance: Mapping[str, float]) -> Scenario:
-    """Return a scenario with the scales, offsets and delays of a motion's inputs that are being found.
-
-    Raises:
-        InputError: If an input is of one finger of a hand.
-    """
+    """Return a scenario with the scales, offsets and delays of a motion's inputs that are being found."""
     for name, values in recording.inputs.items():
         if name.startswith(f"{IMPOSED}."):
             continue

@@ -164,11 +164,7 @@ def unit_of(name: str) -> str:
 
 
 def check_tension_sign(entry: str, tension: Array) -> None:
-    """Refuse recorded tensions that are negative by more than a wrong zero makes them; below 0 N a cord is slack.
-
-    Raises:
-        InputError: Naming the row of the least one.
-    """
+    """Refuse recorded tensions that are negative by more than a wrong zero makes them; below 0 N a cord is slack."""
     least, greatest = float(tension.min()), float(tension.max())
     if least < -_ZERO_ERROR_SHARE * max(greatest, 0.0):
         hint = "" if greatest > 0.0 else "; scale = -1 turns the sign of a column"
@@ -179,11 +175,7 @@ def check_tension_sign(entry: str, tension: Array) -> None:
 def read_recording(
     name: str, settings: RecordingSettings, data: Mapping[str, Sequence[float] | Array] | None = None
 ) -> Recording:
-    """Read a recording from its file, or from arrays by the names of columns.
-
-    Raises:
-        InputError: If the file cannot be read, a column is missing or not of numbers, or a unit does not fit.
-    """
+    """Read a recording from its file, or from arrays by the names of columns."""
     entry = f"identify.recordings.{name}"
     if data is None and settings.file is None:
         raise InputError(f"{entry}.file", "is missing: the path of a CSV file")
@@ -239,11 +231,7 @@ def wraparound_warning(recording: Recording) -> str:
 
 
 def check_angles(recording: Recording, scenario: Scenario) -> None:
-    """Ask about angles of joints without a unit that are beyond the joint's range as radians, and not as degrees.
-
-    Raises:
-        InputError: Naming the column and its farthest angle.
-    """
+    """Ask about angles of joints without a unit that are beyond the joint's range as radians, and not as degrees."""
     for group, columns in (("inputs", recording.inputs), ("outputs", recording.outputs)):
         for name in recording.unitless.intersection(columns):
             variable, _, joint = name.partition(".")
@@ -259,11 +247,7 @@ def check_angles(recording: Recording, scenario: Scenario) -> None:
 
 
 def _signal(table: Table, key: str, column: Column) -> Array:
-    """Return a column in SI; cells of outputs may be empty, and angles of joints are asked about.
-
-    Raises:
-        InputError: As `Table.column`, and if an angle is beyond two turns.
-    """
+    """Return a column in SI; cells of outputs may be empty, and angles of joints are asked about."""
     group, _, name = key.partition(".")
     values = table.column(key, column, unit_of(name), missing=group == "outputs")
     if name.startswith("joint_position.") and np.nanmax(np.abs(values), initial=0.0) > MOST_ANGLE:

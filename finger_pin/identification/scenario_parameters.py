@@ -43,20 +43,12 @@ class ScenarioPart:
     factors: Array
 
     def scenario_at(self, values: Array) -> Scenario:
-        """Return the scenario at values of all parameters that are keys of a scenario.
-
-        Raises:
-            InputError: Naming the entry that is wrong.
-        """
+        """Return the scenario at values of all parameters that are keys of a scenario."""
         return self.family.with_values((self.factors * values[self.indices]).tolist())
 
     @classmethod
     def from_keys(cls, scenario: Scenario, recording: str | None, keys: Sequence[str]) -> ScenarioPart:
-        """Return the scenarios of a recording, by the keys that are shared or of this recording.
-
-        Raises:
-            InputError: If the scenario has no such key.
-        """
+        """Return the scenarios of a recording, by the keys that are shared or of this recording."""
         acting = [k for k, key in enumerate(keys) if recording is None or acts_on(key, recording)]
         # The first entry of a key comes last: a search starts from its value.
         entries = [(k, *entry) for k in acting for entry in reversed(tied_entries(keys[k]))]
@@ -74,22 +66,14 @@ class ScenarioPart:
 
 
 def with_parameters(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
-    """Return a scenario with values of parameters that all recordings share, by key.
-
-    Raises:
-        InputError: Naming the entry that is wrong.
-    """
+    """Return a scenario with values of parameters that all recordings share, by key."""
     for key in filter(recording_pattern, values):
         raise InputError(key, "is of recordings, and this is a number of the scenario for all of them")
     return ScenarioPart.from_keys(scenario, None, tuple(values)).scenario_at(np.array([*values.values()], dtype=float))
 
 
 def tied_entries(key: str) -> list[tuple[str, float]]:
-    """Return the entries of a scenario that a parameter sets, ``A & 0.5 * B`` both, and the factor of each on it.
-
-    Raises:
-        InputError: If a factor is no number or zero, or an entry is set twice.
-    """
+    """Return the entries of a scenario that a parameter sets, ``A & 0.5 * B`` both, and the factor of each on it."""
     entries: dict[str, float] = {}
     for number, part in enumerate(scenario_key(key).split("&")):
         factor, star, entry = part.strip().partition(" * ")
@@ -148,11 +132,7 @@ def key_in(key: str, recording: str) -> str:
 
 
 def check_duplicates(keys: Sequence[str], recordings: Iterable[str]) -> None:
-    """Refuse two parameters of the same entry of a recording.
-
-    Raises:
-        InputError: Naming one of them.
-    """
+    """Refuse two parameters of the same entry of a recording."""
     for recording in recordings:
         keys_by_target: dict[str, str] = {}
         for key in keys:
@@ -190,9 +170,6 @@ def is_scenario_key(key: str, columns: Iterable[str]) -> bool:
     Args:
         key: Dotted key.
         columns: Names of all inputs and outputs, with their recordings.
-
-    Raises:
-        InputError: If it is neither.
     """
     names = sorted(columns)
     if recording_pattern(key) is None or corrected_column(key, names):
@@ -205,11 +182,7 @@ def is_scenario_key(key: str, columns: Iterable[str]) -> bool:
 
 
 def check_shadowing(recording: str, settings: RecordingSettings, keys: Sequence[str]) -> None:
-    """Refuse an entry of one recording that would hide, or be hidden by, a parameter that all recordings share.
-
-    Raises:
-        InputError: Naming the recording's entry.
-    """
+    """Refuse an entry of one recording that would hide, or be hidden by, a parameter that all recordings share."""
     shared = [key for key in keys if recording_pattern(key) is None]
     recording_keys = [scenario_key(key) for key in keys if recording_pattern(key) and acts_on(key, recording)]
     for group, names in (("values", settings.values), ("parameters", recording_keys)):
@@ -223,11 +196,7 @@ def check_shadowing(recording: str, settings: RecordingSettings, keys: Sequence[
 
 
 def with_recorded_values(scenario: Scenario, recording: str, settings: RecordingSettings) -> Scenario:
-    """Return the scenario of a recording, with the parameters that belong to it alone.
-
-    Raises:
-        InputError: Naming the recording's entry.
-    """
+    """Return the scenario of a recording, with the parameters that belong to it alone."""
     for key, value in settings.values.items():
         try:
             scenario = ParametrisedScenario(scenario, (key,)).with_values([value])

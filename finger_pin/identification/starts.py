@@ -59,11 +59,7 @@ def recorded_starts(recording: Recording, rows: NDArray[np.intp], joints: Collec
 
 
 def check_reachable(entry: str, starts: Mapping[str, tuple[float, float]], scenario: Scenario) -> None:
-    """Refuse starts whose angles are far beyond joints' ranges.
-
-    Raises:
-        InputError: Naming the entry.
-    """
+    """Refuse starts whose angles are far beyond joints' ranges."""
     for joint, (angle, _) in starts.items():
         low, high = scenario.finger.joints[joint].range
         if not low - RANGE_MARGIN <= angle <= high + RANGE_MARGIN:

@@ -36,12 +36,7 @@ class SteadyReadings:
     """
 
     def __init__(self, recording: Recording, scenario: Scenario, replacement: Finger | None = None) -> None:
-        """Find the inputs; a finger may replace the one that the scenario describes.
-
-        Raises:
-            InputError: If one names nothing that the scenario has, if the tension of a tendon is missing, if all of
-                one are negative, or if no one direction of sliding tells where joints come to rest.
-        """
+        """Find the inputs; a finger may replace the one that the scenario describes."""
         self.recording, self._entry = recording, f"identify.recordings.{recording.name}"
         goals = [name for name in recording.inputs if name.partition(".")[0] in _GOALS]
         actuators = scenario.finger.actuators.items()

@@ -49,9 +49,6 @@ class Action(LoopController):
             duration: Of an episode, s.
             nominal: Finger that the drives assume: goals of joints become angles of its spools.
             coupling: The joints that passive tendons drive.
-
-        Raises:
-            InputError: If the finger has no such actuators.
         """
         self._finger, holds = finger, finger.actuators.holds
         self.channels = finger.actuators.voltages
@@ -174,11 +171,7 @@ class Action(LoopController):
         return np.maximum(np.searchsorted(self._starts, np.asarray(time) * (1.0 + 1e-12), side="right") - 1, 0)
 
     def action_range(self, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Array, Array]:
-        """Return least and largest action, shape (k,) each.
-
-        Raises:
-            InputError: If limits do not fit.
-        """
+        """Return least and largest action, shape (k,) each."""
         if limits is None:
             return self.low, self.high
         try:

@@ -74,9 +74,6 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 randomise: Distributions by dotted key of the scenario, drawn at every reset; also ``action.delay``, s,
                     and ``observation.NAME.offset``, ``.noise``, ``.quantisation`` of a sensor. Or the path of an
                     identified scenario: its parameters are drawn from their intervals.
-
-        Raises:
-            InputError: Naming the argument, key or variable that is wrong.
         """
         self.task, self.render_mode = Task.from_entries(task), read_render_mode(render_mode)
         self._worlds = Worlds(scenario, self.task, 1, finger)

@@ -31,11 +31,7 @@ class Randomisation:
     """
 
     def __init__(self, task: Task) -> None:
-        """Read a task.
-
-        Raises:
-            InputError: If a key of a sensor or of the action does not exist.
-        """
+        """Read a task."""
         source = task.randomise
         distributions = read_identified(source) if isinstance(source, str | os.PathLike) else source
         if not isinstance(distributions, Mapping):
@@ -89,11 +85,7 @@ class Randomisation:
         return replace(sensor, **fields) if fields else sensor
 
     def delay(self, draws: Mapping[str, Any], delay: float) -> float:
-        """Return the drawn delay of the action, s; that of the task if none was drawn.
-
-        Raises:
-            InputError: If it is negative.
-        """
+        """Return the drawn delay of the action, s; that of the task if none was drawn."""
         delay_draw = draws.get(DELAY_KEY, delay)
         if not is_number(delay_draw) or not 0.0 <= delay_draw < np.inf:
             raise InputError(DELAY_KEY, "must be a finite number of seconds, not negative", delay_draw)
@@ -115,9 +107,6 @@ def read_identified(path: str | os.PathLike[str]) -> dict[str, Distribution]:
 
     Args:
         path: Path of ``identified.toml``; ``identification.nc`` is in the same folder.
-
-    Raises:
-        InputError: If there is none, or a parameter is open at one side: it has no interval to draw from.
     """
     import xarray as xr
 

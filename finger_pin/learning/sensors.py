@@ -36,11 +36,7 @@ class Sensor:
                 raise InputError(f"Sensor.{name}", "must be finite, and not negative but for an offset", value)
 
     def periods(self, period: float, name: str) -> int:
-        """Return the delay in control periods.
-
-        Raises:
-            InputError: If it is not a whole number of them.
-        """
+        """Return the delay in control periods."""
         count = round(self.delay / period)
         if abs(count * period - self.delay) > 1e-9:
             allowed = f"must be a multiple of the control period {period:g} s"
@@ -97,9 +93,5 @@ class Measurement:
 
 
 def measurements(sensors: Mapping[str, Sensor], worlds: int, period: float) -> dict[str, Measurement]:
-    """Return the sensors of all variables in some worlds.
-
-    Raises:
-        InputError: If a delay is no whole number of control periods.
-    """
+    """Return the sensors of all variables in some worlds."""
     return {name: Measurement(worlds, sensor.periods(period, name)) for name, sensor in sensors.items()}

@@ -46,11 +46,7 @@ class Task:
 
     @classmethod
     def from_entries(cls, entries: Mapping[str, Any]) -> Task:
-        """Return a task with entries by name.
-
-        Raises:
-            InputError: If there is no such entry, the reward is missing, or an entry is wrong.
-        """
+        """Return a task with entries by name."""
         names = [task_field.name for task_field in fields(cls)]
         for name in entries:
             if name not in names:
@@ -108,11 +104,7 @@ class Task:
         return {name: sensor for name, sensor in self._observations.items() if isinstance(sensor, Sensor)}
 
     def derive(self, signals: Signals, worlds: int) -> dict[str, Array]:
-        """Return the observations that are functions of readings and draws, by name, shapes (worlds, ...).
-
-        Raises:
-            InputError: If a function returns another shape, or what is not finite.
-        """
+        """Return the observations that are functions of readings and draws, by name, shapes (worlds, ...)."""
         values_by_name = {}
         for name, (entry, function) in self._functions.items():
             value = _evaluate(entry, function, signals)
@@ -136,11 +128,7 @@ class Task:
         return tuple(dict.fromkeys([*self.sensors, *self.privileged]))
 
     def judge(self, signals: Signals, worlds: int) -> tuple[Array, Array]:
-        """Return rewards and whether the end is reached, for all worlds, shape (worlds,) each.
-
-        Raises:
-            InputError: If a function returns another shape, or a reward is not finite.
-        """
+        """Return rewards and whether the end is reached, for all worlds, shape (worlds,) each."""
         reward = _evaluate_scalar("reward", self.reward, signals, worlds)
         if not all_finite(reward):
             raise InputError("reward", "must return finite numbers", reward.tolist())

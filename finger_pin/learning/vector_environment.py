@@ -44,9 +44,6 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             finger: As for `Environment`.
             render_mode: As for `Environment`.
             task: As for `Environment`.
-
-        Raises:
-            InputError: Naming the argument, key or variable that is wrong.
         """
         if not isinstance(num_envs, int | np.integer) or num_envs < 1:
             raise InputError("num_envs", "must be a whole number above 0", num_envs)

@@ -73,11 +73,7 @@ class World:
 
     @classmethod
     def from_scenario(cls, scenario: ScenarioLike, task: Task, finger: FingerLike | None = None) -> World:
-        """Return a world of a scenario, on a custom finger if there is one.
-
-        Raises:
-            InputError: Naming the key or variable that is wrong.
-        """
+        """Return a world of a scenario, on a custom finger if there is one."""
         loaded = load_scenario(scenario)
         custom_finger = resolve_finger(finger, loaded)
         scenario = with_finger(loaded, custom_finger)
@@ -157,11 +153,7 @@ class World:
         return bool(self.reason) or self._step >= self.task.steps
 
     def reset(self, random: np.random.Generator) -> None:
-        """Reset for an episode.
-
-        Raises:
-            InputError: If a draw is not allowed.
-        """
+        """Reset for an episode."""
         self._random, self.reason, self._step, self.now = random, "", 0, 0.0
         self.sampled = self._randomisation.sample_context(random)
         if self._randomisation.keys:

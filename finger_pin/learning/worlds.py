@@ -31,11 +31,7 @@ class Worlds:
     """
 
     def __init__(self, scenario: ScenarioLike, task: Task, count: int, finger: FingerLike | None) -> None:
-        """Build the worlds.
-
-        Raises:
-            InputError: Naming the key or variable that is wrong.
-        """
+        """Build the worlds."""
         world_template = World.from_scenario(scenario, task, finger)
         self.task, self.worlds = task, [world_template, *(world_template.twin() for _ in range(count - 1))]
         loops, actions = [world.origin for world in self.worlds], [world.action for world in self.worlds]
@@ -62,11 +58,7 @@ class Worlds:
         self._find_variables()
 
     def spaces(self) -> tuple[Box, Box]:
-        """Return the spaces of one world's observations and actions, both of 32-bit floats.
-
-        Raises:
-            InputError: If limits do not fit.
-        """
+        """Return the spaces of one world's observations and actions, both of 32-bit floats."""
         low, high = self.worlds[0].action.action_range(self.task.limits)
         observations = self.observe(np.arange(1), for_reward=False)[0]
         return Box(-np.inf, np.inf, observations.shape[1:], np.float32), Box(
@@ -79,9 +71,6 @@ class Worlds:
         Args:
             indices: Their indices.
             randoms: Generators of all worlds, for all draws.
-
-        Raises:
-            InputError: If a draw is not allowed.
         """
         self._randoms = list(randoms)
         for i in indices:
@@ -116,9 +105,6 @@ class Worlds:
         """Return the observations in some worlds, shape (k, o), and the true signals in all by name, shapes (w, ...).
 
         Without ``for_reward`` signals are only those that sensors read.
-
-        Raises:
-            InputError: If a function that is observed returns another shape, or what is not finite.
         """
         snapshot = self._snapshot
         snapshot.clear_signals()
@@ -147,11 +133,7 @@ class Worlds:
 
 
 def read_actions(actions: Any, low: Array, high: Array) -> Array:
-    """Return actions as an array within their bounds, of their shape.
-
-    Raises:
-        InputError: If they have another shape, or are not finite.
-    """
+    """Return actions as an array within their bounds, of their shape."""
     try:
         array = np.asarray(actions, dtype=float)
     except (TypeError, ValueError):
@@ -164,11 +146,7 @@ def read_actions(actions: Any, low: Array, high: Array) -> Array:
 
 
 def read_render_mode(mode: str | None) -> str | None:
-    """Return the mode of pictures.
-
-    Raises:
-        InputError: If there is no such mode.
-    """
+    """Return the mode of pictures."""
     if mode not in (None, "rgb_array"):
         raise InputError("render_mode", 'must be "rgb_array" or None', mode)
     return mode

@@ -98,9 +98,6 @@ def assemble(
         paths: Its tendons on that body.
         parts: Its other parts.
         args: Rows, objects and replacements of the user's own.
-
-    Raises:
-        InputError: As `Finger`.
     """
     _warn_of_turns(description)
     routing, tendons, actuators, joint_friction, stroke_limiter, springs = parts

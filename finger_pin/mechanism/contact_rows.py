@@ -83,11 +83,7 @@ def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> P
 
 
 def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
-    """Refuse a configuration of shape (nq,) in which bodies are deep in each other.
-
-    Raises:
-        InputError: Naming the pair and how deep it is.
-    """
+    """Refuse a configuration of shape (nq,) in which bodies are deep in each other."""
     gaps = path_kinematics(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: contacts.law.arms]
     if gaps.size and gaps.min() < -DEEPEST_START:
         deep, most = -1e3 * float(gaps.min()), 1e3 * DEEPEST_START

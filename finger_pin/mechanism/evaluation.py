@@ -16,11 +16,7 @@ Outputs = Literal["all", "no_acceleration", "row_forces"]
 
 
 def check_outputs(outputs: str) -> None:
-    """Refuse unknown outputs.
-
-    Raises:
-        InputError: Naming those that there are.
-    """
+    """Refuse unknown outputs."""
     if outputs not in get_args(Outputs):
         raise InputError("outputs", f"must be one of {', '.join(get_args(Outputs))}", outputs)
 

@@ -90,9 +90,6 @@ def turned_model(body: RigidBody, slides: bool = False) -> tuple[pin.Model, list
     Args:
         body: The body.
         slides: Whether joints may slide.
-
-    Raises:
-        InputError: If a joint does not turn.
     """
     original, model, turns = body.model, pin.Model(), [np.eye(3)]
     for index in range(1, original.njoints):

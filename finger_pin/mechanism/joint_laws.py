@@ -18,11 +18,7 @@ _PARAMETERS = (*PIN_FRICTION.parameters, "reversal_speed")
 
 
 def joint_law(name: str) -> Law:
-    """Return a law of joint friction by its name, or a user's law as "module:NAME".
-
-    Raises:
-        InputError: If there is none, or it cannot be the friction of a joint.
-    """
+    """Return a law of joint friction by its name, or a user's law as "module:NAME"."""
     if name in PIN_LAWS:
         return PIN_LAWS[name]
     law = _imported(name)
@@ -37,11 +33,7 @@ def joint_law(name: str) -> Law:
 
 
 def _imported(name: str) -> object:
-    """Return the object "module:NAME"; no module is imported unless `LAWS` allows it, since that runs its code.
-
-    Raises:
-        InputError: If the module is neither imported nor allowed, or lacks the name.
-    """
+    """Return the object "module:NAME"; no module is imported unless `LAWS` allows it, since that runs its code."""
     module, _, attribute = name.partition(":")
     allowed = {text.strip() for text in os.environ.get(LAWS, "").split(",")}
     if module not in sys.modules and module not in allowed:

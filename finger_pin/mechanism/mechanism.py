@@ -71,11 +71,7 @@ class Mechanism:
         moved: bool = False,
         prescribed: NDArray[np.int64] | None = None,
     ) -> None:
-        """Join coordinates and rows, as wide as there are coordinates; more inputs than rows have if asked for.
-
-        Raises:
-            InputError: If tables read each other's forces in a circle, or there is no such table, or two have one name.
-        """
+        """Join coordinates and rows, as wide as there are coordinates; more inputs than rows have if asked for."""
         self.body = body
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)

@@ -113,9 +113,6 @@ class Scene:
             description: The finger.
             mechanism: The finger alone.
             placed: Places of a tree's bodies.
-
-        Raises:
-            InputError: If an object has the name of a joint or a shape, or a link has no size.
         """
         hand = description.hand
         extended = add_free_objects(mechanism.body, objects, hand.palm if hand and mechanism.moved else None)
@@ -181,11 +178,7 @@ class Scene:
         return np.array(poses).reshape(-1), np.array(rates).reshape(-1)
 
     def check(self, state: State) -> None:
-        """Refuse a state in which bodies are deep in each other.
-
-        Raises:
-            InputError: Naming the pair.
-        """
+        """Refuse a state in which bodies are deep in each other."""
         placed = _placed(state)
         check_start(self.contacts, self.body, placed)
 

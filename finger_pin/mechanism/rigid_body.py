@@ -51,9 +51,6 @@ class RigidBody:
             model: Pinocchio model with a fixed base.
             tip_frame: Name of the frame at the fingertip, or names of several.
             base_axis: e_1, along which the tendons run at the joints next to the base; base frame.
-
-        Raises:
-            InputError: If a joint neither turns, slides, translates nor is spherical, or there is no such frame.
         """
         for name, joint in zip(model.names[1:], model.joints[1:], strict=True):
             if (joint.nq, joint.nv) != (1, 1) and joint.shortname() not in FREE_JOINTS:

@@ -154,11 +154,7 @@ def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
 
 
 def pairs_apart(objects: Mapping[str, Object], names: Collection[str]) -> set[frozenset[str]]:
-    """Return the names of objects, with those of links, shapes or other objects that they never touch.
-
-    Raises:
-        InputError: If one of these is not known.
-    """
+    """Return the names of objects, with those of links, shapes or other objects that they never touch."""
     for name, obj in objects.items():
         for other in obj.apart:
             if other not in names or other == name:

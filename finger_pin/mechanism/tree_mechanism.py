@@ -72,9 +72,6 @@ def build_body(description: FingerDescription, body: RigidBody | None = None) ->
     Args:
         description: Of the finger.
         body: In place of the body that its links would make.
-
-    Raises:
-        InputError: If a joint moves nothing that has inertia, or a body is given beside those of a tree.
     """
     if not description.tree.bodies:
         body = body or build_rigid_body(description)

@@ -13,12 +13,7 @@ from finger_pin.typing import Array
 
 
 def sort_tables(tables: Sequence[Rows]) -> tuple[Rows, ...]:
-    """Return tables sorted so that every force is evaluated before it is read, stable otherwise.
-
-    Raises:
-        InputError: If forces read each other in a circle, or a table reads one that there is not; also if weights have
-            the wrong shape, or two tables one name.
-    """
+    """Return tables sorted so that every force is evaluated before it is read, stable otherwise."""
     names = [table.group for table in tables]
     for name in names:
         if names.count(name) > 1:
@@ -41,11 +36,7 @@ def sort_tables(tables: Sequence[Rows]) -> tuple[Rows, ...]:
 
 
 def replace_tables(tables: Sequence[Rows], replacements: Mapping[str, Callable[[Rows], Rows]]) -> list[Rows]:
-    """Return tables with some in place of those of their groups.
-
-    Raises:
-        InputError: If there is no such group, or a replacement has other rows, or fewer parameters or signals.
-    """
+    """Return tables with some in place of those of their groups."""
     names = [table.group for table in tables]
     for name in replacements:
         if name not in names:
@@ -75,11 +66,7 @@ def _check_wiring(table: Rows, tables: Sequence[Rows]) -> None:
 
 
 def drive_matrices(tables: Sequence[Rows], tendons: Sequence[str]) -> dict[str, Array]:
-    """Return the weights with which the rows of drives pull t tendons, by table, shape (t, k).
-
-    Raises:
-        InputError: If there is no such tendon.
-    """
+    """Return the weights with which the rows of drives pull t tendons, by table, shape (t, k)."""
     for table in tables:
         for name in table.pulls:
             if name not in tendons:

@@ -35,20 +35,12 @@ class Signals:
     turn: Array
 
     def index(self, name: str) -> int:
-        """Return the index of a tendon or joint in the arrays.
-
-        Raises:
-            InputError: If it has no friction.
-        """
+        """Return the index of a tendon or joint in the arrays."""
         return friction_index(name, self.names)
 
 
 def friction_index(name: str, names: Sequence[str]) -> int:
-    """Return the index of a friction by its name.
-
-    Raises:
-        InputError: If there is none of that name.
-    """
+    """Return the index of a friction by its name."""
     if name not in names:
         raise InputError(f"friction.{name}", f"there are {', '.join(names)}")
     return names.index(name)
@@ -59,9 +51,6 @@ def friction(model: mujoco.MjModel, data: mujoco.MjData) -> Signals:
 
     Arrays are parts of ``data``, without copies, where the model has one such hand; of several attached ones they are
     joined, and copies.
-
-    Raises:
-        InputError: If the model has no friction, or is now integrated by ``discrete``.
     """
     register()
     if int(model.opt.integrator) == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1)):

@@ -34,9 +34,6 @@ def frictions(
 
     A fixed tendon over one joint acts in that joint's row, and fixed tendons that are multiples of each other share
     one. Each branch behind a pulley, a tendon that `add_branches` has made, follows the friction of its tendon.
-
-    Raises:
-        InputError: If nothing pulls a tendon that was named, or a named joint neither turns nor slides.
     """
     plugin_frictions: list[PluginFriction] = []
     spatial_rows: list[tuple[str, Array]] = []

@@ -93,11 +93,7 @@ def _offsets(owner: str, fields: Any, **offsets: int) -> Any:
 
 
 def layout() -> tuple[Model, Data, Contact, Kinds]:
-    """Return offsets in mjModel, mjData and mjContact, bytes, and the numbers of enumerations.
-
-    Raises:
-        InputError: If they do not agree with the addresses of MuJoCo's own arrays, or a field is missing.
-    """
+    """Return offsets in mjModel, mjData and mjContact, bytes, and the numbers of enumerations."""
     version = mujoco.__version__
     try:
         options, start = _structure("mjOption"), _structure("mjModel").opt.offset

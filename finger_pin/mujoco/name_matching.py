@@ -28,11 +28,7 @@ class RoutedFriction(TendonFrictionSettings):
 def match_names(
     patterns: Mapping[str, Mapping[str, Any]] | None, names: list[str], entry: str, kind: type[Description]
 ) -> dict[str, tuple[Any, bool]]:
-    """Return the checked keys of every name that matches, and whether it was written without stars.
-
-    Raises:
-        InputError: If a name matches nothing, or a key or number is not allowed.
-    """
+    """Return the checked keys of every name that matches, and whether it was written without stars."""
     tables: dict[str, dict[str, Any]] = {}
     explicit = set()
     if not isinstance(patterns or {}, Mapping):
@@ -64,10 +60,6 @@ def friction_keys(description: FingerDescription) -> tuple[dict[str, dict[str, A
     """Return the keys with which the tendons and joints of a tree rub as the description says, by name.
 
     They are for the model that `to_mjcf` writes, which has viscous friction of joints and the loss of tendons already.
-
-    Raises:
-        InputError: If tendons rub at several bends, a tendon turns by another angle than its joints, or joints rub by
-            another law than (9).
     """
     tendon_settings, joint_settings = description.tendon_friction, description.joint_friction
     check_friction(description, tendon_settings.place != "canal")

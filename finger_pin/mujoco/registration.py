@@ -77,11 +77,7 @@ def _library() -> ctypes.CDLL:
 
 @cache
 def register() -> None:
-    """Give MuJoCo the plugin, once in a process.
-
-    Raises:
-        InputError: If this version of MuJoCo cannot have it.
-    """
+    """Give MuJoCo the plugin, once in a process."""
     callbacks = _callbacks(*layout())
     library, plugin = _library(), _Plugin()
     library.mjp_defaultPlugin(ctypes.byref(plugin))

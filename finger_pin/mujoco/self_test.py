@@ -18,11 +18,7 @@ SLIDER = """
 
 
 def try_self_test() -> None:
-    """Hold a slider below the limit of its tendon's friction, T (1 - exp(-mu phi)) of tension T, and release it above.
-
-    Raises:
-        InputError: If MuJoCo does not do so, or refuses the model.
-    """
+    """Hold a slider below the limit of its tendon's friction, T (1 - exp(-mu phi)), and release it above."""
     spec = mujoco.MjSpec.from_string(SLIDER)
     law = {"coulomb": 0.2, "curvature_offset": 1.5, "stiction_ratio": 1.0, "viscous": 0.0}
     add_friction(spec, tendons={"rope": law})

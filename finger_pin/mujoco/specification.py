@@ -50,10 +50,6 @@ def add_friction(
         joints: By name, keys of ``finger.joint_friction``.
         of: The finger or hand with a tree of bodies whose friction it is, where `to_mjcf` has written the model;
             ``tendons`` and ``joints`` go on top.
-
-    Raises:
-        InputError: If a name matches nothing, a key or number is not allowed, the model does not compile, has friction
-            already, or is integrated by ``discrete``, which leaves no room for friction.
     """
     if of is not None:
         tendons, joints = (_merged(*each) for each in zip(_described_friction(of), (tendons, joints), strict=True))

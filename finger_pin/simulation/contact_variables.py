@@ -121,11 +121,7 @@ def contact_coordinates(finger: Finger) -> dict[str, Any]:
 
 
 def last_contact_state(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
-    """Return poses and velocities of free objects and the bend of bristles at an instant of a result, packed.
-
-    Raises:
-        InputError: If the result has other contacts or objects.
-    """
+    """Return poses and velocities of free objects and the bend of bristles at an instant of a result, packed."""
     scene = finger.scene
     if scene is None:
         return {}

@@ -48,9 +48,6 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
     Args:
         initial: A packed state, or a result of the same finger, which is continued from its last saved state.
         finger: The finger.
-
-    Raises:
-        InputError: If sizes, names or numbers are not those of a state of this finger.
     """
     if not isinstance(initial, xr.Dataset):
         try:
@@ -80,11 +77,7 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
 
 
 def _fill_rows(finger: Finger, last: xr.Dataset, x: Array) -> None:
-    """Fill the states of canals, actuators of trees, and custom rows and drives from a result's variables.
-
-    Raises:
-        InputError: If a result lacks them.
-    """
+    """Fill the states of canals, actuators of trees, and custom rows and drives from a result's variables."""
     rows, z = {table.group for table in finger.extra_rows}, finger.mechanism.split(x)[2]
     for table, part in zip(finger.mechanism.rows, finger.mechanism.states, strict=True):
         if table.states and table.group in rows:
@@ -95,11 +88,7 @@ def _fill_rows(finger: Finger, last: xr.Dataset, x: Array) -> None:
 
 
 def with_initial_state(loop: ClosedLoop, initial: ArrayLike | xr.Dataset | None) -> ClosedLoop:
-    """Return a loop with an initial state: a packed one, or the last of a result; the loop itself for None.
-
-    Raises:
-        InputError: As `packed_state`.
-    """
+    """Return a loop with an initial state: a packed one, or the last of a result; the loop itself for None."""
     if initial is None:
         return loop
     packed = packed_state(initial, loop.finger)
@@ -107,11 +96,7 @@ def with_initial_state(loop: ClosedLoop, initial: ArrayLike | xr.Dataset | None)
 
 
 def _last_samples(initial: xr.Dataset, finger: Finger) -> LoopMemory | None:
-    """Return the memory of the loops of motors at the end of a result; None where no loop has run.
-
-    Raises:
-        InputError: If the result lacks it.
-    """
+    """Return the memory of the loops of motors at the end of a result; None where no loop has run."""
     if not finger.actuators.holds.any() or "spool_angle" not in initial:
         return None
     last = initial.isel(time=-1)
@@ -122,11 +107,7 @@ def _last_samples(initial: xr.Dataset, finger: Finger) -> LoopMemory | None:
 
 
 def as_finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Return an argument as finite numbers of a shape; a copy.
-
-    Raises:
-        InputError: If it is anything else; ``name`` names the argument.
-    """
+    """Return an argument as finite numbers of a shape; a copy."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -152,9 +133,6 @@ def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:
         finger: With motors or without.
         x: The packed state, shape (size,).
         name: Of the argument, for messages.
-
-    Raises:
-        InputError: Naming the motor and its speed.
     """
     if not finger.actuators.names:
         return

@@ -37,9 +37,6 @@ def record_arrays(samples: SampledTrajectory, names: Sequence[str] | None = None
         samples: The motion at the times that are recorded.
         names: Of the variables.
         entry: Argument that named them, for messages.
-
-    Raises:
-        InputError: If the result has no such variable.
     """
     table = variables(samples.loop)
     check_variables(entry, names or (), table)
@@ -145,11 +142,7 @@ def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
 
 
 def check_memory(settings: SimulationSettings, finger: Finger) -> None:
-    """Refuse a result that cannot fit into the machine's memory.
-
-    Raises:
-        InputError: Naming the sample rate.
-    """
+    """Refuse a result that cannot fit into the machine's memory."""
     samples = settings.duration * settings.sample_rate
     # Every signal of a result, and what it is computed from: measured, 3.5 kB a sample of fig6 and 19 kB of pinch.
     rows = sum(table.count for table in finger.mechanism.rows)

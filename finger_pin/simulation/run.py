@@ -107,11 +107,7 @@ def run(
 
 
 def _accuracy_variables(loop: ClosedLoop, names: Sequence[str]) -> list[str]:
-    """Return the variables that the warnings about accuracy need: the energy account, and the gaps of contacts.
-
-    Raises:
-        InputError: If a result has none of some name.
-    """
+    """Return the variables that the warnings about accuracy need: the energy account, and the gaps of contacts."""
     table = variables(loop)
     check_variables("variables", names, table)
     energies = [name for name, quantity in table.items() if quantity.energy_term is not None and quantity.units == "J"]

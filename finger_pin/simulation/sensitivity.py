@@ -40,9 +40,6 @@ def make_variations(
         values: p numbers.
         sizes: Their magnitudes.
         make: Function of values.
-
-    Raises:
-        InputError: If neither way is allowed.
     """
     variations, changes = [], []
     for k, (value, size) in enumerate(zip(values, sizes, strict=True)):

@@ -68,10 +68,6 @@ class Setup:
             loop: Its loop, where a part of it is custom.
             custom: Names of the parts given in place of the scenario's, from `custom_parts`.
             control_period: As for `simulate`.
-
-        Raises:
-            InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
-                a motor turns too fast at the start, or a custom controller answers wrongly.
         """
         method = scenario.simulation.method
         loop = loop or ClosedLoop.from_scenario(scenario)

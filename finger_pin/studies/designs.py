@@ -50,11 +50,7 @@ class Grid:
     values: Mapping[str, tuple[Value, ...]]
 
     def __init__(self, values: Mapping[str, Sequence[Value]]) -> None:
-        """Check and keep the values.
-
-        Raises:
-            InputError: If there are none, one is not finite or comes twice, or there are too many points.
-        """
+        """Check and keep the values."""
         object.__setattr__(self, "values", _read_values(values))
         for key, axis in self.values.items():
             if len(set(axis)) < len(axis):
@@ -83,11 +79,7 @@ class PointList:
     values: Mapping[str, tuple[Value, ...]]
 
     def __init__(self, values: Mapping[str, Sequence[Value]]) -> None:
-        """Check and keep the values.
-
-        Raises:
-            InputError: If there are none, one is not finite, the keys have different numbers of them, or too many.
-        """
+        """Check and keep the values."""
         object.__setattr__(self, "values", _read_values(values))
         first, *others = self.values
         for key in others:
@@ -120,11 +112,7 @@ class Range:
     logarithmic: bool = False
 
     def check(self, key: str) -> None:
-        """Raise unless the ends are finite, in order and, for logarithms, positive.
-
-        Raises:
-            InputError: Naming the key.
-        """
+        """Raise unless the ends are finite, in order and, for logarithms, positive."""
         ends = [self.low, self.high]
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
             raise InputError(key, "must be two finite numbers, the lower one first", ends)
@@ -161,11 +149,7 @@ class LatinHypercube:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check.
-
-        Raises:
-            InputError: If there are no ranges or samples, or a range is not one.
-        """
+        """Check."""
         if not self.ranges:
             raise InputError("over", "at least one key is needed")
         for key, interval in self.ranges.items():

@@ -39,11 +39,7 @@ _EXECUTOR_MESSAGE = "must be a concurrent.futures.Executor, such as ThreadPoolEx
 
 @contextmanager
 def open_executor(executor: Executor | None = None, workers: int | None = None) -> Iterator[Executor]:
-    """Provide an executor, by default threads, one for each usable core; in it single scenarios do not warn.
-
-    Raises:
-        InputError: If it is no executor, or the number of threads is wrong or given with an executor.
-    """
+    """Provide an executor, by default threads, one for each usable core; in it single scenarios do not warn."""
     if workers is not None and executor is not None:
         raise InputError("workers", "are the executor's own", workers)
     if workers is not None and (not isinstance(workers, Integral) or isinstance(workers, bool) or workers < 1):
@@ -70,9 +66,6 @@ def run_tasks(
     """Call a function with each item and a `Stop`, and yield indices with results or exceptions as they come.
 
     When ``stop``, which is checked every tenth of a second, returns true, tasks that have not started are left.
-
-    Raises:
-        InputError: If the executor returns something else than a future.
     """
     token, futures = CancelToken(), dict[Future[Any], int]()
     finished: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()

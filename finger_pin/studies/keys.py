@@ -40,11 +40,7 @@ class BaseScenario:
     def from_scenario(
         cls, source: ScenarioLike, overrides: Mapping[str, Any] | None = None, finger: FingerLike | None = None
     ) -> BaseScenario:
-        """Load a scenario.
-
-        Raises:
-            InputError: Naming the entry that is wrong.
-        """
+        """Load a scenario."""
         scenario = load_scenario(source, overrides)
         custom_finger = resolve_finger(finger, scenario)
         return cls(with_finger(scenario, custom_finger), custom_finger)
@@ -53,9 +49,6 @@ class BaseScenario:
         """Return the scenario with other values at some keys.
 
         Entries left to their defaults, such as a mass centre at half a link's length, follow the values.
-
-        Raises:
-            InputError: Naming the entry that is wrong.
         """
         return ParametrisedScenario(self.scenario, tuple(point)).with_values(list(point.values()))
 
@@ -72,9 +65,6 @@ class BaseScenario:
             key: Key to vary.
             values: Its values.
             alone: Whether no other key is varied, which might make the values fit.
-
-        Raises:
-            InputError: If there is no such key, it holds something else, or allows none of the values.
         """
         entry = _look_up(self.scenario, key)
         numbers = _is_number(values[0])
@@ -106,11 +96,7 @@ class BaseScenario:
             raise problem
 
     def number(self, key: str) -> float:
-        """Return the scenario's number at a key.
-
-        Raises:
-            InputError: If it has none.
-        """
+        """Return the scenario's number at a key."""
         entry = _look_up(self.scenario, key)
         if self._is_omitted(key):
             raise InputError(key, "is left out of the scenario, so that there is no number to start from: state it")

@@ -67,11 +67,7 @@ class Metric:
 
 
 def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
-    """Return metrics by name; instances of `Metric` are kept.
-
-    Raises:
-        InputError: If there are none, one is unknown or comes twice, or cannot be sent to other processes.
-    """
+    """Return metrics by name; instances of `Metric` are kept."""
     chosen: dict[str, Metric] = {}
     for choice in names:
         if isinstance(choice, str) and choice not in METRICS:
@@ -92,11 +88,7 @@ def resolve_metrics(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
 
 
 def scenario_metrics(scenario: Scenario, names: Iterable[str | Metric] | None = None) -> tuple[Metric, ...]:
-    """Return metrics by name, or those of `DEFAULT_METRICS` that mean something for a scenario.
-
-    Raises:
-        InputError: As `resolve_metrics`, or if one needs a reference or tendons that the scenario does not have.
-    """
+    """Return metrics by name, or those of `DEFAULT_METRICS` that mean something for a scenario."""
     chosen = resolve_metrics(DEFAULT_METRICS if names is None else names)
     if names is None:
         return tuple(metric for metric in chosen if not metric.missing_part(scenario))

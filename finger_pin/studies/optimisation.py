@@ -56,11 +56,7 @@ class Effort:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check.
-
-        Raises:
-            InputError: If a number is too small.
-        """
+        """Check."""
         for name, least in (("population", 4), ("generations", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise InputError(name, f"must be at least {least}", getattr(self, name))

@@ -19,9 +19,6 @@ def parse_values(text: str) -> tuple[str, tuple[Value, ...]]:
     """Return the key and the values of ``KEY=START:STOP:N``, ``KEY=START:STOP:N:log`` or ``KEY=A,B,C``.
 
     START and STOP are among the N values. A, B and C are numbers, or names, or true and false.
-
-    Raises:
-        InputError: If it is neither.
     """
     key, text_value = _split(text, _VALUES_MESSAGE)
     if ":" not in text_value:
@@ -43,11 +40,7 @@ def parse_values(text: str) -> tuple[str, tuple[Value, ...]]:
 
 
 def parse_range(text: str) -> tuple[str, Range]:
-    """Return the key and the range of ``KEY=LOW:HIGH`` or ``KEY=LOW:HIGH:log``.
-
-    Raises:
-        InputError: If it is neither.
-    """
+    """Return the key and the range of ``KEY=LOW:HIGH`` or ``KEY=LOW:HIGH:log``."""
     key, text_value = _split(text, _RANGE_MESSAGE)
     parts, logarithmic = _split_range(text_value)
     if len(parts) != 2:

@@ -144,9 +144,6 @@ def open_study(
     ``products`` are patterns of the files that are made of its records, such as ``figures/sweep.png``; ``restart``
     removes both. The executor is by default one thread for each core.
 
-    Raises:
-        InputError: If the folder cannot be written, or has files of these names that no study wrote.
-
     Warns:
         UserWarning: If runs cannot be found again, or lines are no records.
     """

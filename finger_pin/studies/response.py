@@ -60,9 +60,6 @@ def winding_temperature(run: Run) -> float:
     """Return the highest temperature of any winding, degC: C T' = R i^2 - (T - T_a) / R_th, from T_a on.
 
     Between samples the heat is linear in time, for which the equation is solved in closed form.
-
-    Raises:
-        InputError: If no motor describes its winding.
     """
     temperatures = []
     for name, actuator in run.scenario.finger.actuators.items():
@@ -94,9 +91,6 @@ def fingertip_hysteresis(run: Run) -> float:
     Direction and place are those of the reference fingertip along the line on which it moves most; both directions are
     compared in `HYSTERESIS_BINS` parts of its travel by the mean of the tip less the reference. Without a
     reference the command replaces it, and a cubic of it the path. Of a hand the largest of its fingers.
-
-    Raises:
-        InputError: If neither moves to and fro.
     """
     hystereses = [
         _hysteresis(run, name, finger, tip)

@@ -39,9 +39,6 @@ class Search:
             population: Designs of a generation.
             seed: Of the random numbers.
             start: Replaces a design of the hypercube, shape (size,).
-
-        Raises:
-            InputError: If Optuna is not installed.
         """
         try:
             import optuna

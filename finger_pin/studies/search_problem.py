@@ -45,11 +45,7 @@ class Variable:
 
 
 def parse_variable(text: str) -> Variable:
-    """Return the variable of ``KEY=LOW:HIGH`` or, for keys that go together, ``KEY,KEY2,-KEY3=LOW:HIGH``.
-
-    Raises:
-        InputError: If it is neither.
-    """
+    """Return the variable of ``KEY=LOW:HIGH`` or, for keys that go together, ``KEY,KEY2,-KEY3=LOW:HIGH``."""
     names, interval = parse_range(text)
     keys, signs = [], []
     for name in names.split(","):
@@ -89,11 +85,7 @@ def radii(finger: FingerLike) -> list[Variable]:
 
 
 def check_variables(variables: Sequence[Variable], base: BaseScenario) -> None:
-    """Check that there are variables, and that their keys take numbers of their ranges.
-
-    Raises:
-        InputError: Naming the key.
-    """
+    """Check that there are variables, and that their keys take numbers of their ranges."""
     if not variables:
         raise InputError("over", "at least one key is needed")
     varied: set[str] = set()
@@ -157,11 +149,7 @@ class Constraint:
 
 
 def parse_constraint(text: str) -> Constraint:
-    """Return the constraint of ``NAME>=VALUE`` or ``NAME<=VALUE``.
-
-    Raises:
-        InputError: If it is neither.
-    """
+    """Return the constraint of ``NAME>=VALUE`` or ``NAME<=VALUE``."""
     match = _CONSTRAINT.fullmatch(text)
     try:
         bound = float(match["bound"]) if match else math.nan
@@ -201,9 +189,6 @@ class Goals:
             maximise: Metrics to be made large.
             constraints: Instances of `Constraint`, or texts for `parse_constraint`.
             custom_metrics: Custom metrics that constraints name.
-
-        Raises:
-            InputError: If there is no objective, a metric is unknown or comes twice among them.
         """
         minimised, maximised, texts = list(minimise), list(maximise), list(constraints)
         chosen = resolve_metrics([*minimised, *maximised])

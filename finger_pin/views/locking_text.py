@@ -18,9 +18,6 @@ def summarize_locking(scenario: Scenario, locking_map: SelfLockingMap) -> str:
     Args:
         scenario: Of a finger with force closure.
         locking_map: The map of its finger.
-
-    Raises:
-        InputError: If there is no force closure.
     """
     finger = scenario.finger
     stiction = finger.numbers["joint_friction"][finger.joint_friction.break_away_entry]

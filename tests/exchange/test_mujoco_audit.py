@@ -5,10 +5,10 @@ import re
 import mujoco
 import numpy as np
 import pytest
+from mujoco_schema import ALL, SCHEMA, kind_of
 
 import finger_pin as fp
 from finger_pin.description.loading import read_scenario
-from finger_pin.exchange.mujoco_schema import ALL, SCHEMA, kind_of
 
 pytestmark = pytest.mark.filterwarnings("ignore:hand. not carried over")
 #: Where defaults belong that several elements have.

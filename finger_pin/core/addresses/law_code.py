@@ -120,11 +120,7 @@ def column_counts(laws: Sequence[Law | ContactLaw]) -> tuple[int, int]:
 
 
 def kink_column(law: Law | ContactLaw) -> int:
-    """Return the column of the table of rows by whose sign a law bends, -1 for none.
-
-    Raises:
-        InputError: If it bends with the sign of its speed, but has no state whose rate could.
-    """
+    """Return the column of the table of rows by whose sign a law bends, -1 for none."""
     if law.kink != "speed":
         return ROW.signals + law.signals.index(law.kink) if law.kink else -1
     if law.scale is None or law.arms > 1:
@@ -134,11 +130,7 @@ def kink_column(law: Law | ContactLaw) -> int:
 
 @cache
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a plain function compiled, with all plain functions that it calls.
-
-    Raises:
-        InputError: If it may raise an exception.
-    """
+    """Return a plain function compiled, with all plain functions that it calls."""
     assert isinstance(function, FunctionType)
     code, global_names = function.__code__, function.__globals__
     if _may_raise(function):

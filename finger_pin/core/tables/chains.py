@@ -68,11 +68,7 @@ class _Body(NamedTuple):
 
 
 def read_chains(model: pin.Model) -> Chains:
-    """Read the bodies of a model.
-
-    Raises:
-        InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
-    """
+    """Read the bodies of a model."""
     size = int(model.nv)
     parents, kinds = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
     bodies, slides, charts, frames = np.zeros((size, sum(_WIDTHS))), np.full(size, _LARGEST_SLIDE), [], []

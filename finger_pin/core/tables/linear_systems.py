@@ -160,11 +160,7 @@ class Linear(NamedTuple):
 
 
 def build_linear(structure: Structure, control: InputTable) -> Linear:
-    """Allocate the linearisation of a structure.
-
-    Raises:
-        InputError: If so many bodies can touch that it cannot fit into the machine's memory.
-    """
+    """Allocate the linearisation of a structure."""
     count, width, states = len(structure.state), len(structure.prescribed), len(structure.state_row)
     wide, reads = 2 * width + states + 1, len(structure.read_states)
     full = wide + reads

@@ -71,9 +71,6 @@ def compile_mechanism(mechanism: Mechanism) -> tuple[Structure, Parameters]:
     """Return the structure of a mechanism, which is built once for one wiring, and its parameters.
 
     Pinocchio's model is the source of the rigid body.
-
-    Raises:
-        InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
     """
     body, rows = mechanism.body, mechanism.rows
     chains, structure, geometry = _structure(mechanism)

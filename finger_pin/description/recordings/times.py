@@ -35,9 +35,6 @@ def check_seconds(entry: str, name: str, start: float, times: NDArray[np.float64
         start: The first number of the column.
         times: Shape (m,), s, if they are in seconds.
         by_hand: Whether a few of them may be written by hand, in whole seconds.
-
-    Raises:
-        InputError: Naming the time that the rows take in each unit that they may be in.
     """
     length, factors = times[-1] - times[0], UNITS["s"]
     period = length / (len(times) - 1)
@@ -56,11 +53,7 @@ def check_seconds(entry: str, name: str, start: float, times: NDArray[np.float64
 
 
 def seconds_of_dates(entry: str, column: Column, name: str, cells: NDArray[Any]) -> NDArray[np.float64]:
-    """Return dates and times of ISO 8601 in seconds from the first, shape (m,); those without a zone are all of one.
-
-    Raises:
-        InputError: If one is no such date, or has what only numbers have.
-    """
+    """Return dates and times of ISO 8601 in seconds from the first, shape (m,); those without a zone are all of one."""
     for key, default in (("unit", None), ("period", None), ("supply", None), ("scale", 1.0), ("offset", 0.0)):
         if getattr(column, key) != default:
             raise InputError(f"{entry}.{key}", f"is for numbers, and column {name} has dates", getattr(column, key))

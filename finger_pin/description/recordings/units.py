@@ -85,11 +85,7 @@ def parse_unit(text: str) -> tuple[str, float] | None:
 
 
 def check_header(entry: str, name: str, unit: str | None, si: str, asked: bool) -> None:
-    """Refuse a unit in a header that is unknown, and ask about a name that ends as another unit does.
-
-    Raises:
-        InputError: Naming the column.
-    """
+    """Refuse a unit in a header that is unknown, and ask about a name that ends as another unit does."""
     fitting = UNITS.get(si) or {each: 1.0 for units in UNITS.values() for each in units}
     if unit is not None and parse_unit(unit) is None:
         allowed = f"column {name} is in {unit}, which is no unit known here; write unit, one of {', '.join(fitting)}"
@@ -101,11 +97,7 @@ def check_header(entry: str, name: str, unit: str | None, si: str, asked: bool) 
 
 
 def in_si(entry: str, unit: str, wanted: str) -> float:
-    """Return the factor from a unit to SI; of a quantity whose SI unit is not known, any unit will do.
-
-    Raises:
-        InputError: If it is no unit of that; ``entry`` says where it stands.
-    """
+    """Return the factor from a unit to SI; of a quantity whose SI unit is not known, any unit will do."""
     parsed = parse_unit(unit)
     if parsed is not None and (wanted == parsed[0] or wanted not in UNITS):
         return parsed[1]

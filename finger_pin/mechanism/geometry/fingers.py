@@ -86,11 +86,7 @@ class WoundFinger:
 
     @classmethod
     def from_links(cls, description: FingerDescription, resolution: int) -> WoundFinger:
-        """Wind the tendons of a finger that is made of links.
-
-        Raises:
-            InputError: If a joint carries no link.
-        """
+        """Wind the tendons of a finger that is made of links."""
         model = build_rigid_body(description).model
         links = [joint.link for joint in description.joints.values() if joint.link is not None]
         solids = pin.buildGeomFromUrdfString(model, to_urdf(description), pin.GeometryType.VISUAL).geometryObjects
@@ -162,11 +158,7 @@ class WoundFinger:
 
 
 def fingers_of_links(description: FingerDescription, resolution: int) -> list[WoundFinger]:
-    """Return the fingers of a hand that is made of links, or the only one.
-
-    Raises:
-        InputError: If a joint carries no link.
-    """
+    """Return the fingers of a hand that is made of links, or the only one."""
     for name, joint in description.joints.items():
         if joint.link is None:
             allowed = "is missing; the viewer shows links, or with finger= the model of the user's own"
@@ -185,11 +177,7 @@ def fingers_of_links(description: FingerDescription, resolution: int) -> list[Wo
 def fingers_on_model(
     description: FingerDescription, body: RigidBody, solids: pin.GeometryModel | None, resolution: int
 ) -> tuple[pin.Model, list[WoundFinger], tuple[Visual, ...]]:
-    """Return a model whose joint axes are z, the fingers on it, and its solids.
-
-    Raises:
-        InputError: If a joint does not turn, or the joints of a finger do not follow each other.
-    """
+    """Return a model whose joint axes are z, the fingers on it, and its solids."""
     model, turns = turned_model(body)
     hand, first, fingers = description.hand, 0, []
     for name, finger in {"": description}.items() if hand is None else hand.built().items():

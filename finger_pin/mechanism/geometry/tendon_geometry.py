@@ -65,9 +65,6 @@ class TendonGeometry:
             resolution: Points per straight span and per radian of arc.
             body: The body that the joints are of, if it is not made of links.
             solids: Of that body.
-
-        Raises:
-            InputError: If a joint carries no link, or the body has joints that do not turn.
         """
         self.description, self.first_seen = description, 0 if description.links else 1
         fixed: tuple[Visual, ...] = ()

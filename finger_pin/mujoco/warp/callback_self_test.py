@@ -27,9 +27,6 @@ def try_self_test(device: str, attach: Callable[..., Any]) -> None:
     Args:
         device: Name of Warp's device.
         attach: (m, d, mjm, tendons, joints) -> friction that has been added to them.
-
-    Raises:
-        InputError: If MuJoCo Warp does not do so.
     """
     entry = f"mujoco_warp {metadata.version('mujoco-warp')}"
     try:

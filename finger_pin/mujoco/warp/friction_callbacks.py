@@ -92,11 +92,7 @@ class Friction:
         m.callback.act_bias, m.callback.sensor = self._act_bias, self._sensor
 
     def index(self, name: str) -> int:
-        """Return the index of a tendon or joint in the arrays.
-
-        Raises:
-            InputError: If it has no friction.
-        """
+        """Return the index of a tendon or joint in the arrays."""
         return friction_index(name, self.names)
 
     @property
@@ -184,11 +180,7 @@ class Friction:
 
 
 def check_options(option: Any, entry: str) -> None:
-    """Refuse an integrator or a switch that leaves no room for friction.
-
-    Raises:
-        InputError: Naming it.
-    """
+    """Refuse an integrator or a switch that leaves no room for friction."""
     if int(option.integrator) == _DISCRETE:
         raise InputError(f"{entry}.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
     for bit, purpose in _REQUIRED_SWITCHES.items():
@@ -214,11 +206,6 @@ def add_friction(
 
     Returns:
         Coefficients, signals and state of all worlds.
-
-    Raises:
-        InputError: If a name matches nothing, a key or number is not allowed, a tendon with a pulley has no branches
-            (`add_branches`), the model is integrated by ``discrete`` or has no actuators, ``njmax`` is too small, or
-            this version of MuJoCo Warp gives wrong answers.
     """
     try_self_test(str(d.qpos.device), attach_friction)
     return attach_friction(m, d, mjm, tendons, joints)

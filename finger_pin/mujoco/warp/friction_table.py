@@ -87,11 +87,7 @@ def losses(model: NamedModel, plugin_frictions: list[PluginFriction]) -> tuple[A
 
 
 def check_rows(model: NamedModel, data: Any, of_dofs: Array, of_tendons: Array) -> None:
-    """Refuse data without room for the rows that come before those of contacts, which MuJoCo Warp would leave out.
-
-    Raises:
-        InputError: If ``njmax`` or ``njmax_nnz`` is too small.
-    """
+    """Refuse data without room for the rows that come before those of contacts, which MuJoCo Warp would leave out."""
     dofs_with_loss = (of_dofs > 0.0) | (model.dof_frictionloss > 0.0)
     tendons_with_loss = (of_tendons > 0.0) | (model.tendon_frictionloss > 0.0)
     limited = model.tendon_limited.astype(bool)

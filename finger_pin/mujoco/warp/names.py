@@ -45,9 +45,6 @@ def add_branches(spec: mujoco.MjSpec) -> None:
 
     Args:
         spec: A `mujoco.MjSpec`, which is changed; compile it afterwards.
-
-    Raises:
-        InputError: If it does not compile.
     """
     name_all(spec)
     try:
@@ -59,11 +56,7 @@ def add_branches(spec: mujoco.MjSpec) -> None:
 
 
 def branches_of(model: NamedModel, names: list[str]) -> dict[str, list[tuple[str, float]]]:
-    """Return the branches of tendons with pulleys, each with one over its divisor, as `add_branches` has made them.
-
-    Raises:
-        InputError: If a tendon has a pulley, but its branches are no tendons.
-    """
+    """Return the branches of tendons with pulleys, each with one over its divisor, as `add_branches` has made them."""
     branches: dict[str, list[tuple[str, float]]] = {}
     for name in names:
         first, count = (int(each[model.tendon(name).id]) for each in (model.tendon_adr, model.tendon_num))

@@ -56,11 +56,7 @@ class Inputs:
     """
 
     def __init__(self, scenario: Scenario, loop: ClosedLoop) -> None:
-        """Read a scenario.
-
-        Raises:
-            InputError: If it cannot be played.
-        """
+        """Read a scenario."""
         if loop.controller.needs_sensors or scenario.controller.sampling is not None:
             raise InputError(
                 "controller.sampling", "cannot be played: the playground has a controller of its own period"
@@ -220,11 +216,7 @@ class Inputs:
 
 
 def slider_index(sliders: Sequence[Slider], name: str) -> int:
-    """Return the index of a slider by its name.
-
-    Raises:
-        InputError: If there is none.
-    """
+    """Return the index of a slider by its name."""
     names = [slider.name for slider in sliders]
     if name not in names:
         raise InputError("slider", f"must be one of {', '.join(names)}", name)

@@ -42,11 +42,7 @@ class Parameter:
         return 1.0 if self.factor else float(self.values[0])
 
     def entries(self, number: float) -> dict[str, Any]:
-        """Return the entries for a value of the slider.
-
-        Raises:
-            InputError: If it is beyond the range.
-        """
+        """Return the entries for a value of the slider."""
         if not 0.0 <= number <= self.high:
             raise InputError(self.label, f"must be from 0 to {self.high:.6g}", number)
         scaled = ((number * np.asarray(each, dtype=float)).tolist() if self.factor else number for each in self.values)
@@ -54,11 +50,7 @@ class Parameter:
 
 
 def parameters(scenario: Scenario, controller: LoopController, extra_keys: Sequence[str] = ()) -> tuple[Parameter, ...]:
-    """Return the parameters of a scenario that can be changed as it is played, and those of further keys.
-
-    Raises:
-        InputError: If a further key is not of the finger or its controller, or has no number.
-    """
+    """Return the parameters of a scenario that can be changed as it is played, and those of further keys."""
     sliders = []
     for label, keys, high, factor in _candidates(scenario, controller):
         try:

@@ -72,9 +72,6 @@ class Session:
             scenario: The scenario, its name, or the path of a file.
             keys: Further keys to change while it is played.
             rtol: Relative tolerance, and the absolute one over the scale of each kind of state.
-
-        Raises:
-            InputError: If the scenario cannot be played.
         """
         self.scenario = load_scenario(scenario)
         loop = ClosedLoop.from_scenario(self.scenario)
@@ -135,11 +132,7 @@ class Session:
         simulator.step(command, self.inputs.period, force[0] if len(force) == 1 else force)
 
     def move(self, kind: str, index: int, value: float) -> None:
-        """Move a slider of the inputs.
-
-        Raises:
-            InputError: If there is none, or the value is beyond its range.
-        """
+        """Move a slider of the inputs."""
         self.inputs.set_value(kind, index, value, self.simulator.state.position)
 
     def choose(self, kind: str) -> tuple[Slider, ...]:
@@ -148,11 +141,7 @@ class Session:
         return self.inputs.sliders[kind]
 
     def change(self, index: int, value: float) -> None:
-        """Change a parameter, and go on from the same state; a record goes on in a new piece.
-
-        Raises:
-            InputError: If the value is not allowed, or would make another structure; nothing has changed then.
-        """
+        """Change a parameter, and go on from the same state; a record goes on in a new piece."""
         values = [*self._slider_values[:index], value, *self._slider_values[index + 1 :]]
         entries: dict[str, object] = {}
         for parameter, slider_value in zip(self.parameters, values, strict=True):
@@ -183,11 +172,7 @@ class Session:
         self.recording = True
 
     def stop(self) -> list[Simulator]:
-        """Stop the record; return the simulators of its pieces: one, and one more for every change of the finger.
-
-        Raises:
-            InputError: If nothing was recorded.
-        """
+        """Stop the record; return the simulators of its pieces: one, and one more for every change of the finger."""
         self._end_piece()
         self.recording = False
         pieces, self._pieces = self._pieces, []

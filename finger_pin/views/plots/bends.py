@@ -25,9 +25,6 @@ def plot_bends(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
         result: Dataset of `simulate`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If no tendon rubs at several places.
     """
     if "wrap_tension" not in result:
         raise InputError("result", 'has no tendon that rubs at several places, as with tendon_friction.place = "bends"')

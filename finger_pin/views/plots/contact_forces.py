@@ -32,9 +32,6 @@ def plot_contact(result: xr.Dataset, *, width: Width = None, titles: bool = True
         result: Dataset of `simulate`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If there are no objects.
     """
     if "contact" not in result.dims:
         raise InputError("result", "is of a finger with nothing around it to touch")

@@ -83,9 +83,6 @@ def plot_runaway(results: dict[str, xr.Dataset], *, width: Width = None, titles:
         results: Datasets of `simulate` by label.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If one is of a finger without tendons.
     """
     for label, result in results.items():
         if not result["tendon_command"].size:

@@ -47,9 +47,6 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
         finger: One finger of a hand, drawn as a finger is.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If there is no such finger.
     """
     if finger is not None:
         result = finger_of(result, finger)

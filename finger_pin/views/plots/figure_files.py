@@ -60,9 +60,6 @@ def draw_all(
         format: `png`, `pdf` or `svg`; default that of matplotlib's setting ``savefig.format``, PNG unless changed.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If there is no such figure of this result, or no such format.
     """
     figures = figures_by_name(result)
     functions = list(figures if names is None else names)
@@ -80,9 +77,6 @@ def save_figure(figure: Figure, path: str | Path, format: str | None = None) -> 
         figure: The figure.
         path: Of the file, whose ending is its format; without one it gets the format's.
         format: `png`, `pdf` or `svg`; default that of matplotlib's setting ``savefig.format``, PNG unless changed.
-
-    Raises:
-        InputError: If there is no such format.
     """
     target = Path(path)
     if not target.suffix:

@@ -28,11 +28,7 @@ def fingers_of(result: xr.Dataset) -> list[str]:
 
 
 def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
-    """Return the part of a hand's result about one finger: joints and tendons by their own names, no energies.
-
-    Raises:
-        InputError: If there is no such finger.
-    """
+    """Return the part of a hand's result about one finger: joints and tendons by their own names, no energies."""
     available = fingers_of(result)
     if finger not in available:
         from finger_pin.description.validation import suggestion

@@ -112,9 +112,6 @@ def plot_profiles(result: xr.Dataset, *, width: Width = None, titles: bool = Tru
         result: Dataset of `identify`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If no parameter has a profile.
     """
     shown = profiled_parameters(result)
     if not shown:

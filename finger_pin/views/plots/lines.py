@@ -27,11 +27,7 @@ def names(result: xr.Dataset, coordinate: str) -> list[str]:
 
 
 def times(result: xr.Dataset) -> Array:
-    """Return the sample times of a result, s, shape (m,).
-
-    Raises:
-        InputError: If it has none.
-    """
+    """Return the sample times of a result, s, shape (m,)."""
     require_samples(result)
     return result["time"].values
 

@@ -42,9 +42,6 @@ def plot_losses(result: xr.Dataset, finger: str | None = None, *, width: Width =
         finger: One finger of a hand, drawn as a finger is.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If there is no such finger.
     """
     if finger is not None:
         result = finger_of(result, finger)

@@ -35,9 +35,6 @@ def plot_pareto(result: xr.Dataset, *, width: Width = None, titles: bool = True)
         result: Dataset of `optimise`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If the Dataset is of another kind.
     """
     if "minimise" not in result.attrs:
         raise InputError("result", "must be of optimise")

@@ -38,9 +38,6 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
         result: Dataset of `simulate`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If there are no servos.
     """
     if "motor" not in result.dims:
         raise InputError("result", "is of a finger without servos")

@@ -92,11 +92,7 @@ def new_figure(
 
 
 def inches(width: Width) -> float | None:
-    """Return a width in inches, of the caller or of ``figure.figsize``, or None.
-
-    Raises:
-        InputError: If it is neither a length nor the name of one.
-    """
+    """Return a width in inches, of the caller or of ``figure.figsize``, or None."""
     if width is None:
         figsize = settings["figure.figsize"]
         return None if list(figsize) == list(_DEFAULTS["figure.figsize"]) else float(figsize[0])

@@ -43,9 +43,6 @@ def plot_sweep(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
         result: Dataset of `sweep`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If the Dataset is of another kind.
     """
     if "status" not in result:
         raise InputError("result", "must be of sweep")

@@ -34,9 +34,6 @@ def compare(
         labels: Names of the two in the legend.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
-
-    Raises:
-        InputError: If joints or tendons differ.
     """
     for coordinate in ("joint", "tendon"):
         if names(first, coordinate) != names(second, coordinate):

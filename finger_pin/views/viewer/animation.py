@@ -53,9 +53,6 @@ def write_animation(
 
     Returns:
         The path of the file.
-
-    Raises:
-        InputError: If the result lacks something that is shown.
     """
     write_text(path := Path(path), animation_page(result, forces, ghost, finger))
     return path
@@ -142,9 +139,6 @@ class Playback:
             result: Dataset that `simulate` returned or saved.
             rate: Frames per second of motion; fewer where the motion is long or the result has fewer samples.
             finger: The finger that moved, if it stands on a model of the user's own.
-
-        Raises:
-            InputError: If the result lacks something that is shown.
         """
         cords = [str(name) for name in result["cord"].values] if "cord_tension" in result else []
         scene = Scene(finger or read_scene(result.attrs).finger, cords)

@@ -40,9 +40,6 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
         result: Dataset that `simulate` returned or saved.
         speed: Simulated seconds per second; infinite for the last posture at once.
         rate: Most frames per second.
-
-    Raises:
-        InputError: If the result lacks something that is shown, or speed or rate are not above zero.
     """
     for name, value in (("speed", speed), ("rate", rate)):
         if not value > 0.0:

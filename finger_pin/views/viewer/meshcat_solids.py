@@ -41,9 +41,6 @@ def solid_commands(
         tube_radius: Radius with which tendons are drawn, m; grooves are smaller by as much.
         root: Path below which the links hang.
         colour: Of all solids, red, green and blue; by default each has its own.
-
-    Raises:
-        InputError: If a visual is no box, cylinder, sphere, ellipsoid or mesh.
     """
     links = link_names(geometry)
     for visual in geometry.visuals:
@@ -66,11 +63,7 @@ def root_command(rotation: Array) -> Command:
 
 
 def primitive(name: str, shape: Any) -> tuple[Command, Array]:
-    """Return meshcat's geometry for one of Pinocchio, and the rotation between them; of an ellipsoid a stretch, too.
-
-    Raises:
-        InputError: If it is no box, cylinder, sphere, ellipsoid or mesh.
-    """
+    """Return meshcat's geometry for one of Pinocchio, and the rotation between them; of an ellipsoid a stretch, too."""
     kind = type(shape).__name__
     if kind == "Cylinder":
         return cylinder(shape.radius, 2.0 * shape.halfLength), Y_TO_Z

@@ -136,9 +136,6 @@ def view(
 
     Returns:
         The page in service, with its address; already closed if the call has blocked.
-
-    Raises:
-        InputError: If the result lacks something that is shown.
     """
     return _serve(animation_page(result, forces, ghost, finger), open_browser, block)
 
@@ -162,9 +159,6 @@ def view_forces(
 
     Returns:
         The page in service, with its address; already closed if the call has blocked.
-
-    Raises:
-        InputError: If the finger is not made of links.
     """
     return _serve(posture_page(finger, forces, tension), open_browser, block)
 

@@ -64,11 +64,7 @@ class Ghost:
 
 
 def finger_geometry(finger: FingerLike) -> TendonGeometry:
-    """Return the geometry of a finger or hand, or of its description, name or file.
-
-    Raises:
-        InputError: If a joint of a description carries no link.
-    """
+    """Return the geometry of a finger or hand, or of its description, name or file."""
     model = finger if isinstance(finger, Finger) else None
     description = description_of(finger)
     visuals = None if model is None else model.visuals
@@ -89,11 +85,7 @@ class Scene:
     """
 
     def __init__(self, finger: FingerLike, cords: Sequence[str] = ()) -> None:
-        """Prepare solids and tendons, and a tree's cords that servos, muscles or springs pull, given by their names.
-
-        Raises:
-            InputError: If a joint of a description carries no link.
-        """
+        """Prepare solids and tendons, and a tree's cords that servos, muscles or springs pull, given by their names."""
         self.geometry = finger_geometry(finger)
         description = self.geometry.description
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
