@@ -147,7 +147,7 @@ def comparable_bic(bench: str, law: Law, result: xr.Dataset, reference: xr.Datas
     values, shares = problem.values(problem.start), reference["independent_share"].values[problem.groups]
     values[: problem.requested_count] = result["estimate"].values
     best = fit(problem, problem.to_search(values), weights=shares)
-    return bic(best.residuals, shares, problem.requested_count, problem.groups, problem.least_noise)
+    return bic(best.residuals, shares, problem.requested_count, problem.noise_groups, problem.least_noise)
 
 
 def by_variable(result: xr.Dataset, along: str, values: str, samples: str, power: float = 1.0) -> dict[str, float]:

@@ -59,7 +59,7 @@ def compare_laws(problem: Problem, settings: IdentifySettings, minimum: Fit) -> 
     rows = []
     for name, law in [(SCENARIO_LAW, problem), *other_laws(problem, settings).items()]:
         best = minimum if law is problem else _best_fit(law, problem, minimum)
-        value = bic(best.residuals, minimum.weights, law.requested_count, law.groups, law.least_noise)
+        value = bic(best.residuals, minimum.weights, law.requested_count, law.noise_groups, law.least_noise)
         values = dict(zip(law.keys[: law.requested_count], law.values(best.z).tolist(), strict=False))
         held_out = _held_out_rms(law, best, minimum, folds)
         scaled = np.concatenate([e / n for e, n in zip(best.residuals, minimum.noise, strict=True)])
@@ -77,7 +77,7 @@ def bic(
         residuals: Of every signal.
         weights: Part of the samples that are independent, shape (s,).
         parameters: Number of parameters k.
-        groups: Number of the output that every signal is of, shape (s,).
+        groups: Number of the noise of every signal, shape (s,).
         least_noise: Least standard deviation of every signal, shape (s,).
     """
     size = float(sum(w * len(e) for e, w in zip(residuals, weights, strict=True)))

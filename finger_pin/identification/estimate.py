@@ -226,7 +226,7 @@ def _objective(problem: Problem, weighted: Sequence[Array], weights: Array, scal
     Where outliers count less their noise is that of the scale: an rms would be theirs.
     """
     if loss == "linear":
-        return minus_twice_likelihood(weighted, weights, problem.groups, problem.least_noise)
+        return minus_twice_likelihood(weighted, weights, problem.noise_groups, problem.least_noise)
     by_signal = zip(weighted, weights, scale, strict=True)
     return float(sum(w * (e @ e / s**2 + 2.0 * len(e) * math.log(s)) for e, w, s in by_signal))
 
@@ -261,7 +261,7 @@ def _apply_loss(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[li
 
 def best_of(problem: Problem, fits: Sequence[Fit]) -> Fit:
     """Return the minimum of least misfit with equal weights."""
-    equal_weights, noise = np.ones(len(problem.signals)), (problem.groups, problem.least_noise)
+    equal_weights, noise = np.ones(len(problem.signals)), (problem.noise_groups, problem.least_noise)
     return min(fits, key=lambda candidate: minus_twice_likelihood(candidate.residuals, equal_weights, *noise))
 
 
@@ -275,7 +275,7 @@ def information(problem: Problem, minimum: Fit) -> Array:
 
 def _noise(problem: Problem, residuals: Sequence[Array], robust: bool = False) -> Array:
     """Return the rms of the residuals of every output, or that of their median; never below its least, or rounding."""
-    groups = problem.groups
+    groups = problem.noise_groups
     count, square = pooled_variance(residuals, np.ones(len(residuals)), groups)
     rms = robust_deviation(residuals, groups) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[groups]
     rounding = [1e-9 * max(float(np.max(np.abs(s.measured), initial=0.0)), 1e-9) for s in problem.signals]

@@ -92,9 +92,9 @@ class SmallSample:
         Each output has its samples less its effective number of parameters (the trace of its part of the information)
         as degrees of freedom, and a parameter the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
         """
-        slopes, first = problem.slopes(minimum.z), np.unique(problem.groups, return_index=True)[1]
+        slopes, first = problem.slopes(minimum.z), np.unique(problem.noise_groups, return_index=True)[1]
         parts = np.zeros((len(first), *covariance.shape))
-        for group, w, n, j in zip(problem.groups, minimum.weights, minimum.noise, slopes, strict=True):
+        for group, w, n, j in zip(problem.noise_groups, minimum.weights, minimum.noise, slopes, strict=True):
             parts[group] += w / n**2 * j.T @ j
         effective_parameters = np.einsum("kl,glk->g", covariance, parts)
         counts = _SampleCounts.from_fit(problem, minimum, slopes)
@@ -111,8 +111,8 @@ class SmallSample:
         return cls(
             factor * quantile**2 / CHI2_95,
             factor * freedom * np.log1p(quantile**2 / freedom),
-            noise[problem.groups],
-            pooled_noise[problem.groups],
+            noise[problem.noise_groups],
+            pooled_noise[problem.noise_groups],
         )
 
 
@@ -138,8 +138,8 @@ class _SampleCounts:
         """Return the numbers of samples at a minimum."""
         size = np.array([len(j) for j in slopes], dtype=float)
         shares = (1.0 - minimum.correlation**2) / (1.0 + minimum.correlation**2)
-        counts = np.zeros((3, int(problem.groups.max()) + 1))
-        np.add.at(counts.T, problem.groups, np.stack([size, size * minimum.weights, size * shares], axis=1))
+        counts = np.zeros((3, int(problem.noise_groups.max()) + 1))
+        np.add.at(counts.T, problem.noise_groups, np.stack([size, size * minimum.weights, size * shares], axis=1))
         return cls(*counts)
 
     def corrections(self, parameters: Array) -> tuple[Array, Array]:

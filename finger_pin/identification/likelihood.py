@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from finger_pin.exceptions import InputError
 from finger_pin.identification.recordings import RecordedSignal
 from finger_pin.typing import Array
 
@@ -88,6 +89,30 @@ class NoiseGrowth:
         totals = np.zeros((len(count), *sums.shape[1:]))
         np.add.at(totals, self.groups, sums)
         return np.asarray((totals.T / np.maximum(count, 1)).T[self.groups])
+
+
+def numbered(names: Sequence[Any]) -> NDArray[np.intp]:
+    """Return the number of each name among those that differ, in their order."""
+    order = list(dict.fromkeys(names))
+    return np.array([order.index(name) for name in names], dtype=np.intp)
+
+
+def noise_groups(signals: Sequence[RecordedSignal]) -> NDArray[np.intp]:
+    """Return the number of the noise of every signal: that of its output, or one that several outputs share.
+
+    Raises:
+        InputError: If outputs share a noise, and differ in unit or in what is said of it.
+    """
+    first: dict[str, RecordedSignal] = {}
+    for signal in signals:
+        other = first.setdefault(signal.shared_noise, signal) if signal.shared_noise else signal
+        for what in ("unit", "least_noise", "noise_share"):
+            value, expected = getattr(signal, what), getattr(other, what)
+            if value != expected:
+                entry = f"identify.recordings.{signal.recording}.outputs.{signal.name}.noise"
+                allowed = f"is shared with {other.recording}.{other.name}, whose {what} is {expected}, not {value}"
+                raise InputError(entry, allowed, signal.shared_noise)
+    return numbered([(each.shared_noise,) if each.shared_noise else (each.recording, each.name) for each in signals])
 
 
 def pooled_variance(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -88,7 +88,7 @@ def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:
 
     An outlier is less probable than chance among so many, and alone outweighs all others as they mostly are.
     """
-    ratios, groups = [], problem.groups
+    ratios, groups = [], problem.noise_groups
     count = np.bincount(groups, [len(e) for e in residuals])[groups]
     for e, n, deviation in zip(residuals, count, robust_deviation(residuals, groups), strict=True):
         ratio = np.abs(e) / max(deviation, 1e-300)

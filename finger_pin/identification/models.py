@@ -123,6 +123,7 @@ def _signal(
         ordered=not steady,
         least_noise=recording.settings.outputs[name].least_noise,
         noise_share=recording.settings.outputs[name].noise_share,
+        shared_noise=recording.settings.outputs[name].noise or "",
     )
 
 

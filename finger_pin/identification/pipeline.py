@@ -255,7 +255,7 @@ def _objective(problem: Problem, residuals: Sequence[Array]) -> float:
     """Return minus twice the log-likelihood with equal weights; infinite if a motion fails."""
     if not all(np.isfinite(each).all() for each in residuals):
         return np.inf
-    return minus_twice_likelihood(residuals, np.ones(len(residuals)), problem.groups, problem.least_noise)
+    return minus_twice_likelihood(residuals, np.ones(len(residuals)), problem.noise_groups, problem.least_noise)
 
 
 def _check_influence(problem: Problem, fits: Sequence[Fit], points: Sequence[Array]) -> None:

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from finger_pin.core.threads import in_threads
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.likelihood import NoiseGrowth, block_means, minus_twice_likelihood
+from finger_pin.identification.likelihood import (
+    NoiseGrowth,
+    block_means,
+    minus_twice_likelihood,
+    noise_groups,
+    numbered,
+)
 from finger_pin.identification.limits import Limits
 from finger_pin.identification.recordings import RecordedSignal, RecordingModel, ScenarioMap, unit_of
 from finger_pin.identification.scenario_parameters import (
@@ -49,6 +55,8 @@ class Problem:
         high: Greatest values.
         models: A model for each recording.
         signals: All outputs, in the order of the models.
+        groups: Number of the output of each, whose windows are several signals.
+        noise_groups: Number of the noise of each.
         fixed: Values that the scenario is given first, by key.
         stop: Asked before every evaluation.
         evaluations: Number of scenarios computed.
@@ -74,7 +82,9 @@ class Problem:
     def __post_init__(self) -> None:
         """Check that every key allows its bounds; nuisance parameters of the recordings join the parameters."""
         self.requested_count = len(self.keys)
-        self.growth = NoiseGrowth.from_signals(self.signals, self.groups)
+        self.groups = numbered([f"{signal.recording}.{signal.name}" for signal in self.signals])
+        self.noise_groups = noise_groups(self.signals)
+        self.growth = NoiseGrowth.from_signals(self.signals, self.noise_groups)
         self._slopes: tuple[Array, list[Array]] | None = None
         nuisances = [
             nuisance for model in self.models for nuisance in model.nuisance_parameters if nuisance.key not in self.keys
@@ -83,19 +93,16 @@ class Problem:
         self.low = np.append(self.low, [nuisance.low for nuisance in nuisances])
         self.high = np.append(self.high, [nuisance.high for nuisance in nuisances])
         recordings = [model.recording for model in self.models]
-        self.units = {
-            f"{each.name}.{name}": unit_of(name) for each in recordings for name in (*each.inputs, *each.outputs)
-        }
+        columns = [(each.name, name) for each in recordings for name in (*each.inputs, *each.outputs)]
+        self.units = {f"{recording}.{name}": unit_of(name) for recording, name in columns}
         check_duplicates(self.keys, dict.fromkeys(each.name for each in recordings))
-        requested = enumerate(self.keys[: self.requested_count])
-        self._scenario_indices = np.array([k for k, key in requested if is_scenario_key(key, self.units)], dtype=int)
+        requested = self.keys[: self.requested_count]
+        self._scenario_indices = np.flatnonzero([is_scenario_key(key, self.units) for key in requested])
         keys = tuple(self.keys[k] for k in self._scenario_indices)
 
         def part(model: RecordingModel) -> ScenarioPart:
-            scenario = model.scenario
             check_shadowing(model.recording.name, model.recording.settings, [*keys, *self.fixed])
-            if self.fixed:
-                scenario = with_parameters(scenario, self.fixed)
+            scenario = with_parameters(model.scenario, self.fixed) if self.fixed else model.scenario
             return ScenarioPart.from_keys(scenario, model.recording.name, keys)
 
         self._parts = [part(model) for model in self.models]
@@ -131,13 +138,6 @@ class Problem:
         return any(signal.ordered for signal in self.signals)
 
     @property
-    def groups(self) -> NDArray[np.intp]:
-        """The number of the output that every signal is of: windows of one share its noise."""
-        names = [f"{signal.recording}.{signal.name}" for signal in self.signals]
-        order = list(dict.fromkeys(names))
-        return np.array([order.index(name) for name in names], dtype=np.intp)
-
-    @property
     def least_noise(self) -> Array:
         """The least standard deviation of the residuals of every signal, shape (s,), in its unit."""
         return self.growth.floor
@@ -165,7 +165,7 @@ class Problem:
         if not all(np.isfinite(e).all() for e in errors):
             return self._averaged(errors)
         residuals = self._averaged(self.growth.weigh(errors) if self.growth.active else errors)
-        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.groups, self.least_noise)
+        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.noise_groups, self.least_noise)
         if objective < self.best[0]:
             self.best = (objective, z.copy())
         return residuals

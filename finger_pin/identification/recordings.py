@@ -70,6 +70,7 @@ class RecordedSignal:
         ordered: Whether its samples follow each other in time, so that neighbours may err alike.
         least_noise: Standard deviation that its noise has at least, in its unit.
         noise_share: Part of a reading by which its noise grows.
+        shared_noise: Name of the noise that it shares with others; empty for its own.
     """
 
     recording: str
@@ -83,6 +84,7 @@ class RecordedSignal:
     ordered: bool
     least_noise: float = 0.0
     noise_share: float = 0.0
+    shared_noise: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,7 @@ def result_dataset(problem: Problem, pipeline: FitPipeline, unfinished: str = ""
             variables[f"law_{name}"] = ("law", getattr(comparison, name), {"units": "1"})
     # Searches that end within the interval's rise have found the same minimum.
     least, *objectives = (
-        minus_twice_likelihood(each.residuals, best.weights, problem.groups, problem.least_noise)
+        minus_twice_likelihood(each.residuals, best.weights, problem.noise_groups, problem.least_noise)
         for each in (best, *fits)
     )
     attrs = {
@@ -69,7 +69,7 @@ def result_dataset(problem: Problem, pipeline: FitPipeline, unfinished: str = ""
         "searches": len(fits),
         "searches_alike": sum(each < least + CHI2_95 for each in objectives),
         "evaluations": problem.evaluations,
-        "bic": bic(best.residuals, best.weights, count, problem.groups, problem.least_noise),
+        "bic": bic(best.residuals, best.weights, count, problem.noise_groups, problem.least_noise),
     }
     attrs |= {"unfinished": unfinished} if unfinished else {}
     return xr.Dataset(variables, coordinates, attrs)

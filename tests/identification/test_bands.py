@@ -44,7 +44,7 @@ def linear_fit(slopes, samples):
     rho = np.clip(residual[1:] @ residual[:-1] / (residual @ residual), 0.0, 1.0 - 2.0 / len(samples))
     noise, weight = np.sqrt(np.mean(residual**2)), (1.0 - rho) / (1.0 + rho)
     signal = SimpleNamespace(name="out", recording="one")
-    problem = SimpleNamespace(signals=[signal], groups=np.zeros(1, dtype=int), slopes=lambda z: [slopes])
+    problem = SimpleNamespace(signals=[signal], noise_groups=np.zeros(1, dtype=int), slopes=lambda z: [slopes])
     minimum = SimpleNamespace(
         z=np.zeros(slopes.shape[1]), noise=np.array([noise]), correlation=np.array([rho]), weights=np.array([weight])
     )

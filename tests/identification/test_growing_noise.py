@@ -111,3 +111,39 @@ def test_a_share_without_a_floor_is_refused(output, said):
     with pytest.raises(fp.InputError) as refused:
         fitted(table(np.random.default_rng(1)), **output)
     assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_outputs_that_share_a_noise_are_weighed_alike():
+    """Readings 3, 6, 9 N by a scale of mu: with one noise they are pooled, as by least squares over all of them."""
+    rng, turn, load = np.random.default_rng(3), 1.57, np.repeat([3.0, 6.0, 9.0], 4)
+    data = {
+        name: {"in": load, "out": load * np.exp(-mu * turn) + rng.normal(0.0, spread, load.size)}
+        for name, mu, spread in (("one", 0.10, 0.01), ("two", 0.12, 0.1))
+    }
+
+    def identify(**column):
+        out = {"tendon_tension.T1": {"column": "out", **column}}
+        recording = {"kind": "steady", "speed": 0.01, "inputs": {"tendon_command.T1": "in"}, "outputs": out}
+        given = {"parameters": {"finger.tendon_friction.coulomb": (0.01, 1.0)}, "starts": 1, "profiles": False}
+        return fp.identify("canal", recordings=dict.fromkeys(data, recording), data=data, **given)
+
+    shared, own = identify(noise="cell"), identify()
+    arrived = sum(load @ each["out"] for each in data.values()) / sum(load @ load for _ in data)
+    assert float(shared.estimate[0]) == pytest.approx(-np.log(arrived) / turn, rel=1e-3)
+    assert float(own.estimate[0]) < 0.104
+    rms = np.sqrt(np.mean(shared.residual.values**2))
+    np.testing.assert_allclose(shared.noise, [rms, rms], rtol=1e-9)
+
+
+def test_outputs_with_another_least_noise_share_none():
+    data = {name: {"in": np.ones(3), "out": np.ones(3)} for name in ("one", "two")}
+    recordings = {
+        name: {
+            **{"kind": "steady", "speed": 0.01, "inputs": {"tendon_command.T1": "in"}},
+            "outputs": {"tendon_tension.T1": {"column": "out", "noise": "cell", "least_noise": least}},
+        }
+        for name, least in (("one", 0.1), ("two", 0.2))
+    }
+    given = {"parameters": {"finger.tendon_friction.coulomb": (0.01, 1.0)}}
+    with pytest.raises(fp.InputError, match=r'two.outputs.*T1.noise = "cell".*least_noise is 0.1, not 0.2'):
+        fp.identify("canal", recordings=recordings, data=data, **given)

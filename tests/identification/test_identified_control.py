@@ -69,7 +69,7 @@ def test_profiles_follow_a_likelihood_that_errors_of_runs_do_not_make_jump():
     problem, jumps = build_problem(scenario, settings, taken), []
     for each in (problem, problem.fine()):
         along = [problem.start + 1e-6 * k for k in range(9)]
-        noise = np.ones(len(SEEN)), problem.groups, problem.least_noise
+        noise = np.ones(len(SEEN)), problem.noise_groups, problem.least_noise
         met = [minus_twice_likelihood(each.residuals(z), *noise) for z in along]
         jumps.append(np.max(np.abs(np.diff(met, 2))))
     # What is a four-hundredth of the 3.84 that ends an interval is rounding, and may be as large either way.

@@ -27,6 +27,7 @@ def stub(residual, slopes, *, ordered=True, replicate=None, weight=1.0):
         signals=[signal],
         models=[SimpleNamespace(recording=recording)],
         groups=np.zeros(1, dtype=int),
+        noise_groups=np.zeros(1, dtype=int),
         keys=("a",) * slopes.shape[1],
         box=(np.full(slopes.shape[1], -1e6), np.full(slopes.shape[1], 1e6)),
         slopes=lambda z: [slopes],

@@ -72,6 +72,13 @@ class Column(Description):
     noise_share: Annotated[float, real(0.0, 1.0)] = quantity(
         0.0, unit="1", source="the sensor", doc="Outputs: part of a reading by which noise grows, beside least_noise."
     )
+    noise: str | None = Field(
+        None,
+        strict=True,
+        min_length=1,
+        max_length=200,
+        description="Outputs: a name for the noise that several of one unit share; each has its own by default.",
+    )
     delay: Annotated[float, real(-10.0, 10.0)] = quantity(
         0.0, unit="s", source="calibration", doc="Delay of the column behind its quantity; motions only."
     )
@@ -187,7 +194,7 @@ class RecordingSettings(TableFormat):
             raise problem("parameters", "are for a recording that is fitted, and this one is held out")
         _check_ordered(self.parameters)
         for name, column in {**{f"inputs.{k}": c for k, c in self.inputs.items()}, "time": self.time}.items():
-            for key in ("least_noise", "noise_share"):
+            for key in ("least_noise", "noise_share", "noise"):
                 if column is not None and getattr(column, key):
                     raise problem(f"{name}.{key}", "is for outputs only", getattr(column, key))
         for key, value in self.values.items():
