@@ -64,7 +64,12 @@ class SimulationSettings(Description):
     atol_scale: Annotated[float, real(LEAST_ATOL_SCALE, 0.1)] = quantity(
         1e-6, unit="1", source="energy account", doc="Absolute tolerance over the scale of each kind of state."
     )
-
+    max_step: Annotated[float, real(0.0, 1e3, above=True)] | None = quantity(
+        None,
+        unit="s",
+        source="chosen",
+        doc="Methods of scipy: maximum step size, as touches within a step are not seen.",
+    )
     start_time: Annotated[float, real(-1e6, 1e6)] = quantity(
         0.0, unit="s", source="chosen", doc="Time of references, tensions and forces at t = 0."
     )

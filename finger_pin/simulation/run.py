@@ -69,6 +69,8 @@ def run(
         warnings.warn(damping_message, MicroDampingWarning, stacklevel=5)
     setup = Setup.from_scenario(scenario, loop, custom, control_period)
     loop = setup.loop
+    if setup.touch_warning:
+        warnings.warn(setup.touch_warning, AccuracyWarning, stacklevel=5)
 
     def watch(time: float, x: Array) -> None:
         if progress is not None:

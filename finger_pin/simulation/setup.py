@@ -13,7 +13,6 @@ from finger_pin.control.interface import LoopController
 from finger_pin.control.motor_signals import spool_windings, voltage_signals
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
-from finger_pin.core.collision.interpolants import meetings
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -94,6 +93,9 @@ class Setup:
             method = _METHOD_WITHOUT_SAMPLING
         if scenario.simulation.method not in METHODS_IN_NUMPY:
             loop = loop.compiled()
+        if scenario.simulation.max_step is not None and method in TABLEAUS:
+            allowed = "is for methods of scipy and continuous controllers in Python; the others see all touches"
+            raise InputError("simulation.max_step", allowed, scenario.simulation.max_step)
         controller = loop.controller
         sampled = None if sampling is None else SampledController(loop, sampling)
         if has_position_drives:
@@ -141,8 +143,7 @@ class Setup:
             method=self.method,
             rtol=settings.rtol,
             atol=settings.atol_scale * loop.finger.layout.scales(),
-            longest=loop.longest_step(settings.rtol),
-            meeting=meetings(loop.finger.mechanism),
+            max_step=min(loop.longest_step(settings.rtol), settings.max_step or np.inf),
             watch=watch,
             stop=stop,
         )
@@ -186,6 +187,17 @@ class Setup:
             method=self.method,
             rtol=tolerances.rtol,
             atol_scale=tolerances.atol_scale,
+        )
+
+    @property
+    def touch_warning(self) -> str:
+        """The warning that touches between the ends of steps are not seen; empty where they are, or there are none."""
+        contacts = any(table.law.arms > 1 for table in self.loop.finger.mechanism.rows)
+        if self.method in TABLEAUS or self.scenario.simulation.max_step is not None or not contacts:
+            return ""
+        return (
+            f"{self.method} sees touches at the ends of its steps only: give simulation.max_step, s, less than a touch "
+            f"lasts, or a controller that is sampled"
         )
 
     def ringing(self, trajectory: Trajectory, slow_steps: int) -> str:

@@ -74,7 +74,7 @@ def simulate(
     Warns:
         SelfLockingWarning: If the joints' friction comes close to what locks the finger on the scenario's reference;
             the result's attribute ``self_locking_margin`` says how close, not so with a custom controller or reference.
-        AccuracyWarning: If a contact is stiffer than what the tolerances tell.
+        AccuracyWarning: If a contact is stiffer than what the tolerances tell, or a method may pass over touches.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
     scenario, controls = with_named_samples(load_scenario(scenario), controller)

@@ -126,3 +126,10 @@ def test_a_number_that_changes_nothing_does_not_end_a_run_that_asks_for_many_jac
 
     found = integrate(rhs, np.array([2.0, 0.0, 0.0]), 600.0, method="Radau", rtol=1e-3, atol=np.full(3, 1e-3))
     assert not found.failure and found.statistics.jacobians > 200
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_step_is_longer_than_the_maximum(method):
+    trajectory = run(decay, method=method, rtol=1e-3, max_step=0.05)
+    assert np.diff(trajectory.breakpoints).max() <= 0.05 * (1.0 + 1e-12)
+    assert np.diff(run(decay, method=method, rtol=1e-3).breakpoints).max() > 0.05

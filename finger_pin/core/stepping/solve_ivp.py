@@ -1,18 +1,15 @@
-"""Integration of x' = f(t, x) by scipy's stiff solvers: the readable path, and a reference for the compiled one."""
+"""Integration of x' = f(t, x) by `scipy.integrate.solve_ivp`: the readable path, a reference for the compiled one."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import scipy
 
 from finger_pin.cancellation import Stop
-from finger_pin.core.steps.trajectory import Meeting, Statistics, Trajectory, Watch
+from finger_pin.core.steps.trajectory import Statistics, Trajectory, Watch
 from finger_pin.typing import Array
 
 # So many steps in a row must advance by so much time each on average, s, and so many are kept in memory at most.
@@ -27,8 +24,7 @@ def integrate(
     method: str,
     rtol: float,
     atol: Array,
-    longest: float = np.inf,
-    meeting: Meeting | None = None,
+    max_step: float = np.inf,
     watch: Watch | None = None,
     stop: Stop | None = None,
 ) -> Trajectory:
@@ -41,103 +37,73 @@ def integrate(
         method: ``Radau``, ``BDF`` or ``LSODA``.
         rtol: Relative tolerance.
         atol: Absolute tolerance, shape (size,).
-        longest: The longest step, s.
-        meeting: Finds when bodies meet within a step that does not show it: it is taken again, to end there.
+        max_step: Maximum size of a step, s.
         watch: Called with the simulated time and the state after every step.
         stop: Asked after every step; true ends the integration there.
     """
-    began = time.perf_counter()
-    system, run = _System(rhs), _Steps([0.0], [], [])
-    options: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": longest}
+    began, system, steps = time.perf_counter(), _System(rhs), _StepEnds(watch, stop)
+    options = {"method": method, "rtol": rtol, "atol": atol, "max_step": max_step, "dense_output": True}
     if method in ("Radau", "BDF"):
         options["jac"] = _Jacobian(system, atol / rtol)
-    solver = partial(run.solver, getattr(scipy.integrate, method), system, options)
-    x, reason, interrupted, current = np.array(start, dtype=float), "", False, None
-    while run.times[-1] < duration and not reason and not interrupted:
-        current, reason = _take_step(current, partial(solver, x, duration), system, run.times[-1])
-        if reason:
-            break
-        reached, dense = float(current.t), current.dense_output()
-        met = None if meeting is None else meeting(run.times[-1], reached, _transposed(dense))
-        if met is not None:
-            current = solver(x, met)
-            continue
-        run.times.append(reached)
-        run.dense.append(dense)
-        x = current.y.copy()
-        reason = run.exhausted
-        if watch is not None:
-            watch(reached, x)
-        interrupted = stop is not None and not reason and reached < duration and stop()
+    # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
+    with np.errstate(over="ignore", invalid="ignore"):
+        try:
+            solved = scipy.integrate.solve_ivp(system, (0.0, duration), start, events=steps, **options)
+            failure = steps.failure or (solved.message if solved.status < 0 else "")
+        except (ValueError, scipy.linalg.LinAlgError, _StepFailedError) as error:
+            if error is system.error:
+                raise
+            known = isinstance(error, _StepFailedError)
+            failure = str(error) if known else f"the state or its Jacobian is not finite ({error})"
+            # What came before the step that failed is computed once more: scipy keeps nothing of it.
+            reached, silent = steps.times[-1], _StepEnds()
+            solved = reached and scipy.integrate.solve_ivp(system, (0.0, reached), start, events=silent, **options)
+    if not solved:
+        start = np.array(start, dtype=float)
+        nothing = Statistics(0, system.evaluations, 0, 0, time.perf_counter() - began)
+        return Trajectory(np.zeros(1), lambda at: np.tile(start, (len(at), 1)), nothing, failure)
+    counts = system.evaluations, solved.njev, solved.nlu
     return Trajectory(
-        breakpoints=np.array(run.times),
-        interpolate=run.interpolant(start),
-        statistics=run.statistics(system.evaluations, time.perf_counter() - began),
-        failure=reason,
-        interrupted=interrupted,
+        breakpoints=solved.t,
+        interpolate=lambda at: np.asarray(solved.sol(at).T),
+        statistics=Statistics(len(solved.t) - 1, *counts, time.perf_counter() - began),
+        failure=failure,
+        interrupted=steps.interrupted,
     )
 
 
-def _take_step(solver: Any, renewed: Callable[[], Any], system: _System, last: float) -> tuple[Any, str]:
-    """Take a step, with a new solver if there is none; return the solver, and the step's fault or an empty text."""
-    try:
-        # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
-        with np.errstate(over="ignore", invalid="ignore"):
-            if solver is None or solver.status == "finished":
-                solver = renewed()
-            return solver, _fault(solver, solver.step(), last)
-    except (ValueError, scipy.linalg.LinAlgError) as error:
-        if error is system.error:
-            raise
-        return solver, f"the state or its Jacobian is not finite ({error})"
+class _StepFailedError(Exception):
+    """A step has ended where it began, or where a number is not finite; scipy would go on."""
 
 
-def _fault(solver: Any, message: str | None, last: float) -> str:
-    """Return the fault of a step that scipy has made from a time, s; empty for none."""
-    if solver.status == "failed":
-        return str(message)
-    if not np.all(np.isfinite(solver.y)):
-        return "the state is not finite"
-    return "" if float(solver.t) > last else "the step size is less than the spacing between numbers"
+class _StepEnds:
+    """An event of scipy's that watches the ends of steps, and occurs at the last one if the integration is to stop."""
 
+    terminal = True
 
-def _transposed(dense: Any) -> Callable[[Array], Array]:
-    return lambda at: np.asarray(dense(at).T)
+    def __init__(self, watch: Watch | None = None, stop: Stop | None = None) -> None:
+        self._watch, self._stop, self._end = watch, stop, np.inf
+        self.times, self.failure, self.interrupted = list[float](), "", False
 
-
-@dataclass(frozen=True)
-class _Steps:
-    """The ends of steps with the start first, their interpolants, and the solvers that took them."""
-
-    times: list[float]
-    dense: list[Any]
-    solvers: list[Any]
-
-    def solver(self, kind: Any, system: _System, options: Mapping[str, Any], x: Array, end: float) -> Any:
-        """Return a new solver that starts where the steps end, at a state."""
-        self.solvers.append(kind(system, self.times[-1], x, end, **options))
-        return self.solvers[-1]
-
-    @property
-    def exhausted(self) -> str:
-        """The reason to stop, steps that are too short or too many; empty without one."""
-        steps = len(self.dense)
-        if steps > _MOST_STEPS:
-            return f"after {_MOST_STEPS} steps the trajectory has reached the most that is kept in memory"
-        if steps % _WINDOW == 0 and self.times[-1] - self.times[-1 - _WINDOW] < _WINDOW * _LEAST_MEAN_STEP:
-            return f"the last {_WINDOW} steps advanced by less than {_LEAST_MEAN_STEP:g} s each"
-        return ""
-
-    def statistics(self, evaluations: int, wall_time: float) -> Statistics:
-        """Return the statistics of the steps."""
-        jacobians, factorisations = (sum(int(getattr(each, n)) for each in self.solvers) for n in ("njev", "nlu"))
-        return Statistics(len(self.dense), evaluations, jacobians, factorisations, wall_time)
-
-    def interpolant(self, start: Array) -> Callable[[Array], Array]:
-        """Return the function from times to states."""
-        if not self.dense:
-            return lambda at: np.tile(start, (len(at), 1))
-        return _transposed(scipy.integrate.OdeSolution(self.times, self.dense))
+    def __call__(self, instant: float, x: Array) -> float:
+        # Once it has occurred, scipy looks for the moment.
+        if self._end == np.inf:
+            if self.times and not instant > self.times[-1]:
+                raise _StepFailedError("the step size is less than the spacing between numbers")
+            if not np.all(np.isfinite(x)):
+                raise _StepFailedError("the state or its Jacobian is not finite")
+            self.times.append(float(instant))
+            steps = len(self.times) - 1
+            if steps and self._watch is not None:
+                self._watch(instant, x)
+            self.interrupted = bool(steps and self._stop is not None and self._stop())
+            if steps >= _MOST_STEPS:
+                self.failure = f"after {_MOST_STEPS} steps the trajectory has reached the most that is kept in memory"
+            elif steps % _WINDOW == 0 < steps and instant - self.times[-1 - _WINDOW] < _WINDOW * _LEAST_MEAN_STEP:
+                self.failure = f"the last {_WINDOW} steps advanced by less than {_LEAST_MEAN_STEP:g} s each"
+            if self.interrupted or self.failure:
+                self._end = instant
+        return self._end - instant
 
 
 class _Jacobian:

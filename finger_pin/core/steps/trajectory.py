@@ -10,8 +10,6 @@ from finger_pin.core.steps.repetition import Steps
 from finger_pin.typing import Array
 
 Watch = Callable[[float, Array], None]
-#: Maps the start and the end of a step and its interpolant to when bodies meet that it does not show there; else None.
-Meeting = Callable[[float, float, Callable[[Array], Array]], float | None]
 
 
 @dataclass(frozen=True)
