@@ -227,7 +227,7 @@ def test_fingers_that_are_told_not_to_touch_still_touch_objects():
 def test_methods_that_may_pass_over_touches_say_so_unless_their_steps_are_bounded():
     short = {"simulation.duration": 2e-4, "simulation.method": "BDF"}
     with pytest.warns(
-        fp.AccuracyWarning, match=r"BDF sees touches at the ends of its steps only: give simulation.max_step"
+        AccuracyWarning, match=r"BDF sees touches at the ends of its steps only: give simulation.max_step"
     ):
         fp.simulate(fp.load_scenario("press", short))
     result = fp.simulate(fp.load_scenario("press", short | {"simulation.max_step": 1e-5}))
