@@ -16,7 +16,7 @@ from finger_pin.commands.console import bar, error_note, print_text, shows_progr
 from finger_pin.commands.options import Output, invalid
 
 if TYPE_CHECKING:
-    from validation.report import Family
+    from validation.families import Family
 
 #: Names on the command line, and the modules in scripts/validation, in the order of the report.
 FAMILIES = {
@@ -57,10 +57,11 @@ def validate(
         return 1 if random_models.check(random, seed) else 0
     from validation import report
     from validation.check import Verdict
+    from validation.families import Report
 
     output.mkdir(parents=True, exist_ok=True)
     with error_note("nothing was written"):
-        whole = report.Report.now(measured(names))
+        whole = Report.now(measured(names))
     report.write(whole, output)
     print_text(f"{report.text(whole)}\n\nThe report is {output / report.PAGE}")
     return 1 if whole.count(Verdict.FAIL) else 0
@@ -80,7 +81,7 @@ def chosen(names: str) -> tuple[str, ...]:
 def measured(names: tuple[str, ...]) -> tuple[Family, ...]:
     """Return the results of the named families of checks; on a terminal, show progress."""
     from validation.check import Section, failed
-    from validation.report import Family
+    from validation.families import Family
 
     found: list[Family] = []
     with bar(sys.stderr.isatty(), "families", len(names)) as show:

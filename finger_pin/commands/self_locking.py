@@ -72,5 +72,5 @@ def with_scaled_friction(name: str, scenario: Scenario, factor: float) -> Scenar
 
     friction = scenario.finger.joint_friction
     friction_values = (factor * np.asarray(friction.break_away)).tolist()
-    keys = ("coulomb",) if friction.law in ("dahl", "coulomb") else ("coulomb", "stiction")
+    keys = dict.fromkeys(("coulomb", friction.break_away_entry))
     return load_scenario(name, {f"finger.joint_friction.{key}": friction_values for key in keys})

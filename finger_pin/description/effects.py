@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
+from finger_pin.description.friction import WITHOUT_STRIBECK
 from finger_pin.description.validation import Description, problem
 
 
@@ -65,7 +66,7 @@ OF_FINGER = (
     Rule(
         "joint_friction",
         _STRIBECK,
-        lambda _, friction: friction.law not in ("dahl", "coulomb"),
+        lambda _, friction: friction.law not in WITHOUT_STRIBECK,
         'has no effect with law = "dahl" or "coulomb"',
     ),
     Rule(

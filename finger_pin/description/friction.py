@@ -16,6 +16,8 @@ from finger_pin.typing import Array, Number
 
 #: Laws of the joints' friction by name.
 JOINT_LAWS = ("lugre", "dahl", "coulomb")
+#: Those without Stribeck's curve: a joint lets go at M^d.
+WITHOUT_STRIBECK = ("dahl", "coulomb")
 # Bristles without a stiffness: the least, N/m and N m/rad, and how far they give, m and rad. They harden over a tenth
 # of that: up to forces of e^8 times those at which they begin to, they give by no more.
 _TENDON_BRISTLES, _JOINT_BRISTLES, _PARTS = (5e4, 2e-5), (5.0, 1e-3), 10.0
@@ -133,11 +135,11 @@ class JointFrictionSettings(Description):
     @property
     def break_away_entry(self) -> str:
         """Name of the entry that is `break_away`."""
-        return "coulomb" if self.law in ("dahl", "coulomb") else "stiction"
+        return "coulomb" if self.law in WITHOUT_STRIBECK else "stiction"
 
     @model_validator(mode="after")
     def _stiction_above_coulomb(self) -> Self:
-        if self.law in ("dahl", "coulomb"):
+        if self.law in WITHOUT_STRIBECK:
             return self
         both = isinstance(self.coulomb, tuple) and isinstance(self.stiction, tuple)
         if both and len(self.coulomb) != len(self.stiction):  # type: ignore[arg-type]

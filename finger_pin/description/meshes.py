@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from finger_pin.description.validation import Description, problem
+from finger_pin.typing import Array
 
-Array = NDArray[np.float64]
 _POINT_DTYPE, _FACE_DTYPE = "<f4", "<i4"
 
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, field_serializer, field_validator, model_validator
 
 from finger_pin.description.placement import PathSignal
@@ -15,8 +14,8 @@ from finger_pin.description.signals import ForceSignal, check_axes
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
 from finger_pin.description.tables import dump_set_fields
 from finger_pin.description.validation import Description, FullName, Name, choice, problem, quantity, real, vector
+from finger_pin.typing import Array
 
-Array = NDArray[np.float64]
 #: The coordinates of an object's path.
 PATH = ("x", "y", "z")
 

@@ -13,6 +13,7 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.runs import rms
 from benchmarks.store import Store
+from benchmarks.text_tables import table
 from benchmarks.timing import interleaved
 from finger_pin.typing import Array
 
@@ -133,8 +134,6 @@ def _mujoco_runs() -> dict[str, Callable[[Array], Array]]:
 
 def lines(study: Mapping[str, Any]) -> Iterator[str]:
     """Yield the measurements as text."""
-    from benchmarks.report import table
-
     yield f"control steps of {1e3 * _PERIOD:g} ms of Reach: wall time of each, rms error of the angles"
     for kind, found in study["kinds"].items():
         names = {

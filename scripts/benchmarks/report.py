@@ -10,6 +10,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks import identification, learning, mujoco_friction, mujoco_warp_friction, prepared
 from benchmarks.targets import Target
+from benchmarks.text_tables import table
 from benchmarks.work_precision import OURS
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import GREY, new_figure, styled
@@ -41,14 +42,6 @@ def text(stages: Mapping[str, Any], reached: Sequence[Target], quick: bool) -> s
             parts += ["", *lines(stages[name])]
     parts += ["", *_targets(reached, quick)]
     return "\n".join(parts).strip()
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield aligned lines: the first column to the left, the others to the right."""
-    widths = [max(len(row[column]) for row in [head, *rows]) for column in range(len(head))]
-    for row in [head, *rows]:
-        cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        yield "  ".join(cells).rstrip()
 
 
 def _seconds(value: float | None) -> str:

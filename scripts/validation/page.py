@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING
 
 from finger_pin.views.document import document, image
 from validation.check import Check, Picture, Verdict
-
-if TYPE_CHECKING:
-    from validation.report import Family, Report
+from validation.families import Family, Report
 
 _STYLE = """
 .outcome { font-size: 1.15rem; font-weight: 600; margin: .8rem 0 .2rem; }

@@ -9,8 +9,9 @@ import pytest
 from validate import FAMILIES, import_module, validate
 from validation import methods, servo, stiffness, symmetry
 from validation.check import Section, Verdict, compare, skipped
+from validation.families import Family, Report
 from validation.page import page
-from validation.report import Family, Report, headline, text
+from validation.report import headline, text
 
 from finger_pin.commands.application import run_function
 from finger_pin.description.actuators import PositionLoop
