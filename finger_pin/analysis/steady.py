@@ -49,10 +49,12 @@ def steady_state(
     actuators, v = finger.actuators, np.asarray(speed, dtype=float)[:, None]
     actuated, pulled = finger.routing.actuated, _with_ideal_sources(finger)
     postures = np.zeros((len(v), len(finger.routing.joints))) if position is None else position
-    x = np.array([pulled.rest_state(posture) for posture in postures]).reshape(len(v), pulled.layout.size)
+    x = np.tile(pulled.rest_state(np.zeros(postures.shape[1])), (len(v), 1))
+    state = pulled.layout.unpack(x)
+    state.position[:], state.passive_position[:] = postures, pulled.tendons.rest_position(postures)
     inputs = np.zeros((len(v), pulled.mechanism.channels))
     inputs[:, :actuated] = command
-    rows = pulled.mechanism.evaluate(x, inputs, sliding=sliding_tendons(pulled, v, at_rest=at_rest)).rows
+    rows = pulled.mechanism.row_signals(x, inputs, sliding=sliding_tendons(pulled, v, at_rest=at_rest))
     tension = rows["driven_tendons"].force
     for table, weights in pulled.wraps.items():
         tension = tension + weighted_sum(rows[table].force, weights[:actuated].T)

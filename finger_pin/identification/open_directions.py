@@ -51,7 +51,8 @@ def open_directions(problem: Problem, minimum: Fit, loss: str = "linear") -> lis
     for value, vector in zip(values, vectors.T, strict=True):
         if 1.0 / math.sqrt(max(value, 1e-300)) >= _FREE_DEVIATION:
             direction = vector * width
-            size = np.abs(direction) / np.max(np.abs(direction))
+            # In parts of the ranges: what has little room is moved across it by little.
+            size = np.abs(vector) / np.max(np.abs(vector))
             shown = [k for k in range(len(size)) if size[k] > _SMALL_ENTRY]
             directions.append(_describe(problem, minimum, direction, shown, loss))
     return directions
@@ -73,7 +74,8 @@ def _describe(problem: Problem, minimum: Fit, direction: Array, shown: Sequence[
     if step is None:
         text = f"by slopes a combination of {listed} is open, along which the bounds leave no room for a try"
         return OpenDirection(text, tuple(shown))
-    moved, rise = _refit_after(problem, minimum, step, int(np.argmax(size)), loss)
+    low, high = problem.box
+    moved, rise = _refit_after(problem, minimum, step, int(np.argmax(np.abs(step) / (high - low))), loss)
     example = _step_text(problem, moved - minimum.z)
     if rise < CHI2_95:
         text = f"only a combination of {listed} is determined: with {example} the recordings are met as well"
@@ -92,7 +94,8 @@ def _step_within_bounds(problem: Problem, z: Array, direction: Array) -> Array |
         room = np.where(step > 0.0, high - z, z - low)
         shares = np.divide(room, np.abs(step), out=np.full(len(z), np.inf), where=step != 0.0)
         # Entries that hardly count are cut at their bounds.
-        counted = np.abs(step) > _SMALL_ENTRY * np.max(np.abs(step))
+        size = np.abs(step) / (high - low)
+        counted = size > _SMALL_ENTRY * np.max(size)
         share = min(1.0, float(np.min(shares[counted])))
         steps.append((share, np.clip(z + share * step, low, high) - z))
     share, longest = max(steps, key=lambda pair: pair[0])
@@ -112,5 +115,6 @@ def _step_text(problem: Problem, step: Array) -> str:
     parts = []
     for k in np.flatnonzero(size > _SMALL_MOVE * np.max(size)):
         change = f"times {math.exp(step[k]):.3g}" if problem.logarithmic[k] else f"plus {step[k]:.3g}"
-        parts.append(f"{problem.keys[k]} {change}")
+        if change != "times 1":
+            parts.append(f"{problem.keys[k]} {change}")
     return ", ".join(parts)

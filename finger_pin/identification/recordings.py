@@ -34,6 +34,7 @@ SI_UNITS = {
     "tendon_velocity": "m/s",
     "joint_position": "rad",
     "joint_reference": "rad",
+    "tracking_error": "rad",
     "joint_velocity": "rad/s",
     "joint_torque": "N m",
     "joint_effort": "N m",

@@ -179,6 +179,12 @@ class Mechanism:
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
 
+    def row_signals(
+        self, x: Array, command: Array, force: Array | None = None, sliding: Sliding | None = None
+    ) -> dict[str, RowSignals]:
+        """Return the signals of all tables, by name, without accelerations; arguments are those of `evaluate`."""
+        return self._rows(x, np.asarray(command, dtype=float), self._forces(force, x.shape[:-1]), sliding)[0]
+
     def with_row_states(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
         """Return a packed state with the states that rows had in an evaluation."""
         state = np.array(x, dtype=float)

@@ -97,7 +97,8 @@ def test_bands_hold_the_next_recording_where_friction_differs_from_day_to_day():
         ratio = np.sqrt(squares[-1][0] / squares[-1][1])
         assert float(result.prediction_band_ratio[0]) == pytest.approx(ratio, rel=1e-9)
     band, error = np.mean(squares, axis=0)
-    assert 0.9 < np.mean(within) < 0.98
+    # Of ten days whose coefficients miss together, the mean share varies by some 5 %.
+    assert 0.85 < np.mean(within) <= 1.0
     assert 0.7 < np.sqrt(band / error) < 2.5
     assert re.search(r"% of 12 samples within the 95 % band, half of which is [\d.]+ times 1.96 rms", told(result))
 

@@ -101,7 +101,7 @@ def test_coulomb_and_stiction_of_joints_are_found_together_though_their_bounds_o
 
 def test_values_that_do_not_go_together_are_brought_to_where_they_do_and_those_that_are_held_stay():
     family = ParametrisedScenario(fp.load_scenario("reversals"), (JOINT_COULOMB, JOINT_STICTION))
-    part = ScenarioPart(family, np.arange(2))
+    part = ScenarioPart(family, np.arange(2), np.ones(2))
     limits = Limits.from_parts([part], family.keys, np.array([1e-4, 1e-4]), np.array([1e-3, 2e-3]))
     for given, free, nearest in [
         ((3e-4, 5e-4), (True, True), (3e-4, 5e-4)),
