@@ -41,6 +41,10 @@ class LeftOutWarning(ScenarioWarning):
     """Something of a model that moves or carries anything was not carried over."""
 
 
+class StartWarning(ScenarioWarning):
+    """A run starts beyond the range of a joint or cord, whose stop throws it back."""
+
+
 class ClosureWarning(ScenarioWarning):
     """A finger whose tendons run along paths loses force closure somewhere in its range."""
 

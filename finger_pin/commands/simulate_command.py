@@ -55,6 +55,8 @@ def simulate(
     if scenario is not None and mujoco is not None:
         raise invalid("SCENARIO", f"{scenario}: --mujoco takes its place")
     if listed:
+        if beside := scenario or mujoco:
+            raise invalid("--list", f"lists all there is; leave out {beside}")
         print_text(listing())
         return
     from finger_pin.description.loading import load_scenario

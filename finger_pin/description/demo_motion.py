@@ -33,11 +33,6 @@ def demo_motion(description: FingerDescription, duration: float = 4.0) -> dict[s
         phase = 2.0 * math.pi * next(phases) / count
         return {"offset": middle, "amplitude": half, "frequency": _FREQUENCY, "phase": phase}
 
-    position = {}
-    first = next(iter(tree.keyframes.values())).position if tree.keyframes else {}
-    for name, joint in description.joints.items():
-        lower, upper = joint.range
-        position[name] = first.get(name, min(max(tree.joints[name].reference, lower), upper))
     return {
         "name": description.name,
         "title": f"{description.name}: {'every actuator to and fro' if count else 'it falls, as nothing drives it'}",
@@ -47,8 +42,25 @@ def demo_motion(description: FingerDescription, duration: float = 4.0) -> dict[s
             "tensions": {name: swing(_TENSION, 0.5 * _TENSION) for name in description.actuated_names},
             "inputs": {name: swing(*_range(description, each)) for name, each in tree.actuators.items()},
         },
-        "simulation": {"duration": duration, "initial": {"position": position}},
+        "simulation": {"duration": duration, "initial": {"position": start_position(description)}},
     }
+
+
+def start_position(description: FingerDescription) -> dict[str, float]:
+    """Return where joints start if nothing else is said, rad: amid their ranges, or where a tree does.
+
+    That is its first keyframe, or its references, within the ranges.
+    """
+    tree, position = description.tree, {}
+    first = next(iter(tree.keyframes.values())).position if tree.keyframes else {}
+    for name, joint in description.joints.items():
+        lower, upper = joint.range
+        start = 0.5 * (lower + upper)
+        if name in tree.joints:
+            reference = tree.joints[name].reference
+            start = min(max(reference, lower), upper) if joint.limited else reference
+        position[name] = first.get(name, start)
+    return position
 
 
 def idle_inputs(description: FingerDescription) -> list[str]:

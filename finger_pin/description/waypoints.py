@@ -64,7 +64,8 @@ class Waypoint(Description):
         axis, away = np.array([x, y, z]), np.subtract(point.position, self.position)
         # Turned back into the frame of the wrap.
         local = away - 2.0 * w * np.cross(axis, away) + 2.0 * np.cross(axis, np.cross(axis, away))
-        return bool(np.linalg.norm(local[: 2 if self.kind == "cylinder" else 3]) < self.radius)
+        # On the surface, to rounding, it may wrap.
+        return bool(np.linalg.norm(local[: 2 if self.kind == "cylinder" else 3]) < (1.0 - 1e-9) * self.radius)
 
 
 def check_path(path: dict[str, Waypoint]) -> None:

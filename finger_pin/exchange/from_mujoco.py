@@ -26,8 +26,8 @@ from finger_pin.exchange.mujoco_keyframes import read_keyframes
 from finger_pin.exchange.mujoco_names import Names, Table, entry_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
-from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies, within_margin
-from finger_pin.exchange.mujoco_unsupported import ElementReader, LeftOutElements, apply_flags
+from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies
+from finger_pin.exchange.mujoco_unsupported import ElementReader, LeftOutElements, apply_flags, within_margin
 from finger_pin.mechanism.tendon_paths import rotation
 from finger_pin.version import installing
 

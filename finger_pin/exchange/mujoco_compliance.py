@@ -14,6 +14,8 @@ from finger_pin.typing import Array
 _IMPEDANCE_RANGE = 1e-4, 0.9999
 #: Speed of the impact at which restitution is matched, m/s, and the least restitution.
 IMPACT_SPEED, LEAST_RESTITUTION = 0.1, 0.05
+# Acceleration of the load under which depths are compared, m/s2 or rad/s2, and the difference that is listed, m or rad.
+_LOAD, _GREATEST_DIFFERENCE = 9.81, 1e-3
 # Greatest stiffness of descriptions, N/m or N m/rad.
 _MAX_STIFFNESS = 1e7
 
@@ -25,7 +27,8 @@ def soft_spring(
 
     MuJoCo's force is (a_ref - a) / R with a_ref = -b v - k d r and R = (1 - d) / d times the mobility (manual,
     "Computation: Constraint model"): under a load a spring of k d / R beside a damper of b / R. Within the width the
-    impedance d is smaller, and the constraint gives more. The inertia of 1 / R that MuJoCo adds is left out:
+    impedance d is smaller, and the constraint gives more: by how much is listed if it is more than 1 mm or 1 mrad under
+    the weight of the inertia that meets it. The inertia of 1 / R that MuJoCo adds is left out:
     beside the same spring, a stop throws back as much of an impact's speed with the same damping ratio, b / (2 sqrt k),
     of the inertia that meets it. What is stiffer than descriptions have is listed, by the name of its element.
 
@@ -42,6 +45,10 @@ def soft_spring(
         line = f"{element}: stiffness {spring:.2g} by its solref and solimp, {_MAX_STIFFNESS:.2g} here"
         reader.left_out.add(line, moves=False)
         spring = _MAX_STIFFNESS
+    if depths := depths_at_rest(reader, solref, solimp):
+        theirs, ours = depths
+        line = f"by its solimp it gives {theirs:.3g} under the weight of what it holds, {ours:.3g} here, m or rad"
+        reader.left_out.add(f"{element}: {line}", moves=False)
     if stop and mobility > 0.0:
         damper = damping * math.sqrt(spring / (stiffness * mobility))
     return spring, min(damper, _MAX_STIFFNESS)
@@ -55,6 +62,37 @@ def contact_numbers(reader: ElementReader, solref: Array, solimp: Array, mobilit
     spring, _, stiffness, damping = _springs(reader, solref, solimp, mobility)
     share = restitution(0.5 * damping / math.sqrt(stiffness))
     return spring, impact_damping(max(share, LEAST_RESTITUTION)) / IMPACT_SPEED
+
+
+def depths_at_rest(reader: ElementReader, solref: Array, solimp: Array) -> tuple[float, float] | None:
+    """Return how deep a constraint is at rest in MuJoCo and here, m or rad; None where they differ by less than 1e-3.
+
+    The load is 9.81 m/s2 or rad/s2 of the inertia 1/A that meets it, so that A drops out of MuJoCo's force at rest,
+    F = k d(r)^2 r / ((1 - d(r)) A), with d(r) of its manual ("Solver parameters"): over the width it goes from the
+    first number of ``solimp`` to the second. Here d is the second.
+    """
+    stiffness = _springs(reader, solref, solimp, 1.0)[2]
+    low, high = (min(max(float(each), _IMPEDANCE_RANGE[0]), _IMPEDANCE_RANGE[1]) for each in solimp[:2])
+    width, middle, power = (float(each) for each in solimp[2:5])
+
+    def impedance(depth: float) -> float:
+        x = depth / width if width > 0.0 else 1.0
+        if x >= 1.0:
+            return high
+        rising = x <= middle
+        near, room = (x, middle) if rising else (1.0 - x, 1.0 - middle)
+        part = near if power == 1.0 or room <= 0.0 else near**power / room ** (power - 1.0)
+        return low + (part if rising else 1.0 - part) * (high - low)
+
+    def excess(depth: float) -> float:
+        d = impedance(depth)
+        return stiffness * d * d * depth - _LOAD * (1.0 - d)
+
+    if stiffness <= 0.0:
+        return None
+    ours, least = _LOAD * (1.0 - high) / (stiffness * high**2), min(low, high)
+    theirs = float(brentq(excess, 0.0, 2.0 * _LOAD / (stiffness * least**2), xtol=1e-12, rtol=1e-9))
+    return (theirs, ours) if abs(theirs - ours) > _GREATEST_DIFFERENCE else None
 
 
 def restitution(ratio: float) -> float:

@@ -80,6 +80,13 @@ def _points(reader: ElementReader, i: int) -> list[Table]:
     # MuJoCo has the scaled sine of half the angle, which is 1/4 of a spring of the turns' mobility.
     along, about = np.sum(model.body_invweight0[bodies], axis=0)
     size = float(numbers[10]) * math.sqrt(along / (3.0 * about)) if about > 0.0 else _LEAST_ARM
+    if size < _LEAST_ARM:
+        scale, least = float(numbers[10]), _LEAST_ARM / size * float(numbers[10]) if size else 0.0
+        if not scale:
+            # Nothing turns back.
+            return [_loop(reader, i, bodies, places)]
+        name = model_name(model, "equality", i)
+        reader.left_out.add(f"equality {name}: torquescale {scale:g} is {least:.3g} here, the least", moves=False)
     corners = max(size, _LEAST_ARM) * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
     poses = list(zip(places, frames, strict=True))
     return [_loop(reader, i, bodies, [place + frame @ corner for place, frame in poses], 3.0) for corner in corners]

@@ -25,13 +25,20 @@ def read_keyframes(
 ) -> Table:
     """Return positions, speeds and inputs of all keyframes by name; of a model without any its reference at rest.
 
+    What lies beyond a range is at its edge, and listed, where no equality could forbid it.
     Free bodies that are objects are where the first keyframe has them, unless a later one says otherwise.
     """
     model, data, keyframes = reader.model, reader.start_data(), []
     names = distinct("keyframe", [model.key(k).name for k in range(model.nkey)]) or ["reference"]
     for k, name in enumerate(names):
         keyframe = (model.key_qpos[k], model.key_qvel[k], model.key_ctrl[k], model.key_act[k]) if model.nkey else None
-        qpos, qvel, ctrl, act = keyframe or (data.qpos, data.qvel, data.ctrl, data.act)
+        theirs, qvel, ctrl, act = keyframe or (model.qpos0, data.qvel, data.ctrl, data.act)
+        qpos = reader.at_edges(theirs)
+        for i in joints:
+            at = model.jnt_qposadr[i]
+            if qpos[at] != theirs[at]:
+                line = f"its {theirs[at]:g} for joint {reader.names.joints[i]}, beyond the range, is {qpos[at]:g} here"
+                reader.left_out.add(f"keyframe {name}: {line}", moves=False)
         position = {reader.names.joints[i]: float(qpos[model.jnt_qposadr[i]]) for i in joints}
         velocity = {reader.names.joints[i]: float(qvel[model.jnt_dofadr[i]]) for i in joints}
         for i in free.converted:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from finger_pin.description.surface import Surface
-from finger_pin.exchange.mujoco_compliance import contact_numbers
+from finger_pin.exchange.mujoco_compliance import contact_numbers, depths_at_rest
 from finger_pin.exchange.mujoco_names import Table, model_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.typing import Array
@@ -70,6 +70,14 @@ class Pairs(ElementReader):
         normal = {pair: self._stiffness_and_damping(pair, numbers) for pair, numbers in coefficients.items()}
         stiffness = self._geom_values("stiffness, N/m,", {pair: each[0] for pair, each in normal.items()}, moves=False)
         damping = self._geom_values("damping, s/m,", {pair: each[1] for pair, each in normal.items()}, moves=False)
+        depths = {pair: depths_at_rest(self, *self._solver_parameters(pair)) for pair in coefficients}
+        sinks = [
+            f"{self._pair_name(pair)}: {1e3 * each[0]:.3g} for {1e3 * each[1]:.3g} mm"
+            for pair, each in depths.items()
+            if each
+        ]
+        if sinks:
+            self.left_out.add(f"solimp of geoms, by which they sink under their weight: {_summary(sinks)}", moves=False)
         # Torsion shares its limit with sliding, and has none where that is zero.
         limited = {pair: each[1] * (each[0] > 0.0) for pair, each in coefficients.items()}
         torsion = self._geom_values("torsion, m,", limited)

@@ -10,10 +10,9 @@ from finger_pin.description.objects import Object
 from finger_pin.exchange.mujoco_names import Table, model_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_pairs import Pairs
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
+from finger_pin.mechanism.contact_rows import DEEPEST_START
 from finger_pin.mechanism.tendon_paths import rotation
 
-# Greatest penetration of bodies at the start, m.
-_MAX_PENETRATION = 1e-3
 # Difference of a free body from an even solid: in moments of inertia, part of the largest, and in mass centre, m.
 _INERTIA_TOLERANCE = 1e-9
 
@@ -68,13 +67,13 @@ class Shapes:
         if margins or paired:
             largest = max(model.geom_margin.max(initial=0.0), model.pair_margin.max(initial=0.0))
             line = f"margins of geoms, where contacts begin: {', '.join(dict.fromkeys(margins + paired))}"
-            self.left_out.add(line, moves=bool(largest > _MAX_PENETRATION))
+            self.left_out.add(line, moves=bool(largest > DEEPEST_START))
 
     def _overlaps(self) -> set[frozenset[int]]:
         """Return the pairs of geoms that overlap where runs start, by more than they may."""
         data = self._reader.start_data()
         self.mujoco.mj_collision(self.model, data)
-        deep = [k for k in range(data.ncon) if data.contact.dist[k] < -_MAX_PENETRATION]
+        deep = [k for k in range(data.ncon) if data.contact.dist[k] < -DEEPEST_START]
         return {frozenset(int(each) for each in data.contact.geom[k]) for k in deep}
 
     def body_shapes(self, body: int) -> Table:

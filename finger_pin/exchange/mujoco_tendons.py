@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from finger_pin.description.validation import validate
 from finger_pin.description.waypoints import Waypoint, points_inside_wraps
 from finger_pin.exchange.mujoco_compliance import soft_spring
 from finger_pin.exchange.mujoco_names import Table, distinct, quaternion
-from finger_pin.exchange.mujoco_unsupported import ElementReader
+from finger_pin.exchange.mujoco_unsupported import ElementReader, within_margin
 from finger_pin.typing import Array
 
 
@@ -20,11 +23,10 @@ def passed_bodies(reader: ElementReader, sides: bool = False) -> set[int]:
     return {int(body) for body in (*model.site_bodyid[sites], *model.geom_bodyid[model.wrap_objid[wraps]])}
 
 
-def within_margin(ends: Array, margin: float) -> list[float]:
-    """Return a range less its margin at both ends: no less than its middle, where both ends push."""
-    low, high = (float(each) for each in ends)
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low) - margin, 1e-9 + 1e-6 * (high - low))
-    return [middle - half, middle + half] if margin else [low, high]
+# Distance from a cylinder's axis, in parts of its radius, within which a side site lies on it.
+_ON_AXIS = 1e-9
+# Less is no direction, m: MuJoCo takes the x axis.
+_NO_DIRECTION = 1e-15
 
 
 class TendonReader(ElementReader):
@@ -45,7 +47,7 @@ class TendonReader(ElementReader):
         else:
             names = distinct("pulley", [self._piece_name(k) for k in pieces])
             path = {name: self._piece(k) for name, k in zip(names, pieces, strict=True)}
-            tendon["path"] = self._without_unused_wraps(path)
+            tendon["path"] = self._without_unused_wraps(self.names.tendons[i], path)
         if model.tendon_limited[i]:
             tendon["range"] = within_margin(model.tendon_range[i], float(model.tendon_margin[i]))
             limit = model.tendon_solref_lim[i], model.tendon_solimp_lim[i], float(model.tendon_invweight0[i])
@@ -54,9 +56,9 @@ class TendonReader(ElementReader):
             tendon["limit_damping"] = 0.0
         return tendon
 
-    def _without_unused_wraps(self, path: Table) -> Table:
+    def _without_unused_wraps(self, tendon: str, path: Table) -> Table:
         """Return a path without the wraps that a point of their own body lies inside of: they never wrap."""
-        waypoints = {name: Waypoint.model_validate(each) for name, each in path.items()}
+        waypoints = {name: validate(Waypoint, each, ("tendons", tendon, name)) for name, each in path.items()}
         unused = set()
         for point, wrap in points_inside_wraps(waypoints):
             self.left_out.add(f"wrap {wrap}: {point} lies inside of it, so that the path goes straight", moves=False)
@@ -93,6 +95,12 @@ class TendonReader(ElementReader):
                 wrap["side_point"] = entries
             else:
                 wrap["side"] = self._in_geom_frame(object_id, side).tolist()
+                away = math.hypot(*wrap["side"][:2])
+                if wrap["kind"] == "cylinder" and away < _ON_AXIS * wrap["radius"] <= abs(wrap["side"][2]):
+                    line = f"wrap {self.names.geoms[object_id]}: its side site is on its axis, on no side of it"
+                    self.left_out.add(line, moves=False)
+                    if away < _NO_DIRECTION:
+                        wrap["side"][:2] = _ON_AXIS * wrap["radius"], 0.0
         return wrap
 
     def _in_geom_frame(self, geom: int, site: int) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.exchange.mujoco_names import Names, model_name
+from finger_pin.typing import Array
 
 # Arrays that each flag makes zero; older versions lack some.
 _ZEROED = {
@@ -143,10 +144,27 @@ class ElementReader:
         data = self.mujoco.MjData(self.model)
         if self.model.nkey:
             self.mujoco.mj_resetDataKeyframe(self.model, data, keyframe)
+        data.qpos[:] = self.at_edges(data.qpos)
         self.mujoco.mj_kinematics(self.model, data)
         self.mujoco.mj_comPos(self.model, data)
         self.mujoco.mj_comVel(self.model, data)
         return data
+
+    def at_edges(self, qpos: Array) -> Array:
+        """Return positions whose joints beyond their ranges are at the edges, which only equalities can forbid."""
+        model, placed = self.model, np.array(qpos)
+        if not np.any(model.eq_active0):
+            for i in np.flatnonzero(model.jnt_limited & (model.jnt_type != self.mujoco.mjtJoint.mjJNT_BALL)):
+                low, high = within_margin(model.jnt_range[i], float(model.jnt_margin[i]))
+                placed[model.jnt_qposadr[i]] = np.clip(placed[model.jnt_qposadr[i]], low, high)
+        return placed
+
+
+def within_margin(ends: Array, margin: float) -> list[float]:
+    """Return a range less its margin at both ends: no less than its middle, where both ends push."""
+    low, high = (float(each) for each in ends)
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low) - margin, 1e-9 + 1e-6 * (high - low))
+    return [middle - half, middle + half] if margin else [low, high]
 
 
 def _flag_names(bits: Any, value: int) -> set[str]:

@@ -85,11 +85,10 @@ def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> P
 def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     """Refuse a configuration of shape (nq,) in which bodies are deep in each other."""
     gaps = path_kinematics(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: contacts.law.arms]
-    if gaps.size and gaps.min() < -DEEPEST_START:
+    # What is as deep but for rounding, and for the measure of another program, is not deeper.
+    if gaps.size and gaps.min() < -1.001 * DEEPEST_START:
         deep, most = -1e3 * float(gaps.min()), 1e3 * DEEPEST_START
-        # With as many digits as say that it is more.
-        depth = next((each for each in (f"{deep:.3g}", f"{deep:.6g}") if float(each) > most), repr(deep))
-        allowed = f"starts {depth} mm deep in each other, at most {most:g} mm"
+        allowed = f"starts {deep:.4g} mm deep in each other, at most {most:g} mm"
         pair = contacts.names[int(np.argmin(gaps))]
         raise InputError(
             f"environment.objects: {pair}", f"{allowed}; move the object, or let the joints start elsewhere"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.finger_description import FingerDescription
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.typing import Array
 
@@ -46,12 +47,19 @@ def on_model(
     indices = [int(model.getJointId(name)) for name in chosen]
     if indices != sorted(set(indices)):
         raise InputError("joints", "must follow the model's order, each joint once", chosen)
+    for index, joint in enumerate(model.joints):
+        if index and joint.nv == 0:
+            allowed = "follows another one; read the model without mimics, and hold them together by a passive tendon"
+            raise InputError(f"joint {model.names[index]}", allowed)
+    if dropped := _not_carried_over(description, model, indices):
+        warnings.warn(LeftOutWarning(f"{description.name}: not carried over: {'; '.join(dropped)}"), stacklevel=3)
     locked = [index for index in range(1, model.njoints) if index not in indices]
     posture = pin.neutral(model) if configuration is None else np.asarray(configuration, dtype=float)
     if posture.shape != (model.nq,):
         raise InputError("configuration", f"must be {model.nq} numbers, one per coordinate of the model", posture)
     solids = pin.GeometryModel() if visuals is None else visuals
     reduced, shown = pin.buildReducedModel(model, solids, locked, posture)
+    reduced = _with_angles(reduced)
     reduced.gravity.linear[:] = description.gravity
     body = RigidBody(reduced, tips)
     for index, name in enumerate(description.joints, start=1):
@@ -59,6 +67,52 @@ def on_model(
             number = fingers.index(name.split(".")[0]) if len(fingers) > 1 or fingers[0] else 0
             body.proximal_axes[index] = np.asarray(axes[number], dtype=float)
     return body, shown
+
+
+def _not_carried_over(description: FingerDescription, model: pin.Model, indices: Sequence[int]) -> list[str]:
+    """Return what joints of a model have beyond a description, whose friction and ranges act."""
+    friction, lines = description.numbers["joint_friction"], []
+    # Before Pinocchio 4 it had one limit for both directions.
+    high = getattr(model, "upperDryFrictionLimit", None)
+    losses = model.friction if high is None else np.maximum(high, -model.lowerDryFrictionLimit)
+    for place, ((name, joint), index) in enumerate(zip(description.joints.items(), indices, strict=True)):
+        kind, entry, other = model.joints[index], f"finger.joints.{name}", model.names[index]
+        if kind.nv != 1:
+            continue
+        unit = "N m" if kind.nq == 2 or not kind.shortname().startswith("JointModelP") else "N"
+        damping, theirs = float(friction["viscous"][place]), float(model.damping[kind.idx_v])
+        damping += joint.spring.damping if joint.spring else 0.0
+        if theirs > damping:
+            lines.append(f"damping of joint {other}, {theirs:g} {unit} s/rad: {entry}.spring.damping can say it")
+        dry, theirs = max(float(friction[key][place]) for key in ("floor", "drag")), float(losses[kind.idx_v])
+        if theirs > dry:
+            lines.append(f"dry friction of joint {other}, {theirs:g} {unit}: finger.joint_friction.floor can say it")
+        if kind.nq == 1:
+            low, high = float(model.lowerPositionLimit[kind.idx_q]), float(model.upperPositionLimit[kind.idx_q])
+            lower, upper = joint.range if joint.limited else (-np.inf, np.inf)
+            if low < high and (lower < low - 1e-9 or upper > high + 1e-9):
+                lines.append(f"range of joint {other}, {low:g} to {high:g}: {entry}.range acts, {lower:g} to {upper:g}")
+    return lines
+
+
+def _with_angles(model: pin.Model) -> pin.Model:
+    """Return a model whose hinges that turn on have an angle for coordinate, in place of its cosine and sine."""
+    if all(joint.nq != 2 for joint in model.joints[1:]):
+        return model
+    turned = pin.Model()
+    turned.name, turned.gravity = model.name, model.gravity
+    for index in range(1, model.njoints):
+        joint = model.joints[index]
+        if (joint.nq, joint.nv) == (2, 1):
+            data = joint.createData()
+            joint.calc(data, np.array([1.0, 0.0]), np.zeros(1))
+            joint = pin.JointModelRevoluteUnaligned(np.ravel(data.S)[3:])
+        parent, placement = int(model.parents[index]), model.jointPlacements[index]
+        turned.inertias[turned.addJoint(parent, joint, placement, model.names[index])] = model.inertias[index]
+    turned.armature[:] = model.armature
+    for frame in list(model.frames)[turned.nframes :]:
+        turned.addFrame(frame, False)
+    return turned
 
 
 def _by_joint(joints: Mapping[str, str] | Mapping[str, Mapping[str, str]]) -> dict[str, str]:

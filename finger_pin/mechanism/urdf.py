@@ -17,7 +17,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
-from finger_pin.mechanism.urdf_tree import tree_to_urdf
+from finger_pin.mechanism.urdf_tree import add_inertial, tree_to_urdf
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
 
 BASE_FRAME = "base"
@@ -160,15 +160,12 @@ def _shapes(description: FingerDescription, links: dict[str, Link]) -> dict[str,
 
 def _add_link(robot: ET.Element, name: str, shapes: Iterable[Shape], inertia_of: Link | None = None) -> None:
     element = ET.SubElement(robot, "link", name=name)
-    if inertia_of is not None:
+    if inertia_of is None:
+        add_inertial(element, pin.SE3.Identity(), 0.0)
+    else:
         axial, transverse = inertia_of.inertia
-        inertial = ET.SubElement(element, "inertial")
-        ET.SubElement(
-            inertial, "origin", xyz=_numbers(inertia_of.mass_centre, 0, inertia_of.offset), rpy=_numbers(0, 0, 0)
-        )
-        ET.SubElement(inertial, "mass", value=_numbers(inertia_of.mass))
-        moments = {"ixx": axial, "ixy": 0.0, "ixz": 0.0, "iyy": transverse, "iyz": 0.0, "izz": transverse}
-        ET.SubElement(inertial, "inertia", {key: _numbers(value) for key, value in moments.items()})
+        place = pin.SE3(np.eye(3), np.array([inertia_of.mass_centre, 0.0, inertia_of.offset]))
+        add_inertial(element, place, inertia_of.mass, (axial, transverse, transverse, 0.0, 0.0, 0.0))
     for shape in shapes:
         visual = _add_shape(element, "visual", shape)
         ET.SubElement(visual, "material", name=shape.material)

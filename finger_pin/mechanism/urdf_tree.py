@@ -17,10 +17,14 @@ from finger_pin.mechanism.xml_numbers import numbers as _numbers
 # The geometry of a solid in a body's frame: its kind, sizes, m, place and attitude.
 _Geometry = tuple[str, Sequence[float], pin.SE3]
 _SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length")}
+# Mass and moments of the links between several joints of a body, kg and kg m2: MuJoCo refuses moving ones without.
+_SLIGHT = 1e-14
+_SLIGHT_INERTIA = (_SLIGHT,) * 3 + (0.0,) * 3
 _NOTES = """
   {title}
 
-  Written from a tree of bodies. A body with several joints has a link for each, of which the last has its mass.
+  Written from a tree of bodies. A body with several joints has a link for each, of which the last has its mass
+  and the others 1e-14 kg.
   Left out, because a URDF has no place for it: tendons, actuators, loops, springs, the inertia of rotors;
   couplings by more than a ratio and an offset, meshes, ellipsoids, objects.{rest}
 """
@@ -44,7 +48,7 @@ def tree_to_urdf(description: FingerDescription, drawn: bool, base: str, tip: st
     rest = "".join(f"\n  - {line}" for line in left_out)
     notes = _NOTES.format(title=description.title or description.name, rest=rest)
     root.append(ET.Comment(notes.replace("--", "- -")))
-    ET.SubElement(root, "link", name=base)
+    _add_massless_link(root, base)
     placed: dict[str | None, tuple[str, pin.SE3]] = {None: (base, pin.SE3.Identity())}
     courses = {each.joint: each for each in tree.couplings.values() if each.other and not any(each.higher)}
     for name, body in tree.bodies.items():
@@ -57,7 +61,7 @@ def tree_to_urdf(description: FingerDescription, drawn: bool, base: str, tip: st
             ET.SubElement(joint, "axis", xyz=_numbers(*moved.axis))
             _complete(joint, description, key, moved, courses.get(key), (effort, speed))
             if child != name:
-                ET.SubElement(root, "link", name=child)
+                add_inertial(ET.SubElement(root, "link", name=child), pin.SE3.Identity(), _SLIGHT, _SLIGHT_INERTIA)
             link, place = child, pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
         if not joints:
             _add_joint(root, f"{name}_fixed", "fixed", link, name, place)
@@ -69,7 +73,7 @@ def tree_to_urdf(description: FingerDescription, drawn: bool, base: str, tip: st
         while last in tree.bodies:
             last += "_"
         _add_joint(root, f"{last}_fixed", "fixed", link, last, place * pin.SE3(np.eye(3), np.array(end.position)))
-        ET.SubElement(root, "link", name=last)
+        _add_massless_link(root, last)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -116,15 +120,14 @@ def _add_origin(element: ET.Element, place: pin.SE3) -> None:
     )
 
 
+def _add_massless_link(root: ET.Element, name: str) -> None:
+    add_inertial(ET.SubElement(root, "link", name=name), pin.SE3.Identity(), 0.0)
+
+
 def _add_link(root: ET.Element, name: str, body: Body, place: pin.SE3, drawn: bool) -> None:
     """Add a link whose frame is that of its body's last joint, in which the body has a place."""
     link = ET.SubElement(root, "link", name=name)
-    if body.mass or any(body.inertia):
-        inertial = ET.SubElement(link, "inertial")
-        _add_origin(inertial, place * pin.SE3(np.eye(3), np.array(body.centre)))
-        ET.SubElement(inertial, "mass", value=_numbers(body.mass))
-        moments = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), map(_numbers, body.inertia), strict=True))
-        ET.SubElement(inertial, "inertia", moments)
+    add_inertial(link, place * pin.SE3(np.eye(3), np.array(body.centre)), body.mass, body.inertia)
     for role, solids in (("visual", body.solids), ("collision", body.shapes)) if drawn else ():
         for solid in solids.values():
             for kind, sizes, where in _geometries(solid):
@@ -133,6 +136,22 @@ def _add_link(root: ET.Element, name: str, body: Body, place: pin.SE3, drawn: bo
                 geometry = ET.SubElement(element, "geometry")
                 values = [_numbers(*sizes)] if kind == "box" else map(_numbers, sizes)
                 ET.SubElement(geometry, kind, dict(zip(_SIZES[kind], values, strict=True)))
+
+
+def add_inertial(link: ET.Element, place: pin.SE3, mass: float, inertia: Sequence[float] = (0.0,) * 6) -> None:
+    """Add what a link weighs, also nothing: of links that do not say, MuJoCo weighs the shapes, and Bullet takes 1 kg.
+
+    Args:
+        link: Its element.
+        place: Of the mass centre, and the axes of the moments, in its frame.
+        mass: In kg.
+        inertia: Moments about the mass centre, xx, yy, zz, xy, xz, yz, kg m2.
+    """
+    inertial = ET.SubElement(link, "inertial")
+    _add_origin(inertial, place)
+    ET.SubElement(inertial, "mass", value=_numbers(mass))
+    moments = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), map(_numbers, inertia), strict=True))
+    ET.SubElement(inertial, "inertia", moments)
 
 
 def _geometries(solid: TreeSolid | BodyShape) -> Iterator[_Geometry]:

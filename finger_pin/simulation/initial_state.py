@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import xarray as xr
@@ -11,13 +12,19 @@ from numpy.typing import ArrayLike
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.position_drive import LoopMemory
 from finger_pin.description.validation import finite_vector
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import InputError, StartWarning
+from finger_pin.laws.limiter import limiter_energy, penetration
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import BLOCKS, State
 from finger_pin.simulation.contact_variables import last_contact_state
 from finger_pin.simulation.motor_variables import LOOP_VARIABLES
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.typing import Array
+
+# The rows that guard ranges: what they guard, and the unit of its depth.
+_STOPS = {"limiter": "joint", "tendon_limit": "cord"}
+# Energy in a stop that a start does not mention, J: less than a ten-thousandth of what moving fingers have.
+_LEAST_ENERGY = 1e-6
 
 
 def custom_parts(
@@ -143,3 +150,39 @@ def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:
         if abs(motor_speed) > greatest:
             allowed = f"motor {motor} must turn by at most {greatest:.4g} rad/s at its spool, which its supply can hold"
             raise InputError(name, allowed, float(motor_speed))
+
+
+def beyond_ranges(finger: Finger, x: Array) -> str:
+    """Return which joints and cords lie beyond their ranges at a packed state, how deep, and the energy there.
+
+    Args:
+        finger: The finger.
+        x: The packed state, shape (size,).
+
+    Returns:
+        Text; empty where their stops hold less than 1 uJ each.
+    """
+    stops, position = finger.stroke_limiter, finger.layout.unpack(x).position
+    outside = np.any(stops.limited & (penetration(position, stops.lower, stops.upper) != 0.0))
+    if not outside and all(table.group != "tendon_limit" for table in finger.mechanism.rows):
+        return ""
+    rows, parts = finger.mechanism.evaluate(x, np.zeros(finger.mechanism.channels)).rows, list[str]()
+    slides = dict(zip(finger.routing.joints, finger.rigid_body.slides, strict=False))
+    for group, kind in _STOPS.items():
+        if group not in rows:
+            continue
+        table, depths = rows[group].rows, np.ravel(rows[group]["depth"])
+        lower, upper, stiffness = table.parameters[:3]
+        for row, energy in enumerate(np.ravel(limiter_energy(depths, stiffness))):
+            if energy > _LEAST_ENERGY:
+                name = table.names[row]
+                unit = "m" if kind == "cord" or slides.get(name, False) else "rad"
+                ends = f"{lower[row]:.4g} to {upper[row]:.4g}"
+                parts.append(f"{kind} {name}: {abs(depths[row]):.3g} {unit} beyond {ends}, {energy:.2g} J in its stop")
+    return "; ".join(parts)
+
+
+def warn_beyond_ranges(finger: Finger, x: Array) -> None:
+    """Warn of joints and cords that start beyond their ranges, before their stops throw them back."""
+    if beyond := beyond_ranges(finger, x):
+        warnings.warn(StartWarning(f"{finger.description.name} starts beyond its ranges: {beyond}"), stacklevel=3)

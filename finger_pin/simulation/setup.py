@@ -23,7 +23,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.accuracy import CHUNK_STEPS, ringing_warning
-from finger_pin.simulation.initial_state import check_motors
+from finger_pin.simulation.initial_state import beyond_ranges, check_motors, warn_beyond_ranges
 
 #: What to try where an integrator cannot go on.
 ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
@@ -76,6 +76,9 @@ class Setup:
             check_motors(loop.finger, loop.initial_state())
         if loop.finger.scene is not None:
             loop.finger.scene.check(loop.finger.layout.unpack(loop.initial_state()))
+        if "initial state" not in custom:
+            # A state of one's own, as of a result, may lean on a stop.
+            warn_beyond_ranges(loop.finger, loop.initial_state())
         sampling = sampling_settings(scenario, control_period)
         if sampling is None and (loop.controller.needs_sensors or loop.controller.sensors):
             raise InputError("control_period", "is missing: a controller that reads sensors is sampled")
@@ -217,4 +220,6 @@ class Setup:
         advice = _ROUNDING_ADVICE if min(settings.rtol, settings.atol_scale) < _TIGHT_TOLERANCE else ADVICE
         if "physical range" in trajectory.failure:
             advice = _RUNAWAY_ADVICE
+        if beyond := beyond_ranges(self.loop.finger, self.loop.initial_state()):
+            advice = f"a start within the ranges: {beyond}"
         return f"{trajectory.failure}; {cause}" if cause else trajectory.failure, advice

@@ -18,6 +18,7 @@ from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.batch_stepper import BatchStepper
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables.inputs import held_control
+from finger_pin.description.demo_motion import start_position
 from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError
@@ -26,7 +27,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
-from finger_pin.simulation.initial_state import as_finite_array, check_motors
+from finger_pin.simulation.initial_state import as_finite_array, check_motors, warn_beyond_ranges
 from finger_pin.simulation.step_log import StepLog
 from finger_pin.typing import Array
 
@@ -59,7 +60,7 @@ class Simulator:
 
         Args:
             finger: The finger, or what `Finger` takes: a description, a name, or the path of a file.
-            position: theta at the start, shape (n,), rad; by default the middle of the ranges.
+            position: theta at the start, shape (n,), rad; by default amid the ranges, or where a tree starts.
             method: A compiled method.
             rtol: Relative tolerance.
             atol_scale: Absolute tolerance over the scale of each kind of state.
@@ -75,8 +76,8 @@ class Simulator:
         self._settings: dict[str, Any] = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
         self._family: ParametrisedScenario | None = None
         self._build(as_finger(finger))
-        middle = 0.5 * (self.finger.stroke_limiter.lower + self.finger.stroke_limiter.upper)
-        self._posture = middle if position is None else as_finite_array("position", position, middle.shape)
+        first = np.array([*start_position(self.finger.description).values()])
+        self._posture = first if position is None else as_finite_array("position", position, first.shape)
         self._start(self._state_at_rest(self._posture), 0.0)
 
     def __repr__(self) -> str:
@@ -87,10 +88,9 @@ class Simulator:
     def _build(self, finger: Finger) -> None:
         """Build the stepper of a finger; `_start` gives it a state."""
         self.finger, mechanism = finger, finger.mechanism
-        control = held_control(mechanism.channels, mechanism.coordinates)
         self._guides = PrescribedPaths.from_finger(finger, 0.0, self._settings["rtol"])
         self._palm = PalmPath.from_hand(finger.description.hand, 0.0, finger, self._settings["rtol"])
-        control = with_paths(control, self._palm, self._guides)
+        control = with_paths(held_control(mechanism.channels, mechanism.coordinates), self._palm, self._guides)
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
         self._stepper = Stepper.from_finger(finger, control, rest, **self._settings)
         self._initial_snapshot = self._stepper.state_snapshot
@@ -103,6 +103,7 @@ class Simulator:
         x = start_state(finger, finger.rest_state(position), self._palm, self._guides)
         if finger.scene is not None:
             finger.scene.check(finger.layout.unpack(x))
+        warn_beyond_ranges(finger, x)
         return x
 
     def _start(self, x: Array, time: float) -> None:
@@ -245,8 +246,7 @@ class Simulator:
 
     def signals(self) -> FingerSignals:
         """Return all signals at the present state, under the tensions and force of the last step."""
-        path = self._palm or self._guides
-        base_motion = None if path is None else path.base(self.time)
+        base_motion = path.base(self.time) if (path := self._palm or self._guides) else None
         return self._compiled.evaluate(self.x, self._inputs, self._force, base_motion)
 
     def clone(self) -> Simulator:

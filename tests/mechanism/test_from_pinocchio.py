@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import InputError, LeftOutWarning
 from finger_pin.simulation.energy import energies, powers
 
-pytestmark = pytest.mark.slow
+# The hand's URDF says 10 N m of dry friction and less of ranges, of which the tests of the hand have no need.
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::finger_pin.exceptions.LeftOutWarning")]
 
 JOINTS = {"spread": "joint_0.0", "proximal": "joint_1.0", "medial": "joint_2.0", "distal": "joint_3.0"}
 INDICES = [0, 1, 2, 3]
@@ -240,3 +241,59 @@ def test_a_configuration_of_the_wrong_size_is_named(description, hand):
     with pytest.raises(InputError) as caught:
         fp.Finger.from_model(description, hand, JOINTS, TIP, np.zeros(5))
     assert caught.value.entry == "configuration"
+
+
+LINKS = """<robot name="f"><link name="palm"/>
+<link name="p1"><inertial><origin xyz="0.03 0 0"/><mass value="0.03"/>
+<inertia ixx="1e-6" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="p2"><inertial><origin xyz="0.02 0 0"/><mass value="0.02"/>
+<inertia ixx="1e-6" iyy="4e-6" izz="4e-6" ixy="0" ixz="0" iyz="0"/></inertial></link><link name="tip"/>
+<joint name="j1" type="continuous"><parent link="palm"/><child link="p1"/><axis xyz="0 0.6 0.8"/>
+<dynamics damping="0.01" friction="0.001"/></joint>
+<joint name="j2" type="revolute"><origin xyz="0.06 0 0"/><parent link="p1"/><child link="p2"/><axis xyz="0 1 0"/>MIMIC
+<limit lower="-0.1" upper="0.5" effort="1" velocity="1"/></joint>
+<joint name="jt" type="fixed"><origin xyz="0.04 0 0"/><parent link="p2"/><child link="tip"/></joint></robot>"""
+
+
+def two_joints(friction, *ranges):
+    """Return a finger of two joints that two tendons pull."""
+    joints = {name: {"range": limits} for name, limits in zip("ab", ranges, strict=True)}
+    crossings = {name: {"radius": 0.008} for name in "ab"}
+    table = {"name": "f", "joints": joints, "tendons": {"T": {"crossings": crossings}}, "joint_friction": friction}
+    return fp.FingerDescription.model_validate(table)
+
+
+def test_damping_friction_and_ranges_that_the_description_has_less_of_are_told():
+    model = pin.buildModelFromXML(LINKS.replace("MIMIC", ""))
+    with pytest.warns(LeftOutWarning) as caught:
+        fp.Finger.from_model(two_joints({}, [-1.0, 1.0], [-1.0, 0.4]), model, {"a": "j1", "b": "j2"}, "tip")
+    (message,) = [str(each.message) for each in caught]
+    assert "damping of joint j1, 0.01 N m s/rad: finger.joints.a.spring.damping can say it" in message
+    assert "dry friction of joint j1, 0.001 N m: finger.joint_friction.floor can say it" in message
+    assert "range of joint j2, -0.1 to 0.5: finger.joints.b.range acts, -1 to 0.4" in message
+    assert message.count(";") == 2
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_continuous_joint_moves_as_pinocchio_moves_its_cosine_and_sine():
+    model = pin.buildModelFromXML(LINKS.replace("MIMIC", ""))
+    description = two_joints({"viscous": 0.01, "floor": 0.001}, [-1.0, 1.0], [0.0, 0.4])
+    body = fp.Finger.from_model(description, model, {"a": "j1", "b": "j2"}, "tip").rigid_body
+    model.gravity.linear[:] = description.gravity
+    data = model.createData()
+    for q in np.random.default_rng(3).uniform(-2.0, 2.0, (5, 2)):
+        whole = np.array([np.cos(q[0]), np.sin(q[0]), q[1]])
+        mass = np.triu(pin.crba(model, data, whole))
+        np.testing.assert_allclose(body.mass_matrix(q), mass + np.triu(mass, 1).T, rtol=1e-12)
+        gravity = pin.computeGeneralizedGravity(model, data, whole)
+        np.testing.assert_allclose(body.gravity_torque(q), gravity, rtol=1e-12, atol=1e-15)
+        pin.framesForwardKinematics(model, data, whole)
+        np.testing.assert_allclose(body.tip_position(q), data.oMf[model.getFrameId("tip")].translation, atol=1e-15)
+
+
+def test_a_joint_that_mimics_another_is_refused_by_its_name():
+    text = LINKS.replace("MIMIC", '<mimic joint="j1" multiplier="0.5" offset="0"/>').replace("continuous", "prismatic")
+    text = text.replace("<dynamics", '<limit lower="0" upper="1" effort="1" velocity="1"/><dynamics')
+    model = pin.buildModelFromXML(text, mimic=True)
+    with pytest.raises(InputError, match=r"joint j2: follows another one; read the model without mimics"):
+        fp.Finger.from_model(two_joints({}, [-1.0, 1.0], [0.0, 0.4]), model, {"a": "j1", "b": "j2"}, "tip")

@@ -13,6 +13,9 @@ from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views import plots, view_forces
 from finger_pin.views.viewer import write_animation
 
+# The hand's URDF says 10 N m of dry friction.
+pytestmark = pytest.mark.filterwarnings("ignore::finger_pin.exceptions.LeftOutWarning")
+
 POSITION = (0.1, 0.5, 0.6, 0.4)
 NAMES = ("spread", "proximal", "medial", "distal")
 FIRST = {"index": 0, "thumb": 12, "middle": 4, "ring": 8}

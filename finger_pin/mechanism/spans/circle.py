@@ -13,6 +13,10 @@ from typing import Any, NamedTuple
 FREE, SHORT_WAY, LONG_WAY, INSIDE = range(4)
 # Below this, a length or a radius is none, as in MuJoCo.
 _LENGTH_ROUNDING = 1e-15
+#: Distance below the surface, in parts of the radius, within which a point lies on it, and the path may wrap.
+ON_CIRCLE = 1e-9
+# Least length of a tangent that derivatives see, in parts of the radius.
+_LEAST_TANGENT = 1e-6
 _MOST_STEPS = 50
 
 
@@ -52,10 +56,12 @@ def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: A
         has_side: Whether there is a side point.
         inside: Whether the path passes inside.
     """
-    if radius < _LENGTH_ROUNDING or min(r0, r1) <= radius:
+    if radius < _LENGTH_ROUNDING or min(r0, r1) < (1.0 - ON_CIRCLE) * radius:
         return FREE
-    touching = math.acos(radius / r0) + math.acos(radius / r1)
+    touching = math.acos(min(radius / r0, 1.0)) + math.acos(min(radius / r1, 1.0))
     if inside != 0.0:
+        if min(r0, r1) <= radius:
+            return FREE
         return INSIDE if angle < touching else FREE
     # Where what is opposite to the side point lies between the ends, the way is the long one.
     long = has_side != 0.0 and math.atan2(across, along) < angle - math.pi
@@ -68,17 +74,17 @@ def path(side: Any, r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
     """Return length and turn of a path, and their derivatives."""
     if side == INSIDE:
         return _inside(r0, r1, angle, radius)
-    return _around(r0, r1, angle if side == SHORT_WAY else 2.0 * math.pi - angle, radius)
+    return _around(max(r0, radius), max(r1, radius), angle if side == SHORT_WAY else 2.0 * math.pi - angle, radius)
 
 
 def _around(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
     """Return the path around the circle: two tangents and the arc between them, as `path` does."""
-    # A point on the circle itself has no second derivative.
-    h0 = max(math.sqrt((r0 - radius) * (r0 + radius)), 1e-12 * radius)
-    h1 = max(math.sqrt((r1 - radius) * (r1 + radius)), 1e-12 * radius)
+    h0, h1 = math.sqrt((r0 - radius) * (r0 + radius)), math.sqrt((r1 - radius) * (r1 + radius))
     turn = angle - math.acos(radius / r0) - math.acos(radius / r1)
-    by0, by1 = -radius / (r0 * h0), -radius / (r1 * h1)
     length = h0 + h1 + radius * turn
+    # A point on the circle itself has no second derivative.
+    h0, h1 = max(h0, _LEAST_TANGENT * radius), max(h1, _LEAST_TANGENT * radius)
+    by0, by1 = -radius / (r0 * h0), -radius / (r1 * h1)
     return CirclePath(
         *(length, h0 / r0, h1 / r1, radius),
         *(radius * radius / (h0 * r0 * r0), radius * radius / (h1 * r1 * r1), 0.0, 0.0, 0.0, 0.0),
