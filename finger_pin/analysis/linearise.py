@@ -1,8 +1,8 @@
 """Linearisation at a state: A, B, C, D, E of x' = f(x, u, p), y = h(x, u, p), or of the map over a step.
 
-Derivatives of f and h are differences of sixth order of the compiled evaluation, whose rounding they come near. Near a
-kink, such as where sliding reverses, they are of third order and from the state's side alone. At a kink, such as that
-of friction at rest, they are the mean of both sides, as the exact slopes of the laws are.
+A and B of f are the exact derivatives that the integrator has. All others of f and h are differences of sixth order of
+the compiled evaluation, whose rounding they come near. Near a kink, such as where sliding reverses, they are of third
+order and from the state's side alone. At a kink, such as that of friction at rest, all are the mean of both sides.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis.step_map import StepMap
 from finger_pin.core.signals.compiled_finger import CompiledFinger
+from finger_pin.core.signals.rate_derivatives import rate_derivatives
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
@@ -28,9 +29,11 @@ from finger_pin.typing import Array
 _OFFSETS = np.arange(-3.0, 4.0)
 _CENTRAL = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 _FORWARD = np.array([-11.0, 18.0, -9.0, 2.0]) / 6.0, np.array([-1.5, 2.0, -0.5, 0.0])
-# Relative difference of slopes, and of the value's rounding, above which they disagree; number of steps tried, and the
-# divisor from one to the next, until one side has no kink.
-_SLOPE_TOLERANCE, _ROUNDING, _MAX_TRIALS, _STEP_DIVISOR = 1e-4, 1e-13, 4, 10.0
+# Relative difference of slopes above which they disagree; number of steps tried, and the divisor from one to the next,
+# until one side has no kink.
+_SLOPE_TOLERANCE, _MAX_TRIALS, _STEP_DIVISOR = 1e-4, 4, 10.0
+# Shifts, in steps, that show how values are rounded; the factor by which slopes may have more of it, and the least.
+_ROUNDING_SHIFTS, _ROUNDING_FACTOR, _LEAST_ROUNDING = 1e-9 * np.arange(1.0, 5.0), 10.0, 1e-14
 # Steps: of the scale of a state, of an input in N or V, of the size of a parameter.
 _STATE_STEP, _INPUT_STEP, _PARAMETER_STEP = 1e-4, 1e-3, 1e-4
 # Steps of a map over these.
@@ -104,8 +107,10 @@ def linearise(
             sizes,
             least=values == 0.0,
         )
-    if step_map is not None:
-        size = len(x)
+    size = len(x)
+    if step_map is None:
+        by_state[0][:size], by_input[0][:size] = rate_derivatives(finger.mechanism, x, u)
+    else:
         value[:size] = step_map.end
         by_state[0][:size], by_input[0][:size] = step_map.slopes(*(_MAP_STEP_SHARE * each for each in steps))
         if parameters:
@@ -139,7 +144,8 @@ def _slopes(
         steps: Shape (n,).
         least: Where a number must not be less, shape (n,).
     """
-    value = function(point[None])[0]
+    value, *shifted = function(point + np.append(0.0, _ROUNDING_SHIFTS)[:, None] * steps)
+    rounding = _ROUNDING_FACTOR * np.abs(shifted - value).max(axis=0) + _LEAST_ROUNDING * np.abs(value)
     columns, sides = np.zeros((len(value), len(point))), np.zeros(len(point), int)
     bounded: NDArray[np.bool_] = np.zeros(len(point), bool) if least is None else np.asarray(least, dtype=bool)
 
@@ -162,7 +168,7 @@ def _slopes(
         h = steps[pending] / _STEP_DIVISOR**trial
         undecided = []
         for k, values, size in zip(pending, lines(pending, h, _OFFSETS), h, strict=True):
-            slope, side = _slope(values, value, size)
+            slope, side = _slope(values, rounding, size)
             if trial == 0 or side is not None:
                 columns[:, k], sides[k] = slope, side or 0
             if side is None:
@@ -173,7 +179,7 @@ def _slopes(
     return columns, sides
 
 
-def _slope(values: Array, value: Array, h: float) -> tuple[Array, int | None]:
+def _slope(values: Array, rounding: Array, h: float) -> tuple[Array, int | None]:
     """Return the derivative along a line of values at `_OFFSETS`, and its side: 1 above, -1 below, 0 central.
 
     None: both sides have a kink.
@@ -182,7 +188,7 @@ def _slope(values: Array, value: Array, h: float) -> tuple[Array, int | None]:
     above, below = [weights @ values[3:] / h for weights in _FORWARD], [-w @ values[3::-1] / h for w in _FORWARD]
 
     def agree(first: Array, second: Array) -> bool:
-        tolerance = _SLOPE_TOLERANCE * np.maximum(abs(first), abs(second)) + _ROUNDING * np.max(abs(value)) / h
+        tolerance = _SLOPE_TOLERANCE * np.maximum(abs(first), abs(second)) + rounding / h
         return bool((abs(first - second) <= tolerance).all())
 
     if agree(above[0], below[0]):

@@ -116,7 +116,11 @@ class TreeActuator(Description):
         doc="Largest rate of a, which follows u; without time_constant within 0.1 ms.",
     )
     delay: Annotated[float, real(0.0, 10.0)] = quantity(
-        0.0, unit="s", source="design", doc="After which a command acts; before the first arrives, u is 0."
+        0.0,
+        unit="s",
+        source="design",
+        doc="After which a command acts. With a clock that starts at 0, u is 0 before the first command arrives; a run "
+        "that starts later (`start_time`, or one that goes on) reads its signal before the start.",
     )
 
     muscle: Muscle | None = Field(None, description="A muscle in place of an affine force.")

@@ -107,7 +107,7 @@ class _Writer:
             stiffness = self.description.numbers["stroke_limiter"]["stiffness"]
             stops += (stiffness * [*of_joints.values()]).tolist()
         squares += [(1.0 - IMPEDANCE) / IMPEDANCE**2 * square for square in stops]
-        return math.sqrt(max(1.0, *squares))
+        return math.sqrt(max([1.0, *squares]))
 
     def write(self, root: ET.Element, step: float) -> None:
         """Write all but the keyframes; controls that come late are kept for steps of a length, s."""

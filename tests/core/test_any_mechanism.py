@@ -9,12 +9,10 @@ from core_cases import Bound, relative
 from random_mechanisms import by_listing, kinds_of, random_mechanism, random_states, with_other_numbers
 
 import finger_pin as fp
-from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.signals.compiled_finger import CompiledMechanism
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables.inputs import held_control
-from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
 
@@ -29,8 +27,6 @@ ROUGH = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
 SEEDS = (0, 3, 4, 5)
 # States of each whose Jacobian is compared, of those without a kink nearby.
 ENOUGH = 2
-# A whole number, one of other laws, and one that adds states.
-UNCHANGED = ("stribeck_exponent", "reversal_speed", "hysteresis")
 
 
 def aside(row, p):
@@ -252,25 +248,3 @@ def test_the_textbook_and_the_compiled_integrators_read_the_same_tables():
     for table in mechanism.rows:
         after = ends(with_changed(mechanism, lambda other, own=table: other is own), x, control, force)
         assert min(np.abs(one - other).max() for one, other in zip(after, before, strict=True)) > 1e-4, table.law.name
-
-
-@pytest.mark.parametrize("name", ["reversals", "servo", "press"])
-def test_a_finger_whose_parameters_were_changed_evaluates_alike_in_both(name):
-    """Half of the finger's numbers, drawn anew around what they were, as prepared runs change them."""
-    rng, scenario = np.random.default_rng(3), fp.load_scenario(name)
-    table = scenario.finger.model_dump(mode="python", exclude_none=True)
-    groups = ("tendon_friction", "joint_friction", "passive_tendon", "stroke_limiter")
-    numbers = [(group, each) for group in groups for each, held in table[group].items() if isinstance(held, float)]
-    keys = [f"finger.{group}.{each}" for group, each in numbers if each not in UNCHANGED and rng.random() < 0.5]
-    family = ParametrisedScenario(
-        scenario, [*keys, "finger.joints.distal.link.length", "finger.joints.medial.link.mass"]
-    )
-    before = ClosedLoop.from_scenario(scenario).finger
-    # Coulomb's level stays below that of stiction.
-    factors = [rng.uniform(0.8, 1.0) if "coulomb" in key else rng.uniform(1.0, 1.2) for key in family.keys]
-    changed = family.with_values([value * factor + 1e-9 for value, factor in zip(family.values, factors, strict=True)])
-    mechanism = ClosedLoop.from_scenario(changed).finger.mechanism
-    x, command = random_states(mechanism, rng, 6), rng.uniform(0.0, 3.0, mechanism.channels)
-    found = CompiledMechanism(mechanism).evaluate(x, command)
-    assert_same(found, mechanism.evaluate(x, command), mechanism)
-    assert relative(found.rate, before.mechanism.evaluate(x, command).rate) > 1e-6

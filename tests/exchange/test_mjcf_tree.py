@@ -181,6 +181,16 @@ def test_stops_of_a_tree_and_on_request_of_a_finger_give_by_torque_over_stiffnes
             assert data.qpos[0] > upper + 0.5
 
 
+def test_a_tree_without_springs_and_ends_is_written_with_its_masses():
+    bodies = {"one": {"mass": 0.1, "inertia": [1e-4, 1e-4, 1e-4, 0.0, 0.0, 0.0]}}
+    joints, tips = {"one": {"body": "one", "axis": [0.0, 1.0, 0.0]}}, {"tip": {"body": "one"}}
+    tree = {"bodies": bodies, "joints": joints, "tips": tips}
+    table = {"name": "bare", "joints": {"one": {"range": [-1.0, 1.0]}}, "tendons": {}, "tree": tree}
+    text = fp.to_mjcf(fp.FingerDescription.model_validate(table), limits=False)
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.nq == 1 and model.body("one").mass == pytest.approx(0.1, rel=1e-12)
+
+
 POWERS = {"couplings": {"c": {"joint": "two", "other": "one", "powers": (0.0, 0.0, 0.0, 0.1)}}}
 BOTH = {"tendons": {"t": {"joints": {"one": 0.01}, "path": OWN["slack"]["tendons"]["t"]["path"]}}}
 REFUSED = [

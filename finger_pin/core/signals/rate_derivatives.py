@@ -1,0 +1,66 @@
+"""Exact derivatives of a mechanism's rate at a state, out of the linear systems that implicit methods solve."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from finger_pin.core.evaluation.condensation import condense
+from finger_pin.core.evaluation.dynamics import evaluate
+from finger_pin.core.evaluation.linearisation import linearise
+from finger_pin.core.signals.bound_models import BoundModel
+from finger_pin.core.tables.inputs import held_control
+from finger_pin.core.tables.linear_systems import Linear
+from finger_pin.core.tables.mechanism_parameters import compile_mechanism
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.typing import Array
+
+# g of the systems (g - J) u = r, 1/s, between slow and stiff rates: J is known to parts of 1e-16 of it.
+_G = 1e4
+
+
+def rate_derivatives(mechanism: Mechanism, x: Array, command: Array) -> tuple[Array, Array]:
+    """Return the exact derivatives of the rate by state and inputs, shapes (n, n) and (n, u).
+
+    At a kink, such as that of friction at rest, they are the mean of both sides.
+
+    Args:
+        mechanism: At rest as a whole, without free bodies, whose state has quaternions.
+        x: Packed state, shape (n,).
+        command: Inputs, shape (u,).
+
+    Raises:
+        InputError: If the derivatives are not finite at the state.
+    """
+    structure, parameters = compile_mechanism(mechanism)
+    control = held_control(mechanism.channels, mechanism.coordinates)
+    bound = BoundModel(structure, parameters, [table.law for table in mechanism.rows], control, mechanism.moved)
+    bound.model.state[:], control.tension[:] = x, command
+    evaluate(bound.address)
+    linearise(bound.address)
+    by_state, by_input = np.zeros((len(x), len(x))), np.zeros((len(x), len(command)))
+    for k in range(len(command) or 1):
+        # The input rises by 1 in a second: its derivative is that by time.
+        control.by_time[:] = np.arange(len(command)) == k
+        if not condense(bound.address, _G):
+            raise InputError("state", "has a rate whose derivatives are not finite", x.tolist())
+        by_state, by_time = _resolved(bound.model.linear)
+        by_input[:, k : k + 1] = by_time[:, None]
+    return by_state, by_input
+
+
+def _resolved(linear: Linear) -> tuple[Array, Array]:
+    """Return the Jacobian and the derivative by time of solutions (g - J)^-1 (r + f_t), block by block."""
+    blocks, whole, solution = linear.blocks, len(linear.mass), linear.solution
+    jacobian, by_time = np.zeros((len(solution), len(solution))), np.zeros(len(solution))
+    # Of open contacts, each on its own.
+    alone = 2 * whole + np.arange(len(blocks.loose))
+    jacobian[alone, alone] = -blocks.loose
+    for b in range(blocks.number[0]):
+        places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+        states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
+        at = np.concatenate([places, whole + places, 2 * whole + states])
+        inverse = np.linalg.inv(solution[at, : len(at)])
+        jacobian[np.ix_(at, at)] = _G * np.eye(len(at)) - inverse
+        by_time[at] = inverse @ solution[at, len(at)]
+    return jacobian, by_time
