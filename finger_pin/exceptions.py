@@ -45,6 +45,10 @@ class StartWarning(ScenarioWarning):
     """A run starts beyond the range of a joint or cord, whose stop throws it back."""
 
 
+class SlowRunWarning(ScenarioWarning):
+    """A run that takes far longer than what it simulates."""
+
+
 class ClosureWarning(ScenarioWarning):
     """A finger whose tendons run along paths loses force closure somewhere in its range."""
 

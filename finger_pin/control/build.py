@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -18,13 +17,14 @@ from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import ProportionalController, RoutedController
 from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward
 from finger_pin.control.torque import FingertipForce, TorqueLaw
+from finger_pin.description.caching import memoised
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.description.routing import Routing
+from finger_pin.description.routing import Routing, routing_parts
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.description.tables import settings_of_finger
 from finger_pin.description.validation import Numbers, expand
-from finger_pin.exceptions import ClosureWarning, InputError
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
@@ -79,17 +79,32 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
 
 
 def _routed(scenario: Scenario, finger: Finger) -> RoutedController:
-    """Return the controller of a finger whose arms depend on the posture; warn of lost force closure."""
+    """Return the controller of a finger whose arms depend on the posture."""
     settings, numbers = scenario.controller, scenario.numbers
-    closure = closure_over_range(finger)
-    if not closure.holds:
-        warnings.warn(f"{closure}: tendons go slack or turn joints there", ClosureWarning, stacklevel=4)
     law = TorqueLaw(
         gain=numbers["gain"],
         damping=numbers["damping"],
         static=_static_torque(finger, settings.gravity_compensation, settings.spring_compensation),
     )
     return RoutedController(finger, law, numbers["minimum_tension"], _fingertip(scenario, finger))
+
+
+def closure_advice(controller: LoopController) -> str:
+    """Return the warning about force closure that a controller's fingers lose, in one line; empty if it holds."""
+    parts = controller.controllers if isinstance(controller, HandController) else (controller,)
+    return "; ".join(filter(None, (_lost_closure(part.finger) for part in parts if isinstance(part, RoutedController))))
+
+
+def _arm_parts(finger: Finger) -> tuple[object, ...]:
+    description = finger.description
+    return (finger.constructor_args.rigid_body, *routing_parts(description), *description.joints.values())
+
+
+# Runs of a study share what the arms depend on.
+@memoised(_arm_parts)
+def _lost_closure(finger: Finger) -> str:
+    closure = closure_over_range(finger)
+    return "" if closure.holds else f"{closure}: tendons go slack or turn joints there"
 
 
 def _distribution(scenario: Scenario, finger: Finger) -> TensionDistribution:

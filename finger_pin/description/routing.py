@@ -22,7 +22,7 @@ from finger_pin.typing import Array, Indices
 _SLACK_SHARE = 1e-9
 
 
-def _parts(_: object, description: FingerDescription) -> tuple[object, ...]:
+def routing_parts(description: FingerDescription) -> tuple[object, ...]:
     """Return the parts of a description that its routing depends on."""
     joints = (description.hand and tuple(description.hand.fingers), description.tree, *description.joints)
     at_bends = description.tendon_friction.place == "bends"
@@ -60,7 +60,7 @@ class Routing:
     through_space: NDArray[np.bool_]
 
     @classmethod
-    @memoised(_parts)
+    @memoised(lambda _, description: routing_parts(description))
     def from_description(cls, description: FingerDescription) -> Routing:
         """Build the matrices from the crossings of every tendon."""
         joints, tendons = tuple(description.joints), tuple(description.tendons)

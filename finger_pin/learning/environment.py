@@ -70,7 +70,8 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 draw: A function of a generator that returns values of an episode, such as a goal, as arrays by name;
                     they are observed after the variables.
                 start: ``"reference"``, ``"random"`` within the joints' ranges, or a function of a generator that
-                    returns theta, shape (n,), rad.
+                    returns theta, shape (n,), rad. Where bodies overlap it is drawn again, up to a hundred times;
+                    the last draw is then moved towards the reference until they do not.
                 randomise: Distributions by dotted key of the scenario, drawn at every reset; also ``action.delay``, s,
                     and ``observation.NAME.offset``, ``.noise``, ``.quantisation`` of a sensor. Or the path of an
                     identified scenario: its parameters are drawn from their intervals.

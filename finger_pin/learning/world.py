@@ -34,8 +34,8 @@ from finger_pin.views.viewer.video import draw_picture
 if TYPE_CHECKING:
     import xarray as xr
 
-# Starts that are drawn anew where bodies overlap.
-_MAX_STARTS = 100
+# Starts that are drawn anew where bodies overlap, and parts of the way from the last one to the reference.
+_MAX_STARTS, _WAY_STEPS = 100, 32
 
 
 class World:
@@ -192,7 +192,7 @@ class World:
         loop, task = self.origin, self.task
         if task.start == "reference":
             return loop.initial_state()
-        scene, joints = loop.finger.scene, len(loop.finger.routing.joints)
+        joints = len(loop.finger.routing.joints)
         for _ in range(_MAX_STARTS):
             if callable(task.start):
                 position = np.asarray(task.start(self._random), dtype=float)
@@ -203,15 +203,26 @@ class World:
                 free_position = self._random.uniform(limiter.lower, limiter.upper)
                 position = np.clip(coupling.matrix @ free_position + coupling.offset, limiter.lower, limiter.upper)
             x = loop.rest_state(position, np.zeros(joints))
-            if scene is None:
+            if self._is_free(x):
                 return x
-            try:
-                scene.check(loop.finger.layout.unpack(x))
-            except InputError as error:
-                problem = error
-            else:
+        # The nearest free posture on the way to the reference: a training must not end here.
+        reference = loop.reference.at(0.0).position
+        for share in np.arange(1.0, _WAY_STEPS) / _WAY_STEPS:
+            x = loop.rest_state(position + share * (reference - position), np.zeros(joints))
+            if self._is_free(x):
                 return x
-        raise problem
+        return loop.initial_state()
+
+    def _is_free(self, x: Array) -> bool:
+        """Return whether no bodies are deep in each other at a packed state."""
+        finger = self.origin.finger
+        if finger.scene is None:
+            return True
+        try:
+            finger.scene.check(finger.layout.unpack(x))
+        except InputError:
+            return False
+        return True
 
     def act(self, action: Array) -> float:
         """Start a control period with an action; return the end of its first piece, s."""

@@ -82,7 +82,8 @@ class PathElement:
     extent: float = np.inf
 
 
-@dataclass(frozen=True, eq=False)
+# Compared by value, with its piece by identity: rows made anew of the same pieces have the same structure.
+@dataclass(frozen=True)
 class PathTerm:
     """The use of a piece by a row.
 

@@ -11,7 +11,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.polynomial import Polynomial
 
+from finger_pin.description.caching import memoised
 from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.routing import routing_parts
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_parts import Coupling
@@ -78,13 +80,12 @@ def build_body(description: FingerDescription, body: RigidBody | None = None) ->
         return body, TendonPaths.from_description(description, body)
     if body is not None:
         raise InputError("rigid_body", "has no place beside a tree, whose bodies are its own")
-    body, placed = _body_of_tree(description)
-    return body, TendonPaths.from_description(description, body, placed)
+    return _body_of_tree(description)
 
 
-def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[str | None, Placed]]:
-    tree = description.tree
-    model = pin.Model()
+@memoised(lambda it: (it.name, it.gravity, *routing_parts(it), *it.joints.values()))
+def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
+    tree, model = description.tree, pin.Model()
     model.name = description.name
     model.gravity.linear[:] = description.gravity
     placed: dict[str | None, Placed] = {None: Placed(0, pin.SE3.Identity())}
@@ -93,8 +94,7 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
         place = place * pin.SE3(rotation(body.orientation), np.array(body.position))
         for joint_name, moved in tree.joints.items():
             if moved.body == name:
-                hinge = moved.kind == "hinge"
-                kind = pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned
+                kind = pin.JointModelRevoluteUnaligned if moved.kind == "hinge" else pin.JointModelPrismaticUnaligned
                 joint = model.addJoint(joint, kind(np.array(moved.axis)), joint_placement(place, moved), joint_name)
                 model.armature[model.joints[joint].idx_v] = moved.armature if moved.path is None else _ON_PATH
                 place = pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
@@ -111,7 +111,7 @@ def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, Mapping[st
     for name, moment in zip(tree.joints, np.diag(rigid_body.mass_matrix(pin.neutral(model))), strict=True):
         if not moment > 0.0:
             raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
-    return rigid_body, placed
+    return rigid_body, TendonPaths.from_description(description, rigid_body, placed)
 
 
 def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows) -> Rows:

@@ -11,13 +11,16 @@ import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
+from finger_pin.analysis.weight import weight_advice
 from finger_pin.cancellation import CancelToken, Stop
+from finger_pin.control.build import closure_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import (
     AccuracyWarning,
+    ClosureWarning,
     IntegrationError,
     Interrupted,
     MicroDampingWarning,
@@ -67,6 +70,9 @@ def run(
     damping_message = micro_damping_advice(scenario.finger)
     if damping_message:
         warnings.warn(damping_message, MicroDampingWarning, stacklevel=5)
+    closure_message = closure_advice(loop.controller)
+    if closure_message:
+        warnings.warn(closure_message, ClosureWarning, stacklevel=5)
     setup = Setup.from_scenario(scenario, loop, custom, control_period)
     loop = setup.loop
     if setup.touch_warning:
@@ -97,6 +103,8 @@ def run(
     messages = {
         "self_locking": locking_message,
         "micro_damping": damping_message,
+        "closure": closure_message,
+        "weight": weight_advice(loop.finger) if loop.palm is None else "",
         "accuracy": stiffness_message,
         "account": account_message,
         "ringing": ringing_message,

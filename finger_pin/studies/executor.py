@@ -14,10 +14,10 @@ import tempfile
 import threading
 import uuid
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext, suppress
-from functools import partial
+from functools import lru_cache, partial
 from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,6 +35,10 @@ _Result = TypeVar("_Result")
 # Period of the checks for a stop, s, and length of the run that compiles, in simulated time, s.
 _POLL_PERIOD, _COMPILE_DURATION = 0.1, 1e-3
 _EXECUTOR_MESSAGE = "must be a concurrent.futures.Executor, such as ThreadPoolExecutor(4)"
+
+
+class KilledRun(FingerPinError):
+    """A run killed the process that did it, such as by the memory that it took."""
 
 
 @contextmanager
@@ -65,18 +69,58 @@ def run_tasks(
 ) -> Iterator[tuple[int, _Result | BaseException]]:
     """Call a function with each item and a `Stop`, and yield indices with results or exceptions as they come.
 
-    When ``stop``, which is checked every tenth of a second, returns true, tasks that have not started are left.
+    When ``stop``, which is checked every tenth of a second, returns true, tasks that have not started are left. Tasks
+    that were at work when a process died are done again, each alone in a process of its own; of one that dies again
+    the exception is a `KilledRun`, and the others go on in new processes.
     """
-    token, futures = CancelToken(), dict[Future[Any], int]()
-    finished: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
-    threads = isinstance(executor, ThreadPoolExecutor)
     # A file that tells processes of this machine to stop; others go on to the end of their runs.
     stop_file = Path(tempfile.gettempdir()) / f"finger_pin-{uuid.uuid4().hex}"
+    left = dict(enumerate(items))
+    broken = yield from _run_in(executor, function, left, stop, stop_file)
+    while broken and not stop():
+        running = [index for index in broken if _mark(stop_file, index).exists()]
+        if not running:
+            yield from broken.items()
+            return
+        for index in running:
+            with _replacement(executor, 1) as process:
+                error = (yield from _run_in(process, function, {index: left[index]}, stop, stop_file)).get(index)
+            _mark(stop_file, index).unlink(missing_ok=True)
+            if error is not None:
+                yield index, KilledRun(f"it killed its process twice, with no other run beside it: {error_line(error)}")
+        left = {index: left[index] for index in broken if index not in running}
+        with _replacement(executor) as pool:
+            broken = yield from _run_in(pool, function, left, stop, stop_file)
+
+
+def _replacement(executor: Executor, workers: int | None = None) -> ProcessPoolExecutor:
+    """Return new processes like those of an executor that broke."""
+    names = ("mp_context", "initializer", "initargs") if isinstance(executor, ProcessPoolExecutor) else ()
+    options = {name: getattr(executor, f"_{name}") for name in names}
+    return ProcessPoolExecutor(workers or getattr(executor, "_max_workers", None), **options)
+
+
+def _mark(stop_file: Path, index: int) -> Path:
+    """Return the file that is there while a process is at a task."""
+    return stop_file.with_name(f"{stop_file.name}-{index}")
+
+
+def _run_in(
+    executor: Executor, function: Callable[[_Item, Stop], _Result], items: Mapping[int, _Item], stop: Stop, path: Path
+) -> Generator[tuple[int, _Result | BaseException], None, dict[int, BrokenExecutor]]:
+    """Yield what `run_tasks` does, and return the errors of the tasks that a broken executor has not done."""
+    token, futures, broken = CancelToken(), dict[Future[Any], int](), dict[int, BrokenExecutor]()
+    finished: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
+    threads = isinstance(executor, ThreadPoolExecutor)
+    # What all tasks share is written once, and read once by each process.
+    written = b"" if threads else cloudpickle.dumps(function)
     try:
-        for index, item in enumerate(items):
+        for index, item in items.items():
             if stop():
-                return
-            task = (function, item, token) if threads else (_call, cloudpickle.dumps((function, item)), str(stop_file))
+                return broken
+            task: tuple[Any, ...] = (function, item, token)
+            if not threads:
+                task = (_call, written, cloudpickle.dumps(item), str(path), str(_mark(path, index)))
             future = _submit(executor, *task)
             futures[future] = index
             future.add_done_callback(finished.put)
@@ -87,16 +131,19 @@ def run_tasks(
                 count += 1
                 result = CancelledError() if future.cancelled() else future.exception() or future.result()
                 # Ctrl-C ends processes of an executor too.
-                if not (isinstance(result, BaseException) and stop()):
+                if isinstance(result, BrokenExecutor):
+                    broken[futures[future]] = result
+                elif not (isinstance(result, BaseException) and stop()):
                     yield futures[future], result
     finally:
         token.cancel()
         running = [future for future in futures if not future.cancel() and not future.done()]
         if running and not threads:
             with suppress(OSError):
-                stop_file.touch()
+                path.touch()
             for future in running:
-                future.add_done_callback(partial(_remove, stop_file, running))
+                future.add_done_callback(partial(_remove, path, running))
+    return broken
 
 
 def _remove(stop_file: Path, running: Sequence[Future[Any]], _: Future[Any]) -> None:
@@ -116,14 +163,26 @@ def _submit(executor: Executor, *task: Any) -> Future[Any]:
     return future
 
 
-def _call(task: bytes, stop_file: str) -> Any:
+@lru_cache(2)
+def _read(function: bytes) -> Callable[[Any, Stop], Any]:
+    """Return a function that was sent; with the same objects in it for all tasks of a process."""
+    loaded: Callable[[Any, Stop], Any] = pickle.loads(function)
+    return loaded
+
+
+def _call(function: bytes, item: bytes, stop_file: str, mark: str) -> Any:
     stop = partial(os.path.exists, stop_file)
     # Executors fetch tasks in advance, which they cannot take back.
     if stop():
         raise CancelledError
-    function, item = pickle.loads(task)
-    with without_scenario_warnings():
-        return function(item, stop)
+    with suppress(OSError):
+        Path(mark).touch()
+    try:
+        with without_scenario_warnings():
+            return _read(function)(pickle.loads(item), stop)
+    finally:
+        with suppress(OSError):
+            Path(mark).unlink(missing_ok=True)
 
 
 def error_line(error: BaseException) -> str:

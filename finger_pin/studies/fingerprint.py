@@ -16,7 +16,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import versions
 
 # Imports point down, so nothing above the studies affects their results.
-_EXCLUDED = {"views", "commands"}
+_EXCLUDED = {"commands", "learning", "views", "identification"}
 _PLAIN_TYPES = (type(None), bool, int, float, complex, str, bytes, type(...))
 _WRAPPED_ATTRIBUTES = ("fget", "fset", "fdel", "__wrapped__", "targetoptions")
 
@@ -126,8 +126,8 @@ def _names(code: CodeType) -> frozenset[str]:
 
 @cache
 def _is_installed(module: str | None) -> bool:
-    """Return true for modules of this package, of Python and of installed packages, not the user's."""
-    top = (module or "").partition(".")[0]
+    """Return true for modules that the source's digest or versions cover, not for the user's own."""
+    top, *rooms = (module or "").split(".")
     path = getattr(sys.modules.get(top), "__file__", None) or ""
-    in_library = top == "finger_pin" or top in sys.stdlib_module_names
+    in_library = (top == "finger_pin" and _EXCLUDED.isdisjoint(rooms[:1])) or top in sys.stdlib_module_names
     return in_library or not {"site-packages", "dist-packages"}.isdisjoint(Path(path).parts)

@@ -23,7 +23,7 @@ from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.studies.executor import compile_for, error_line, open_executor, run_tasks
+from finger_pin.studies.executor import KilledRun, compile_for, error_line, open_executor, run_tasks
 from finger_pin.studies.fingerprint import UnknownDependency, digest, source_digest
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric
@@ -104,7 +104,7 @@ class Study:
             compile_for(self.executor, lambda: self.base.at(tasks[0][1]))
         task_function = partial(execute, base=self.base, metrics=self.metrics, source=source_digest())
         for index, outcome in run_tasks(self.executor, task_function, tasks, self.token):
-            record = _failed_record(*tasks[index], outcome) if isinstance(outcome, BaseException) else outcome
+            record = self._failed(*tasks[index], outcome) if isinstance(outcome, BaseException) else outcome
             self.append(record)
             records[record.key] = record
             report()
@@ -117,6 +117,13 @@ class Study:
             _import_laws(lambda: self.base.at(point))
         digests = [_content_digest(f"the value {name}", name, warn=self.path is not None) for name in names]
         return str(joblib.hash((self.digest, dict(point), digests)))
+
+    def _failed(self, key: str, point: Point, error: BaseException) -> RunRecord:
+        """Return the record of a run that killed its workers, or raise if the executor failed."""
+        if isinstance(error, KilledRun) or type(error).__name__ == "KilledWorker":
+            return RunRecord(key, dict(point), FAILED, f"the workers that ran it died: {error}", {}, 0.0)
+        advice = "; give an output to keep what it has finished" if self.path is None else ""
+        raise ExecutorError(f"the executor cannot go on: {error_line(error)}{advice}")
 
     def append(self, record: RunRecord) -> None:
         """Keep a record, also on disk if there is a folder."""
@@ -217,13 +224,6 @@ def _content_digest(name: str, part: Any, warn: bool) -> str:
         if warn:
             warnings.warn(f"{name} uses {error}, so its runs are done anew whenever they are asked for", stacklevel=6)
         return uuid.uuid4().hex
-
-
-def _failed_record(key: str, point: Point, error: BaseException) -> RunRecord:
-    """Return the record of a run that killed its workers, or raise if the executor failed."""
-    if type(error).__name__ == "KilledWorker":
-        return RunRecord(key, dict(point), FAILED, f"the workers that ran it died: {error}", {}, 0.0)
-    raise ExecutorError(f"the executor cannot go on: {error_line(error)}; give an output to keep what it has finished")
 
 
 def execute(

@@ -20,7 +20,7 @@ from finger_pin.views.shown_units import actuators_by_unit, joints_by_unit
 
 _SETTLING_TIME = 1.0
 _LONG_RUN = 2.0
-_WARNINGS = ("interrupted", "self_locking", "micro_damping", "accuracy", "account", "ringing")
+_WARNINGS = ("interrupted", "self_locking", "micro_damping", "closure", "weight", "accuracy", "account", "ringing")
 # The least speed of sliding, m/s.
 _LEAST_SLIDING_SPEED = 1e-6
 
@@ -136,17 +136,26 @@ def _actuators(result: xr.Dataset) -> list[list[str]]:
 def _tension(result: xr.Dataset) -> list[str]:
     tension = result["tendon_tension"]
     rows = [_range_row(str(name), np.asarray(tension.sel(tendon=name))) for name in result["tendon"].values]
+    passive = 0
     if "passive_tension_proximal" in result:
         proximal = result["passive_tension_proximal"]
         halves = np.asarray(proximal.transpose("time", ...)).reshape(proximal.sizes["time"], -1)
-        passive = len(rows) - halves.shape[1]
-        pairs = zip(rows[passive:], halves.T, strict=True)
-        rows[passive:] = [
+        passive = halves.shape[1]
+        pairs = zip(rows[-passive:], halves.T, strict=True)
+        rows[-passive:] = [
             row
             for distal, half in pairs
             for row in (_range_row(f"{distal[0]}, proximal half", half), (f"{distal[0]}, distal half", *distal[1:]))
         ]
-    return ["Tension, N", *table(("", "least", "greatest"), rows)]
+    # What pulls a tendon is before the bends at which it rubs.
+    entering = result.get("spool_tension", result.get("tendon_command"))
+    if entering is None:
+        return ["Tension behind the bends, N", *table(("", "least", "greatest"), rows)]
+    pulls = np.asarray(entering.transpose("time", "tendon")).max(axis=0).tolist()
+    actuated = result.sizes["tendon"] - passive
+    pulled = [f"{pull + 0.0:.3f}" for pull in pulls[:actuated]] + [""] * (len(rows) - actuated)
+    pulled_rows = [(*row, pull) for row, pull in zip(rows, pulled, strict=True)]
+    return ["Tension behind the bends, N", *table(("", "least", "greatest", "greatest where pulled"), pulled_rows)]
 
 
 def _motors(result: xr.Dataset) -> list[list[str]]:

@@ -7,6 +7,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.commands.console import count_bar, progress_bar, runs_bar
+from finger_pin.core.stepping import integrator
+from finger_pin.exceptions import SlowRunWarning
 from finger_pin.simulation import progress
 
 SHORT = {"simulation.duration": 0.01}
@@ -38,6 +40,20 @@ def test_a_notebook_shows_nothing_of_what_is_over_within_its_patience_and_a_scri
     monkeypatch.delitem(sys.modules, "IPython")
     fp.simulate(fp.load_scenario("reversals", SHORT))
     assert progress.notebook_bar("s", 1.0) is None and capsys.readouterr() == ("", "")
+
+
+def test_a_slow_run_says_its_steps_a_second_and_what_keeps_them_short_while_it_runs(monkeypatch):
+    monkeypatch.setattr(integrator, "_PATIENCE", 0.0)
+    monkeypatch.setattr(integrator, "_SLOW_SHARE", 1e9)
+    with pytest.warns(SlowRunWarning) as caught:
+        result = fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 1.0}))
+    (text,) = [str(each.message) for each in caught]
+    time, steps, rate, name = re.search(
+        r"t = (\S+) s of 1 s .*: (\d+) steps, (\S+) a second, .* short is (.*)", text
+    ).groups()
+    assert 0.0 < float(time) < 1.0 and 0 < int(steps) < result.attrs["solver_steps"]
+    assert float(rate) > result.attrs["solver_steps"] / result.attrs["solver_wall_time"] / 100.0
+    assert name in fp.Finger(fp.load_scenario("reversals").finger).layout.names
 
 
 def test_bars_of_commands_are_on_standard_error_if_asked_for_and_leave_nothing_on_a_terminal(capsys):

@@ -64,6 +64,12 @@ def tripled(number, stop):
     return 3 * number
 
 
+def count(number, stop, seen):
+    """Return how many tasks have been given the same list."""
+    seen.append(number)
+    return len(seen)
+
+
 def raises(number, stop):
     raise ArithmeticError(f"planted\n{number}")
 

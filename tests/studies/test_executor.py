@@ -49,6 +49,12 @@ def test_every_item_is_done_once_and_comes_with_its_index_by_any_executor(execut
     assert dict(run_tasks(executor, lambda number, stop: factor * number, [2], never)) == {0: 10}
 
 
+def test_a_process_reads_what_all_tasks_share_once():
+    with ProcessPoolExecutor(1) as processes:
+        counts = dict(run_tasks(processes, partial(planted.count, seen=[]), "abc", never))
+    assert counts == {0: 1, 1: 2, 2: 3}
+
+
 def test_what_raises_is_told_in_one_line_and_the_others_go_on():
     with open_executor(workers=2) as executor:
         (failed,) = dict(run_tasks(executor, planted.raises, [7], never)).values()

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import threading
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.studies.fingerprint import UnknownDependency, digest, source_digest
 from finger_pin.studies.metrics import METRICS
+from finger_pin.views.summary import summarize
 
 
 def defined(text, **values):
@@ -107,6 +109,27 @@ def test_what_cannot_be_compared_has_no_digest(mystery):
 def test_all_metrics_of_the_package_have_digests_of_their_own():
     assert len({digest(metric.measure) for metric in METRICS.values()}) == len(METRICS)
     assert source_digest() == source_digest()
+
+
+LAYERS = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+ROOMS = next(each["layers"] for each in LAYERS if "studies" in each["layers"])
+
+
+@pytest.mark.parametrize("room", ROOMS[: ROOMS.index("studies") + 2])
+def test_an_edit_above_the_studies_keeps_stored_runs_and_one_below_does_not(room, monkeypatch):
+    read = Path.read_bytes
+    before = source_digest.__wrapped__()
+    monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + b"#" * (path.parts.count(room) > 0))
+    assert (source_digest.__wrapped__() == before) == (ROOMS.index(room) < ROOMS.index("studies"))
+
+
+def test_a_metric_that_calls_a_room_above_the_studies_depends_on_its_code(monkeypatch):
+    def measure(run):
+        return len(summarize(run.result))
+
+    before = digest(measure)
+    monkeypatch.setattr(summarize, "__code__", (lambda result: "").__code__)
+    assert digest(measure) != before
 
 
 def test_runs_with_a_law_of_ones_own_are_kept_under_a_digest_of_it():

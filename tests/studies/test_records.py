@@ -2,10 +2,12 @@
 
 import os
 import threading
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 
 import filelock
 import pytest
+from planted import DIES
 
 import finger_pin as fp
 from finger_pin.studies.keys import BaseScenario
@@ -104,3 +106,16 @@ def test_a_folder_that_cannot_be_made_or_written_is_told(tmp_path):
     for folder in (tmp_path / "file" / "sub", tmp_path / "folder"):
         with pytest.raises(fp.InputError, match="cannot be written"):
             opened(folder).__enter__()
+
+
+def test_a_run_that_kills_its_process_twice_is_marked_failed_and_the_others_are_done():
+    with ProcessPoolExecutor(2) as pool:
+        result = fp.sweep(
+            "reversals",
+            {"controller.gain": [2.0, 1.0, 3.0]},
+            metrics=[DIES],
+            overrides={"simulation.duration": 0.02},
+            executor=pool,
+        )
+    assert result["status"].values.tolist() == ["failed", "done", "done"]
+    assert "killed its process twice" in str(result["reason"].values[0])

@@ -59,9 +59,25 @@ def test_a_run_under_given_tensions_tells_errors_only_of_a_reference_that_moves(
 
 def test_the_summary_tells_least_and_greatest_tensions(result):
     tension = result["tendon_tension"].sel(tendon="T3")
-    np.testing.assert_allclose(row(result, "T3"), [tension.min(), tension.max()], atol=5e-4)
+    pulled = result["tendon_command"].sel(tendon="T3").max()
+    np.testing.assert_allclose(row(result, "T3"), [tension.min(), tension.max(), pulled], atol=5e-4)
     proximal = result["passive_tension_proximal"]
     np.testing.assert_allclose(row(result, "T5, proximal half"), [proximal.min(), proximal.max()], atol=5e-4)
+
+
+@pytest.mark.parametrize(("gravity", "twist", "weighs"), [("z", 0.0, False), ("y", 0.0, True), ("z", 0.1, True)])
+def test_the_summary_says_so_where_gravity_is_along_all_axes(gravity, twist, weighs):
+    """The first axis is z; a twist alpha of the link before turns the next one by as much out of it."""
+    link = {"length": 0.03, "width": 0.01, "mass": 0.01}
+    chain = {
+        "name": "chain",
+        "gravity": [-9.81 * (gravity == axis) for axis in "xyz"],
+        "joints": {name: {"range": [0.0, 1.0], "link": link | {"twist": twist}} for name in ("first", "second")},
+        "tendons": {"T": {"crossings": {"first": {"radius": 0.005}}}},
+    }
+    table = {"name": "chain", "finger": chain, "controller": {"kind": "tensions"}, "simulation": {"duration": 1e-3}}
+    text = summarize(fp.simulate(fp.Scenario.model_validate(table)))
+    assert ("moves no joint" in text) != weighs
 
 
 def test_the_shares_of_the_energy_account_add_up(result):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol
@@ -17,12 +18,16 @@ from finger_pin.core.steps import integration as core
 from finger_pin.core.steps.repetition import Steps
 from finger_pin.core.steps.trajectory import Statistics, Trajectory, Watch
 from finger_pin.core.threads import in_threads
+from finger_pin.exceptions import SlowRunWarning
 from finger_pin.typing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
 _MOST_BYTES = 2e9
 # Room for so many of an island's to begin with; what is not used of it takes no memory.
 _FIRST_RECORD_LENGTH = 8192
+
+# After so long, s, a run is slow that has at least as long before it and has simulated less than this part of it.
+_PATIENCE, _SLOW_SHARE = 10.0, 0.1
 
 # Slices of a simulation of several islands, between which it can be watched.
 _WATCHED_SLICES = 200
@@ -85,6 +90,10 @@ class _Recorder:
             return f"after {self.step_count} steps the trajectory has reached the most that is kept in memory"
         return ""
 
+    def limiting_state(self, names: Sequence[str]) -> str:
+        """Return the name of the number of the state whose error was largest in the last step."""
+        return names[self._stepper.places(self.part.island)[int(self.part.memory.limiting_state[0])]]
+
     def steps(self) -> IslandMotion:
         """Return the steps that were taken."""
         return IslandMotion(self._stepper.mechanism, self.part, *self.start, self.room.first(self.step_count))
@@ -121,7 +130,7 @@ def integrate_compiled(
     # Of a controller that acts in between, the linearised flow knows nothing.
     keeps_islands = controller is None and not stepper.driven
     recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
-    began = time.perf_counter()
+    began, start, warned = time.perf_counter(), stepper.time, False
     alone = len(recorders) == 1
     reason, interrupted = "", False
     while stepper.time < duration and not reason and not interrupted:
@@ -130,6 +139,9 @@ def integrate_compiled(
         statuses = in_threads(partial(_Recorder.advance, end=end, chunks=chunks), recorders)
         for recorder, status in zip(recorders, statuses, strict=True):
             reason = reason or recorder.reason(status, duration, names)
+        if not warned and time.perf_counter() - began > _PATIENCE:
+            span = start, stepper.time, duration
+            warned = _warn_if_slow(recorders, span, time.perf_counter() - began, names)
         if watch is not None:
             watch(stepper.time, stepper.x)
         interrupted = stop is not None and not reason and stepper.time < duration and stop()
@@ -145,6 +157,27 @@ def integrate_compiled(
         islands=() if not keeps_islands or stepper.holds_inputs else tuple(steps),
         steps=tuple(Steps(each.record.times, each.record.shares, each.record.branches) for each in steps),
     )
+
+
+def _warn_if_slow(
+    recorders: Sequence[_Recorder], span: tuple[float, float, float], elapsed: float, names: Sequence[str]
+) -> bool:
+    """Warn of a run that is slow for what it simulates, with its steps and what keeps them short; return whether."""
+    start, now, end = span
+    simulated = now - start
+    if simulated > _SLOW_SHARE * elapsed or (end - now) * elapsed < _PATIENCE * simulated:
+        return False
+    slowest = max(recorders, key=lambda recorder: recorder.step_count)
+    count = slowest.step_count
+    remaining = f", at this rate {(end - now) * elapsed / simulated:.3g} s more" if simulated > 0.0 else ""
+    warnings.warn(
+        f"t = {now:.3g} s of {end:.3g} s after {elapsed:.3g} s{remaining}: {count} steps, {count / elapsed:.3g} a "
+        f"second, of {simulated / max(count, 1):.1g} s on average; what keeps them short is "
+        f"{slowest.limiting_state(names)}",
+        SlowRunWarning,
+        stacklevel=7,
+    )
+    return True
 
 
 def _next_end(stepper: Stepper, duration: float, controller: SampledController | None, sliced: bool) -> float:
