@@ -71,7 +71,7 @@ def run_tasks(
 
     When ``stop``, which is checked every tenth of a second, returns true, tasks that have not started are left. Tasks
     that were at work when a process died are done again, each alone in a process of its own; of one that dies again
-    the exception is a `KilledRun`, and the others go on in new processes.
+    the exception is a `KilledRun`, and the others go on in new processes of this machine, one for each core.
     """
     # A file that tells processes of this machine to stop; others go on to the end of their runs.
     stop_file = Path(tempfile.gettempdir()) / f"finger_pin-{uuid.uuid4().hex}"
@@ -83,21 +83,14 @@ def run_tasks(
             yield from broken.items()
             return
         for index in running:
-            with _replacement(executor, 1) as process:
+            with ProcessPoolExecutor(1) as process:
                 error = (yield from _run_in(process, function, {index: left[index]}, stop, stop_file)).get(index)
             _mark(stop_file, index).unlink(missing_ok=True)
             if error is not None:
                 yield index, KilledRun(f"it killed its process twice, with no other run beside it: {error_line(error)}")
         left = {index: left[index] for index in broken if index not in running}
-        with _replacement(executor) as pool:
+        with ProcessPoolExecutor() as pool:
             broken = yield from _run_in(pool, function, left, stop, stop_file)
-
-
-def _replacement(executor: Executor, workers: int | None = None) -> ProcessPoolExecutor:
-    """Return new processes like those of an executor that broke."""
-    names = ("mp_context", "initializer", "initargs") if isinstance(executor, ProcessPoolExecutor) else ()
-    options = {name: getattr(executor, f"_{name}") for name in names}
-    return ProcessPoolExecutor(workers or getattr(executor, "_max_workers", None), **options)
 
 
 def _mark(stop_file: Path, index: int) -> Path:
