@@ -13,7 +13,7 @@ from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.analysis.settled_postures import settled_posture
 from finger_pin.analysis.spring_return import SpringReturn, spring_return
-from finger_pin.analysis.steady import SteadyState, rubbing_cords, sliding_tendons, steady_state
+from finger_pin.analysis.steady import SteadyState, rubbing_cords, steady_state
 from finger_pin.analysis.tip_force import RequiredTension, largest_force, tension_for_force
 from finger_pin.analysis.tip_statics import Friction
 
@@ -44,7 +44,6 @@ __all__ = [
     "self_locking_map",
     "self_locking_margin",
     "settled_posture",
-    "sliding_tendons",
     "spring_return",
     "steady_state",
     "tension_for_force",

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finger_pin.analysis.equilibrium import equilibrium
 from finger_pin.analysis.steady import sliding_tendons
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import as_inputs
+from finger_pin.mechanism.coerce import FingerLike, as_finger, as_inputs
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
 # Change of an angle for differences, rad; greatest number of Newton steps; step at which they have converged, rad.
@@ -22,22 +22,31 @@ _MAX_ANGLE_STEP = 0.3
 _PASSIVE_POSITION_SCALE = 1e-3
 
 
-def settled_posture(finger: Finger, load: Array, speed: float | None, guess: Array, force: Array) -> Array:
+def settled_posture(
+    finger: FingerLike,
+    inputs: ArrayLike,
+    speed: float | None = None,
+    guess: ArrayLike | None = None,
+    force: Array | None = None,
+) -> Array:
     """Return the stable posture at rest near another, shape (n,), rad; nan if there is none.
 
     Newton's method is tried first; the descent of `equilibrium` is some five times slower, and finds it from anywhere.
 
     Args:
         finger: With ideal sources of tension and winches.
-        load: Tensions at the entrances of the canals, N, or what winches wind in, m, shape (a,).
+        inputs: Tensions at the entrances of the canals, N, or what winches wind in, m, then a tree's inputs, shape (u,).
         speed: Of the tendons as they came to rest, m/s, positive as they were drawn in: their friction has its sign.
             None: there is no friction any more.
-        guess: Shape (n,), rad.
-        force: At the fingertip, shape (3,), N.
+        guess: Shape (n,), rad; by default the angles of the ranges nearest to zero.
+        force: At the fingertip, shape (3,), of several tips (t, 3), N; none by default.
     """
-    layout, joints, command = finger.layout, len(guess), as_inputs(finger, load)
+    finger = as_finger(finger)
+    layout, command, limiter = finger.layout, as_inputs(finger, inputs), finger.stroke_limiter
+    start = np.clip(0.0, limiter.lower, limiter.upper) if guess is None else np.asarray(guess, dtype=float)
+    joints = len(start)
     sliding = None if speed is None else sliding_tendons(finger, np.array([speed]), at_rest=True)
-    state = layout.unpack(finger.rest_state(guess))
+    state = layout.unpack(finger.rest_state(start))
     size = np.append(np.ones(joints), np.full(len(state.passive_position), _PASSIVE_POSITION_SCALE))
 
     def at_rest(y: Array) -> tuple[Array, Evaluation]:
@@ -58,7 +67,7 @@ def settled_posture(finger: Finger, load: Array, speed: float | None, guess: Arr
         friction = finger.mechanism.split(finger.mechanism.with_row_states(x, evaluation.rows))[2]
         position = (size * y)[:joints]
         try:
-            resting = equilibrium(finger, load, position=position, fingertip_force=force, friction=friction)
+            resting = equilibrium(finger, command, position=position, fingertip_force=force, friction=friction)
         except InputError as error:
             if error.entry == "inputs":
                 return np.full(joints, np.nan)

@@ -77,8 +77,9 @@ def sliding_tendons(finger: Finger, speed: Array, *, at_rest: bool) -> Sliding:
     return Sliding(speeds, at_rest)
 
 
-def rubbing_cords(finger: Finger) -> NDArray[np.bool_]:
+def rubbing_cords(finger: FingerLike) -> NDArray[np.bool_]:
     """Return whether friction takes something of each cord: tendons, cords of a tree, and branches; shape (c,)."""
+    finger = as_finger(finger)
     masks = [np.zeros(0, dtype=bool)]
     for table in finger.mechanism.rows:
         own = table.group in ("driven_tendons", "passive_tendons")

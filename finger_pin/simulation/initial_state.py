@@ -23,8 +23,8 @@ from finger_pin.typing import Array
 
 # The rows that guard ranges: what they guard, and the unit of its depth.
 _STOPS = {"limiter": "joint", "tendon_limit": "cord"}
-# Energy in a stop that a start does not mention, J: less than a ten-thousandth of what moving fingers have.
-_LEAST_ENERGY = 1e-6
+# Energy in a stop that a start does not mention, J: 0.4 deg of the default stop; where (20) leads a joint is nearer.
+_LEAST_ENERGY = 1e-3
 
 
 def custom_parts(
@@ -160,7 +160,7 @@ def beyond_ranges(finger: Finger, x: Array) -> str:
         x: The packed state, shape (size,).
 
     Returns:
-        Text; empty where their stops hold less than 1 uJ each.
+        Text; empty where their stops hold less than 1 mJ each.
     """
     stops, position = finger.stroke_limiter, finger.layout.unpack(x).position
     outside = np.any(stops.limited & (penetration(position, stops.lower, stops.upper) != 0.0))

@@ -18,6 +18,9 @@ from finger_pin.description.validation import validate
 from finger_pin.exceptions import IntegrationError
 from finger_pin.simulation.simulator import Simulator
 
+# Starts beyond ranges are meant.
+pytestmark = pytest.mark.filterwarnings("ignore::finger_pin.exceptions.StartWarning")
+
 # A run of so short a time takes a second or two even where steps are as small as they may be.
 LONGEST = 1e-4
 # An energy, J, that only rounding makes, in a finger that rests without any.

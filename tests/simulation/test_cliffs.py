@@ -15,6 +15,9 @@ from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation import accuracy, recording
 from finger_pin.views.summary import summarize
 
+# Starts beyond ranges are meant.
+pytestmark = pytest.mark.filterwarnings("ignore::finger_pin.exceptions.StartWarning")
+
 LINK = {"length": 0.04, "width": 0.015, "mass": 5e-3}
 
 

@@ -20,7 +20,8 @@ from finger_pin.views.plots.figure_files import draw_all, figures_by_name
 from finger_pin.views.summary import summarize
 from finger_pin.views.viewer import write_animation, write_video
 
-pytestmark = pytest.mark.slow
+# Some starts lie beyond the joints' ranges.
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::finger_pin.exceptions.StartWarning")]
 
 SERVO = {"motor": "XL330-M288", "spool_radius": 0.005}
 FAR, NEAR, BESIDE = ({"shape": "sphere", "radius": 0.008, "position": [0.3, 0.3, z]} for z in (-0.4, -0.3, 0.0))

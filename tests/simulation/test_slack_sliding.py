@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from validation.wild_fingers import wild_scenario
 
 import finger_pin as fp
+
+# Starts beyond ranges are meant.
+pytestmark = pytest.mark.filterwarnings("ignore::finger_pin.exceptions.StartWarning")
 
 
 def let_go(floor: float) -> tuple[fp.Scenario, np.ndarray]:
