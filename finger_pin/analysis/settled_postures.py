@@ -35,7 +35,7 @@ def settled_posture(
 
     Args:
         finger: With ideal sources of tension and winches.
-        inputs: Tensions at the entrances of the canals, N, or what winches wind in, m, then a tree's inputs, shape (u,).
+        inputs: Tensions at the entrances of canals, N, or what winches wind in, m, then a tree's inputs, shape (u,).
         speed: Of the tendons as they came to rest, m/s, positive as they were drawn in: their friction has its sign.
             None: there is no friction any more.
         guess: Shape (n,), rad; by default the angles of the ranges nearest to zero.
