@@ -105,10 +105,7 @@ class SteadyReadings:
         at_rest = settings.at_rest or self._compares_posture
         by_name = {_POSTURE: position}
         if any(variable != _POSTURE for variable, _ in self._outputs):
-            finger: FingerLike = self._replacement or scenario.finger
-            if self._replacement is not None:
-                finger = with_parameters_of(self._replacement, self.scenario, scenario)
-            steady = steady_state(finger, load, self.recording.speed, position, at_rest)
+            steady = steady_state(self._driven(scenario), load, self.recording.speed, position, at_rest)
             by_name |= {
                 "tendon_tension": steady.tension,
                 "tendon_friction": steady.friction,
@@ -179,13 +176,18 @@ class SteadyReadings:
                 (load if group is self.load else position)[:, index] = values
         return load, position
 
+    def _driven(self, scenario: Scenario) -> FingerLike:
+        """Return the scenario's finger with its motors, or what replaces it, with the scenario's numbers."""
+        if self._replacement is None:
+            return scenario.finger
+        return with_parameters_of(self._replacement, self.scenario, scenario)
+
     def _finger(self, scenario: Scenario) -> Finger:
         """Return the finger at rest, with sources and winches in place of motors."""
-        finger, objects = scenario.finger, scenario.environment.objects
+        finger, objects, driven = scenario.finger, scenario.environment.objects, self._driven(scenario)
         resting = resting_finger(finger, self.wound_tendons.values()) if finger.actuators else finger
-        if self._replacement is not None:
-            replacement = with_parameters_of(self._replacement, self.scenario, scenario)
-            return replacement.changed(resting, objects) if finger.actuators else replacement
+        if isinstance(driven, Finger):
+            return driven.changed(resting, objects) if finger.actuators else driven
         return Finger(resting, objects=objects)
 
     def _settled_postures(self, scenario: Scenario, load: Array) -> Array:

@@ -118,14 +118,14 @@ class Law:
         """
         level, sign = self.signals.index("level"), np.sign(row.speed)
         state = np.zeros(np.broadcast_shapes(*map(np.shape, row)))
-        short, before, change = np.zeros_like(state), state, np.zeros_like(state)
+        short, change = np.zeros_like(state), np.zeros_like(state)
         for _ in range(_SETTLING_STEPS):
             was, short = short, sign * self.act(row._replace(state=state), p)[2][level] - state
             if np.all(np.abs(short) <= _SETTLED * np.abs(state)):
                 break
             slope = np.divide(short - was, change, out=-np.ones_like(state), where=change != 0.0)
-            before, state = state, state - short / np.where(slope < 0.0, slope, -1.0)
-            change = state - before
+            change = -short / np.where(slope < 0.0, slope, -1.0)
+            state = state + change
         return row._replace(state=state)
 
 

@@ -107,9 +107,8 @@ class Finger:
         The places in its description do not count.
 
         Args:
-            description: Joints (no links needed), tendons and friction; its gravity replaces the model's, and its
-                damping, dry friction and ranges act. Where the model has more of them, a `LeftOutWarning` says so.
-            model: For example a whole hand. Joints that turn on (continuous) have an angle for coordinate here.
+            description: No links needed. Its gravity, friction, ranges replace the model's; `LeftOutWarning` says what is lost.
+            model: For example a whole hand. Continuous joints have an angle for coordinate here.
             joints: For every joint of the description, in the model's order, the name of the model's joint.
             tip_frame: Frame of the fingertip in the model.
             configuration: Position at which the other joints are locked, shape (nq,); neutral by default.
@@ -118,7 +117,7 @@ class Finger:
 
         Raises:
             InputError: If a joint is missing, given twice or out of the model's order, or has several coordinates,
-                or one follows another (mimic), or the configuration has the wrong size.
+                follows another (mimic), or the configuration has the wrong size.
         """
         body, shown = on_model(description, model, joints, tip_frame, configuration, base_axis, visuals)
         finger = cls(description, body)
