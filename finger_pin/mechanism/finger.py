@@ -107,7 +107,7 @@ class Finger:
         The places in its description do not count.
 
         Args:
-            description: No links needed. Its gravity, friction, ranges replace the model's; `LeftOutWarning` says what is lost.
+            description: No links needed. Its gravity, friction and ranges replace the model's (`LeftOutWarning`).
             model: For example a whole hand. Continuous joints have an angle for coordinate here.
             joints: For every joint of the description, in the model's order, the name of the model's joint.
             tip_frame: Frame of the fingertip in the model.
