@@ -22,12 +22,14 @@ from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.core.tables.inputs import core_signal, held_control
-from finger_pin.description.parameters import Link
+from finger_pin.description.links import link_body, tree_of_links
+from finger_pin.description.parameters import Joint, Link
 from finger_pin.description.placement import PathSignal
+from finger_pin.mechanism.body_places import Placed
 from finger_pin.mechanism.contact_rows import contact_rows
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.solids import add_free_objects, link_solid, object_solids
+from finger_pin.mechanism.solids import add_free_objects, body_solids, object_solids
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
 
@@ -44,7 +46,9 @@ def fly(flight: Flight, method: str, tolerance: float) -> tuple[Trajectory, Arra
         joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
         inertia = pin.Inertia(0.1, np.array([0.05, 0.0, 0.0]), 1e-5 * np.eye(3))
         model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-        links = [link_solid("joint", "link", joint, Link(length=0.1, width=0.01, mass=0.1), True)]
+        described = Joint(range=(-1.0, 1.0), link=Link(length=0.1, width=0.01, mass=0.1))
+        tree, placed = tree_of_links({"joint": described}, {}), {link_body("joint"): Placed(joint, pin.SE3.Identity())}
+        links = body_solids(tree, placed, RigidBody(model, []))
     body = add_free_objects(RigidBody(model, []), flight.objects)
     width = body.model.nv
     prescribed = np.full(width, -1)

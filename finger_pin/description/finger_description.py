@@ -23,16 +23,9 @@ from finger_pin.description.caching import memoised
 from finger_pin.description.cords import Cord, check_tendons
 from finger_pin.description.effects import OF_FINGER, OF_HAND, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
+from finger_pin.description.links import placed_on_palm, tree_of_links
 from finger_pin.description.parameters import Joint, PassiveTendon, PerItem, StrokeLimiterSettings, Tendon, per_item
-from finger_pin.description.placement import (
-    PALM_POINT,
-    Palm,
-    actuator_of_hand,
-    joined_table,
-    placed_finger,
-    rotation,
-    tendon_of_hand,
-)
+from finger_pin.description.placement import PALM_POINT, Palm, joined_entries, placed_finger, quaternion, rotation
 from finger_pin.description.tree import NO_TREE, Tree
 from finger_pin.description.validation import IN_RADIANS, Description, Name, check_size, problem, quantity, real, vector
 from finger_pin.typing import Array
@@ -132,6 +125,17 @@ class FingerDescription(Description):
     def numbers(self) -> Mapping[str, Mapping[str, Array]]:
         """Numbers of friction, passive tendons and stops as arrays of one per item, by table and entry."""
         return self._numbers or self._expand()
+
+    @property
+    def bodies(self) -> Tree:
+        """The tree of bodies that it is made of, also where it is given by links.
+
+        Raises:
+            InputError: If a joint has neither a body nor a link, or the name of something else of a finger.
+        """
+        if self.hand is not None:
+            return self.hand.bodies
+        return self.tree if self.tree.bodies else tree_of_links(self.joints, self.tendons)
 
     def cord(self, name: str) -> Cord:
         """Return one of its tendons as a cord, or else a tendon of its tree that something else pulls."""
@@ -268,6 +272,13 @@ class HandSettings(Description):
         """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
         return {name: placed_finger(name, placed, self.gravity) for name, placed in self.fingers.items()}
 
+    @property
+    def bodies(self) -> Tree:
+        """Bodies of all fingers, and the palm's, as one tree in the palm's frame."""
+        places = {name: (placed.position, quaternion(*placed.orientation)) for name, placed in self.fingers.items()}
+        trees = {name: finger.bodies for name, finger in self.built().items()}
+        return placed_on_palm(trees, places, self.palm.size, self.palm.centre)
+
     def joined(self) -> FingerDescription:
         """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
         joined = self._put_together().model_copy()
@@ -277,24 +288,4 @@ class HandSettings(Description):
     # Of hands whose palms differ all else is the same.
     @memoised(lambda self: (self.name, self.title, self.gravity, *self.fingers, *self.fingers.values()))
     def _put_together(self) -> FingerDescription:
-        parts = self.built()
-        tendons, actuators = (
-            {f"{name}.{own}": each for name, part in parts.items() for own, each in getattr(part, group).items()}
-            for group in ("tendons", "actuators")
-        )
-        return FingerDescription.model_construct(
-            name=self.name,
-            title=self.title,
-            gravity=self.gravity,
-            joints={f"{name}.{own}": joint for name, part in parts.items() for own, joint in part.joints.items()},
-            tendons={
-                name: tendon_of_hand(name.split(".")[0], tendon)
-                for name, tendon in sorted(tendons.items(), key=lambda item: item[1].kind)
-            },
-            tendon_friction=joined_table(parts, "tendon_friction", TendonFrictionSettings),
-            joint_friction=joined_table(parts, "joint_friction", JointFrictionSettings),
-            passive_tendon=joined_table(parts, "passive_tendon", PassiveTendon),
-            stroke_limiter=joined_table(parts, "stroke_limiter", StrokeLimiterSettings),
-            actuators={name: actuator_of_hand(name.split(".")[0], actuator) for name, actuator in actuators.items()},
-            touches_itself=any(part.touches_itself for part in parts.values()),
-        )
+        return FingerDescription.model_construct(**joined_entries(self, self.built()))

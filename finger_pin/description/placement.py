@@ -8,10 +8,12 @@ from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
+from scipy.spatial.transform import Rotation
 
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.caching import memoised
-from finger_pin.description.parameters import Joint, Link, Tendon
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
+from finger_pin.description.parameters import Joint, Link, PassiveTendon, StrokeLimiterSettings, Tendon
 from finger_pin.description.signals import SignalSettings
 from finger_pin.description.tables import Series, series
 from finger_pin.description.validation import Description, Name, Numbers, problem, quantity, real, suggestion, vector
@@ -25,7 +27,6 @@ PALM_POINT = vector(3, -2.0, 2.0, _MILLIMETRES)
 PATH = ("x", "y", "z", "roll", "pitch", "yaw")
 _COORDINATE = real(-12.5, 12.5)
 
-_Table = TypeVar("_Table", bound=Description)
 _Finger = TypeVar("_Finger", bound=Description)
 
 
@@ -36,6 +37,13 @@ def rotation(roll: float, pitch: float, yaw: float) -> Array:
     about = ([[1, 0, 0], [0, a, -d], [0, d, a]], [[b, 0, e], [0, 1, 0], [-e, 0, b]], [[c, -f, 0], [f, c, 0], [0, 0, 1]])
     turned: Array = reduce(lambda first, then: np.array(then) @ first, about, np.eye(3))
     return turned
+
+
+@lru_cache
+def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """Return the rotation of fixed angles as a unit quaternion x, y, z, w."""
+    x, y, z, w = Rotation.from_matrix(rotation(roll, pitch, yaw)).as_quat().tolist()
+    return x, y, z, w
 
 
 # Powers of the scale that a link's numbers go with.
@@ -84,25 +92,44 @@ def placed_finger(name: str, placed: Any, gravity: tuple[float, float, float]) -
     return finger.updated(name=name, gravity=tuple(gravity_of_finger.tolist()))
 
 
-def tendon_of_hand(finger: str, tendon: Tendon) -> Tendon:
+def joined_entries(hand: Any, parts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entries of all fingers of a hand as one; the actuated tendons of all precede the passive ones."""
+    tendons, actuators, joints = (
+        {f"{name}.{own}": each for name, part in parts.items() for own, each in getattr(part, group).items()}
+        for group in ("tendons", "actuators", "joints")
+    )
+    return {
+        "name": hand.name,
+        "title": hand.title,
+        "gravity": hand.gravity,
+        "joints": joints,
+        "tendons": {
+            name: _tendon_of_hand(name.split(".")[0], tendon)
+            for name, tendon in sorted(tendons.items(), key=lambda item: item[1].kind)
+        },
+        "tendon_friction": _joined_table(parts, "tendon_friction", TendonFrictionSettings),
+        "joint_friction": _joined_table(parts, "joint_friction", JointFrictionSettings),
+        "passive_tendon": _joined_table(parts, "passive_tendon", PassiveTendon),
+        "stroke_limiter": _joined_table(parts, "stroke_limiter", StrokeLimiterSettings),
+        "actuators": {name: _actuator_of_hand(name.split(".")[0], actuator) for name, actuator in actuators.items()},
+        "touches_itself": any(part.touches_itself for part in parts.values()),
+    }
+
+
+def _tendon_of_hand(finger: str, tendon: Tendon) -> Tendon:
     """Return a tendon whose crossings are of the joints of a hand."""
     return tendon.updated(crossings={f"{finger}.{name}": each for name, each in tendon.crossings.items()})
 
 
-def actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
+def _actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
     """Return an actuator whose tendons are those of a hand."""
     return actuator.updated(tendons=tuple(f"{finger}.{tendon}" for tendon in actuator.tendons))
 
 
-def joined_table(parts: Mapping[str, Any], group: str, table: type[_Table]) -> _Table:
+def _joined_table(parts: Mapping[str, Any], group: str, table: type[Description]) -> Description:
     """Return one table for all fingers, with lists of numbers in the order of the hand."""
-    tables: list[_Table] = [getattr(part, group) for part in parts.values()]
-    joined: _Table = _joined(table, tables, [_kinds(part, group) for part in parts.values()])
-    return joined
-
-
-def _joined(table: Any, tables: Sequence[Any], kinds: list[tuple[str, ...]]) -> Any:
-    return table.model_construct(**_joined_lists(tables, kinds))
+    tables = [getattr(part, group) for part in parts.values()]
+    return table.model_construct(**_joined_lists(tables, [_kinds(part, group) for part in parts.values()]))
 
 
 def _kinds(part: Any, group: str) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -110,7 +110,13 @@ class Shaped(Description):
 
 
 class BodyShape(Shaped):
-    """A shape with which a body of a tree touches."""
+    """A shape with which a body of a tree touches.
+
+    Attributes:
+        continues: Whether it is a capsule whose near end lies in another one, which stands for it on a plane.
+    """
+
+    continues: ClassVar[bool] = False
 
     shape: Annotated[Literal["sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*SIZES)] = quantity(
         ..., unit="1", source="design", doc="One of sphere, box, cylinder, capsule, ellipsoid."

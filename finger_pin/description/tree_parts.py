@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.objects import ObjectState, check_moments
 from finger_pin.description.placement import PathSignal
@@ -26,6 +26,14 @@ from finger_pin.description.waypoints import BODY_POINT, Triple, Waypoint, check
 
 _MILLIMETRES = " m (is it in millimetres?)"
 _LARGE = 1e9
+#: Red, green, blue and opacity of what solids are made of, 0 to 1.
+MATERIALS: dict[str, tuple[float, float, float, float]] = {
+    "shell": (0.80, 0.81, 0.82, 1.0),
+    "pulley": (0.16, 0.17, 0.20, 1.0),
+    "axle": (0.72, 0.56, 0.28, 1.0),
+    "pad": (0.90, 0.38, 0.18, 1.0),
+    "palm": (0.30, 0.34, 0.40, 1.0),
+}
 #: The highest power of a coupling.
 MOST_POWER = 7
 Pair = tuple[float, float]
@@ -57,6 +65,13 @@ class TreeSolid(Description):
     orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
     )
+
+    _material: str = PrivateAttr("shell")
+
+    @property
+    def material(self) -> str:
+        """Key of `MATERIALS`."""
+        return self._material
 
     @model_validator(mode="after")
     def _which(self) -> Self:

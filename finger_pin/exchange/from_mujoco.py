@@ -28,7 +28,7 @@ from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
 from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies
 from finger_pin.exchange.mujoco_unsupported import ElementReader, LeftOutElements, apply_flags, within_margin
-from finger_pin.mechanism.tendon_paths import rotation
+from finger_pin.mechanism.body_places import rotation
 from finger_pin.version import installing
 
 _LEAST_FRICTION = 1e-7

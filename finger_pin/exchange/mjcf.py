@@ -10,21 +10,19 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from finger_pin.description.finger_description import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
-from finger_pin.description.parameters import Link
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.exchange.mjcf_compliance import soft
+from finger_pin.exchange.mjcf_bodies import BodyWriter
 from finger_pin.exchange.mjcf_friction import add_friction_elements
 from finger_pin.exchange.mjcf_tree import tree_to_mjcf
-from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.urdf import BASE_FRAME, TENSION_LIMIT, TIP_FRAME, build_rigid_body
+from finger_pin.mechanism.urdf import TENSION_LIMIT, TIP_FRAME
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
 from finger_pin.typing import Array
 
@@ -108,25 +106,18 @@ def to_mjcf(
             raise InputError("friction", f"of a tree is added to what is written without: {call}")
         return tree_to_mjcf(description, posture, timestep, integrator, limits is not False, shapes)
     tendons = Tendons.from_description(description)
-    links = _links(description)
-    position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)
-    if position.shape != (len(links),):
-        raise InputError("posture", f"must be {len(links)} numbers, one per joint", posture)
+    writer = BodyWriter(description, bool(limits), shapes)
+    joints = len(description.joints)
+    position = np.zeros(joints) if posture is None else np.asarray(posture, dtype=float)
+    if position.shape != (joints,):
+        raise InputError("posture", f"must be {joints} numbers, one per joint", posture)
     time_step = _stable_step(tendons, massless) if timestep is None else timestep
     root = ET.Element("mujoco", model=description.name)
     root.append(ET.Comment(_header(description, tendons, massless, friction, bool(limits))))
-    ET.SubElement(root, "compiler", angle="radian", eulerseq="XYZ")
+    ET.SubElement(root, "compiler", angle="radian", autolimits="false")
     option = {"timestep": _numbers(time_step), "gravity": _numbers(*description.gravity), "integrator": integrator}
     ET.SubElement(root, "option", option)
-    if shapes:
-        assets = ET.SubElement(root, "asset")
-        for name, colour in MATERIALS.items():
-            ET.SubElement(assets, "material", name=name, rgba=_numbers(*colour))
-    world = ET.SubElement(root, "worldbody")
-    if description.hand is not None:
-        _add_hand(world, description.hand, shapes, bool(limits))
-    else:
-        _add_links(ET.SubElement(world, "body", name=BASE_FRAME), description, links, shapes, bool(limits))
+    world = writer.add_bodies(root)
     if not massless:
         _add_masses(world, description, tendons)
     _add_tendons(root, tendons, massless)
@@ -151,76 +142,12 @@ def _header(description: FingerDescription, tendons: Tendons, massless: bool, fr
     return _HEADER.format(**notes).replace("--", "- -")
 
 
-def _links(description: FingerDescription) -> dict[str, Link]:
-    links = {}
-    for name, joint in description.joints.items():
-        if joint.link is None:
-            raise InputError(f"finger.joints.{name}.link", "is needed to generate an MJCF")
-        links[name] = joint.link
-    return links
-
-
 def _stable_step(tendons: Tendons, massless: bool) -> float:
     """Return a time step, s, to one digit: explicit stiffness is stable below 2 / omega, omega^2 = 2 K_h / m_5."""
     if massless or not tendons.routing.passive:
         return TIMESTEP
     fastest = math.sqrt(float(np.max(2.0 * tendons.half_stiffness / tendons.mass)))
     return min(TIMESTEP, float(f"{0.8 / fastest:.0e}"))
-
-
-def _add_hand(world: ET.Element, hand: HandSettings, shapes: bool, limits: bool) -> None:
-    """Add the palm and, on it, the fingers; names of a finger begin with its own and a dot."""
-    palm = ET.SubElement(world, "body", name="palm")
-    if shapes and all(hand.palm.size):
-        _add_shapes(palm, [Shape("box", hand.palm.size, hand.palm.centre, material="palm")])
-    for name, finger in hand.built().items():
-        mount = hand.fingers[name]
-        pose = {"pos": _numbers(*mount.position), "euler": _numbers(*mount.orientation)}
-        base = ET.SubElement(palm, "body", {"name": f"{name}.{BASE_FRAME}", **pose})
-        _add_links(base, finger, _links(finger), shapes, limits, f"{name}.")
-
-
-def _add_links(
-    body: ET.Element,
-    description: FingerDescription,
-    links: dict[str, Link],
-    shapes: bool,
-    limits: bool,
-    prefix: str = "",
-) -> None:
-    """Nest the links: a body's frame is its joint's, the axis is z and the link runs along x."""
-    size = len(links)
-    first, last = next(iter(links)), next(reversed(links.values()))
-    shapes_of_link = link_shapes(description, links)
-    damping = description.numbers["joint_friction"]["viscous"]
-    limiter = description.numbers["stroke_limiter"]
-    mobility = np.linalg.inv(build_rigid_body(description).mass_matrix(np.zeros(size)))
-    stiffness, damper = limiter["stiffness"], limiter["viscous"]
-    if shapes:
-        _add_shapes(body, palm_shapes(description, first, links[first]))
-    position, twist = (0.0, 0.0, 0.0), 0.0
-    for index, (name, link) in enumerate(links.items()):
-        frame = {"name": f"{prefix}{name}_link", "pos": _numbers(*position), "euler": _numbers(twist, 0, 0)}
-        body = ET.SubElement(body, "body", frame)
-        axial, transverse = link.inertia
-        inertia = {"pos": _numbers(link.mass_centre, 0, link.offset), "mass": _numbers(link.mass)}
-        ET.SubElement(body, "inertial", {**inertia, "diaginertia": _numbers(axial, transverse, transverse)})
-        limited = limits and description.joints[name].limited
-        bounds = {"range": _numbers(*description.joints[name].range), "limited": str(limited).lower()}
-        if limited:
-            bounds |= soft(stiffness[index], damper[index], mobility[index, index], "limit", stop=True)
-        hinge = {"name": f"{prefix}{name}", "type": "hinge", "axis": _numbers(0, 0, 1), **bounds}
-        spring = description.joints[name].spring
-        if spring is not None:
-            hinge |= {"stiffness": _numbers(spring.stiffness), "springref": _numbers(spring.rest)}
-        drag = damping[index] + (spring.damping if spring else 0.0)
-        ET.SubElement(body, "joint", {**hinge, "damping": _numbers(drag)})
-        if shapes:
-            _add_shapes(body, shapes_of_link[name])
-        position, twist = (link.length, 0.0, link.offset), link.twist
-    if shapes:
-        _add_shapes(body, pad_shapes(last), position)
-    ET.SubElement(body, "site", name=f"{prefix}{TIP_FRAME}", pos=_numbers(*position), euler=_numbers(twist, 0, 0))
 
 
 def _add_masses(world: ET.Element, description: FingerDescription, tendons: Tendons) -> None:
@@ -275,15 +202,3 @@ def _add_tendon(
     for coordinate, factor in zip(coordinates, coupling, strict=True):
         if factor != 0.0:
             ET.SubElement(tendon, "joint", joint=coordinate, coef=_numbers(factor))
-
-
-def _add_shapes(body: ET.Element, shapes: Iterable[Shape], place: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-    """Add shapes, moved to a place, m; those that collide meet objects of MuJoCo's default type, but not each other."""
-    for shape in shapes:
-        centre = [coordinate + shift for coordinate, shift in zip(shape.position, place, strict=True)]
-        size = [0.5 * side for side in shape.size]
-        if shape.kind != "box":
-            size[0] = shape.size[0]
-        frame = {"pos": _numbers(*centre), "euler": _numbers(*shape.rotation), "material": shape.material}
-        contact = {"mass": "0", "contype": "0", "conaffinity": str(int(shape.collides))}
-        ET.SubElement(body, "geom", {"type": shape.kind, "size": _numbers(*size), **frame, **contact})

@@ -14,8 +14,9 @@ from scipy.optimize import brentq
 
 from finger_pin.description.tree import Tree
 from finger_pin.exchange.mujoco_compliance import IMPACT_SPEED, LEAST_RESTITUTION, impact_damping, restitution
+from finger_pin.mechanism.body_places import Placed
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.tendon_paths import Placed, TendonPaths
+from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.xml_numbers import numbers
 from finger_pin.typing import Array
 

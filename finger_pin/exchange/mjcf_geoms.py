@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.surface import Shaped, Surface
 from finger_pin.description.tree import Tree
-from finger_pin.description.tree_parts import Body
+from finger_pin.description.tree_parts import MATERIALS, Body
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_compliance import Mobility, impact_ratio, quaternion, soft
 from finger_pin.mechanism.contact_rows import law_numbers
@@ -21,9 +21,13 @@ IDLE, HIDDEN = {"contype": "0", "conaffinity": "0"}, "4"
 _CONTACT = {"contype": "0", "conaffinity": "1"}
 
 
-def add_meshes(root: ET.Element, tree: Tree) -> None:
-    """Add the meshes of solids."""
+def add_assets(root: ET.Element, tree: Tree) -> None:
+    """Add the materials and meshes of solids."""
     assets = ET.SubElement(root, "asset")
+    used = {solid.material for body in tree.bodies.values() for solid in body.solids.values()}
+    for material, colour in MATERIALS.items():
+        if material in used:
+            ET.SubElement(assets, "material", name=material, rgba=numbers(*colour))
     for name, mesh in tree.meshes.items():
         points, faces = mesh.unpacked()
         corners = {"vertex": numbers(*points.ravel()), "face": " ".join(map(str, faces.ravel().tolist()))}
@@ -33,13 +37,14 @@ def add_meshes(root: ET.Element, tree: Tree) -> None:
 def add_body_geoms(element: ET.Element, body: Body) -> None:
     """Add the solids and shapes of a body; those of one name are one geom."""
     for key, solid in body.solids.items():
+        drawn = IDLE | {"material": solid.material}
         if key not in body.shapes and solid.kind == "mesh":
             pose = {"pos": numbers(*solid.position), "quat": quaternion(solid.orientation)}
             mesh_attributes = {"name": key, "type": "mesh", "mesh": str(solid.mesh), "mass": "0"}
-            ET.SubElement(element, "geom", mesh_attributes | pose | IDLE)
+            ET.SubElement(element, "geom", mesh_attributes | pose | drawn)
         elif key not in body.shapes:
             sizes = {"box": solid.sides, "ellipsoid": solid.semi_axes}.get(solid.kind, (solid.radius, solid.length))
-            add_geom(element, key, solid.kind, sizes, solid.position, solid.orientation, IDLE)
+            add_geom(element, key, solid.kind, sizes, solid.position, solid.orientation, drawn)
     for key, shape in body.shapes.items():
         contact = _CONTACT | _friction(shape.surface) | ({} if key in body.solids else {"group": HIDDEN})
         add_geom(element, key, shape.shape, shape.sizes, shape.position, shape.orientation, contact)

@@ -12,26 +12,22 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 
 from finger_pin.description.finger_description import FingerDescription
-from finger_pin.description.tree_parts import Body, TreeTendon
+from finger_pin.description.tree_parts import TreeTendon
 from finger_pin.description.waypoints import Waypoint
 from finger_pin.exceptions import InputError
-from finger_pin.exchange.mjcf_compliance import IMPEDANCE, Mobility, quaternion, soft
+from finger_pin.exchange.mjcf_bodies import BodyWriter
+from finger_pin.exchange.mjcf_compliance import IMPEDANCE, soft
 from finger_pin.exchange.mjcf_drives import add_actuators, add_equalities, add_keyframes
-from finger_pin.exchange.mjcf_geoms import HIDDEN, IDLE, add_body_geoms, add_geom, add_meshes, add_objects, add_pairs
-from finger_pin.mechanism.tendon_paths import rotation
-from finger_pin.mechanism.tree_mechanism import build_body
+from finger_pin.exchange.mjcf_geoms import HIDDEN, IDLE, add_geom, add_objects, add_pairs
+from finger_pin.mechanism.body_places import rotation
 from finger_pin.mechanism.xml_numbers import numbers
-from finger_pin.typing import Array
 
 # Longest step of MuJoCo, s, and its share of the time 1 / omega of the stiffest spring.
 _MAX_STEP, _STEP_SHARE = 1e-3, 0.2
-# The least friction loss that MuJoCo keeps, N m, the length of a wrap, which has none here, m, and the inertia that
-# MuJoCo wants of all that moves, kg m2.
-_LEAST_LOSS, _CYLINDER_LENGTH, _NO_INERTIA = 1e-6, 0.02, 1e-12
-_WORLD = "world"
+# Length of a wrap, which has none here, m.
+_CYLINDER_LENGTH = 0.02
 
 _HEADER = """
   {title}
@@ -81,14 +77,11 @@ def _header(description: FingerDescription) -> str:
     return _HEADER.format(title=description.title or description.name, rest=lines).replace("--", "- -")
 
 
-class _Writer:
+class _Writer(BodyWriter):
     """Writes bodies, tendons and what drives and holds them."""
 
     def __init__(self, description: FingerDescription, limits: bool, shapes: bool) -> None:
-        self.description, self.tree, self.limits, self.shapes = description, description.tree, limits, shapes
-        self.rigid_body, self.paths = build_body(description)
-        self.mobility = Mobility(self.tree, self.rigid_body, self.paths)
-        self.elements: dict[str | None, ET.Element] = {}
+        super().__init__(description, limits, shapes)
         self.names = {name for each in self.tree.bodies.values() for name in (*each.solids, *each.shapes)}
         self.waypoint_attributes: dict[tuple[str, Waypoint], dict[str, str]] = {}
 
@@ -112,15 +105,7 @@ class _Writer:
     def write(self, root: ET.Element, step: float) -> None:
         """Write all but the keyframes; controls that come late are kept for steps of a length, s."""
         tree = self.tree
-        if any(each.solids or each.shapes for each in tree.bodies.values()) and tree.meshes:
-            add_meshes(root, tree)
-        world = self.elements[None] = ET.SubElement(root, "worldbody")
-        for name, body in tree.bodies.items():
-            self._add_body(name, body)
-        for name, tip in ({"": tree.tip} if tree.tip else tree.tips).items():
-            # What is called a tip is read as one.
-            site = name if "tip" in name.lower() else "_".join(filter(None, (name, "fingertip")))
-            ET.SubElement(self.elements[tip.body], "site", name=site, pos=numbers(*tip.position))
+        world = self.add_bodies(root)
         if self.shapes:
             geoms = add_objects(world, tree)
             add_pairs(ET.SubElement(root, "contact"), self.description, geoms, self.mobility)
@@ -134,66 +119,6 @@ class _Writer:
                     ET.SubElement(fixed, "joint", joint=joint, coef=numbers(-crossing.radius))
         add_equalities(root, self.description, self.elements, self.mobility)
         add_actuators(root, self.description, step)
-
-    def place(self, name: str, q: Array) -> pin.SE3:
-        """Return the place of a body at a posture, shape (n,)."""
-        data, placed = self.rigid_body.model.createData(), self.paths.placed[name]
-        pin.forwardKinematics(self.rigid_body.model, data, q)
-        return data.oMi[placed.joint] * placed.frame
-
-    def _add_body(self, name: str, body: Body) -> None:
-        parent = self.elements[body.parent]
-        is_fixed = body.parent is None and not any(joint.body == name for joint in self.tree.joints.values())
-        if is_fixed and name == _WORLD:
-            self.elements[name] = parent
-            if self.shapes:
-                add_body_geoms(parent, body)
-            return
-        pose = {"pos": numbers(*body.position), "quat": quaternion(body.orientation)}
-        is_mocap = self._is_mocap(name, body)
-        attributes = {"mocap": "true"} if is_mocap else {}
-        attributes |= {"gravcomp": numbers(body.gravity_compensation)} if body.gravity_compensation else {}
-        element = self.elements[name] = ET.SubElement(parent, "body", {"name": name, **pose, **attributes})
-        if body.mass or any(body.inertia):
-            inertia = {"pos": numbers(*body.centre), "mass": numbers(body.mass), "fullinertia": numbers(*body.inertia)}
-            ET.SubElement(element, "inertial", inertia)
-        elif not is_fixed and not is_mocap:
-            least = {"pos": "0 0 0", "mass": numbers(_NO_INERTIA), "diaginertia": numbers(*[_NO_INERTIA] * 3)}
-            ET.SubElement(element, "inertial", least)
-        friction = self.description.numbers["joint_friction"]
-        loss = np.maximum(friction["floor"], friction["drag"])
-        for k, (joint, moved) in enumerate(self.tree.joints.items()):
-            if moved.body == name and not is_mocap:
-                place = {"axis": numbers(*moved.axis), "pos": numbers(*moved.anchor), "ref": numbers(moved.reference)}
-                attributes = {"name": joint, "type": moved.kind, **place, "armature": numbers(moved.armature)}
-                attributes["frictionloss"] = numbers(loss[k] if moved.bearing and loss[k] >= _LEAST_LOSS else 0.0)
-                ET.SubElement(element, "joint", attributes | self._joint(k, joint))
-        if self.shapes:
-            add_body_geoms(element, body)
-
-    def _is_mocap(self, name: str, body: Body) -> bool:
-        """Return whether a body is written as a mocap body, whose path the user gives by ``mocap_pos``."""
-        joints = [key for key, joint in self.tree.joints.items() if joint.body == name]
-        on_paths = [key for key in joints if key in self.tree.on_paths]
-        if on_paths and (body.parent is not None or on_paths != joints):
-            allowed = "is not written: a mocap body of MuJoCo stands in the world, and all of its joints have paths"
-            raise InputError(f"finger.tree.joints.{on_paths[0]}.path", allowed)
-        return bool(on_paths)
-
-    def _joint(self, k: int, name: str) -> dict[str, str]:
-        """Return spring, damper and range of a joint."""
-        joint, values = self.description.joints[name], self.description.numbers
-        viscous = float(values["joint_friction"]["viscous"][k]) * self.tree.joints[name].bearing
-        spring = joint.spring
-        attributes = {"damping": numbers(viscous + (spring.damping if spring else 0.0))}
-        if spring is not None:
-            attributes |= {"stiffness": numbers(spring.stiffness), "springref": numbers(spring.rest)}
-        limited = joint.limited and self.limits
-        attributes |= {"range": numbers(*joint.range), "limited": str(limited).lower()}
-        if limited:
-            stiffness, damper = (float(values["stroke_limiter"][entry][k]) for entry in ("stiffness", "viscous"))
-            attributes |= soft(stiffness, damper, self.mobility.joints[name], "limit", stop=True)
-        return attributes
 
     def _add_tendon(self, table: ET.Element, name: str, tendon: TreeTendon) -> None:
         if tendon.path is not None and any((tendon.joints or {}).values()):

@@ -10,8 +10,8 @@ from finger_pin.description.objects import Object
 from finger_pin.exchange.mujoco_names import Table, model_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_pairs import Pairs
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
+from finger_pin.mechanism.body_places import rotation
 from finger_pin.mechanism.contact_rows import DEEPEST_START
-from finger_pin.mechanism.tendon_paths import rotation
 
 # Difference of a free body from an even solid: in moments of inertia, part of the largest, and in mass centre, m.
 _INERTIA_TOLERANCE = 1e-9

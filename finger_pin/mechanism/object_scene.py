@@ -10,39 +10,21 @@ import pinocchio as pin
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.links import link_body
 from finger_pin.description.objects import Object
-from finger_pin.description.parameters import Link
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.body_places import Placed
 from finger_pin.mechanism.contact_rows import check_start, contact_rows
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.solids import (
-    WORLD,
-    add_free_objects,
-    finger_solids,
-    object_solids,
-    pairs_apart,
-    pairs_within,
-    tree_solids,
-)
+from finger_pin.mechanism.solids import WORLD, add_free_objects, body_solids, object_solids, pairs_apart, pairs_within
 from finger_pin.mechanism.state import State
-from finger_pin.mechanism.tendon_paths import Placed
 from finger_pin.typing import Array
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6
-
-
-def _links(description: FingerDescription) -> dict[str, Link]:
-    links: dict[str, Link] = {}
-    for name in description.links:
-        link = description.joints[name].link
-        if link is None:
-            raise InputError(f"finger.joints.{name}.link", "is needed for contacts, which take its size from there")
-        links[name] = link
-    return links
 
 
 def _touching(
@@ -59,11 +41,14 @@ def _touching(
         for name, each in objects.items()
         for place in [(each.position, each.orientation)]
     )
-    carried = (joint.link for joint in description.joints.values())
-    links = ((link.length, link.width, link.offset) for link in carried if link)
+    of_bodies = (
+        (key, each.continues, each.shape, each.sizes, each.surface, each.position, each.orientation)
+        for body in description.bodies.bodies.values()
+        for key, each in body.shapes.items()
+    )
     hand = description.hand
     pairs = hand and hand.fingers_touch, frozenset(pairs_within(description))
-    return (topology, *pairs, width, *links, *shapes)
+    return (topology, *pairs, width, *of_bodies, *shapes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +120,12 @@ class Scene:
         placed: Mapping[str | None, Placed],
     ) -> Rows:
         """Return the contacts of links and objects."""
-        hand, links = description.hand, _links(description)
-        bodies = [*tree_solids(description.tree, placed, extended), *finger_solids(links, extended)]
+        hand = description.hand
+        # Of a model of the user's own joints have the places of links.
+        places = placed or {
+            link_body(name): Placed(k, pin.SE3.Identity()) for k, name in enumerate(description.joints, 1)
+        }
+        bodies = body_solids(description.bodies, places, extended)
         if hand is not None and hand.fingers_touch is False:
             bodies = [replace(each, group=hand.name) for each in bodies]
         for name in objects:

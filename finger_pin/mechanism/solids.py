@@ -11,13 +11,12 @@ import pinocchio as pin
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.objects import Object, inertia_matrix
-from finger_pin.description.parameters import Link
 from finger_pin.description.placement import Palm
 from finger_pin.description.surface import Surface
 from finger_pin.description.tree import Tree
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.body_places import Placed, rotation
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.tendon_paths import Placed, rotation
 from finger_pin.typing import Array
 
 # Mass and moments of joints of the world, which carry nothing yet, kg and kg m2.
@@ -32,8 +31,6 @@ _WORLD_JOINTS = (
     pin.JointModelPY,
     pin.JointModelPZ,
 )
-# A link's own z axis runs along it, which is the x axis of its joint.
-_ALONG_LINK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,41 +96,14 @@ class Solid:
         return replace(self, home=home, range=np.inf if slides else radius)
 
 
-def link_solid(name: str, group: str, joint: int, link: Link, last: bool) -> Solid:
-    """Return a link as a capsule as wide as it is, from its joint to the next; the last one ends in the pad.
-
-    Args:
-        name: Of its joint.
-        group: Of the finger.
-        joint: Index of its joint in the Pinocchio model.
-        link: Its sizes.
-        last: Whether it is the last link.
-    """
-    radius = 0.5 * link.width
-    length = max(link.length - radius, 0.0) if last else link.length
-    place = pin.SE3(_ALONG_LINK, np.array([0.5 * length, 0.0, link.offset]))
-    return Solid(name, group, joint, place, "capsule", (radius, length), joined=True)
-
-
-def finger_solids(links: Mapping[str, Link], body: RigidBody) -> list[Solid]:
-    """Return the links of a finger or a hand, given by the names of their joints, from the base to each tip."""
-    fingers = {name: name.rpartition(".")[0] for name in links}
-    last = {finger: name for name, finger in fingers.items()}
-    return [
-        link_solid(
-            name, f"{fingers[name]}.", int(body.model.getJointId(name)), link, name == last[fingers[name]]
-        ).kept_near(body)
-        for name, link in links.items()
-    ]
-
-
-def tree_solids(tree: Tree, placed: Mapping[str | None, Placed], body: RigidBody) -> list[Solid]:
-    """Return the shapes of the bodies of a tree, which are one group; ``placed`` has the bodies' placements."""
+def body_solids(tree: Tree, placed: Mapping[str | None, Placed], body: RigidBody) -> list[Solid]:
+    """Return the shapes of bodies, those of a finger as one group; ``placed`` has the bodies' places."""
     solids = []
     for name, part in tree.bodies.items():
         for key, shape in part.shapes.items():
-            place = pin.SE3(rotation(shape.orientation), np.array(shape.position))
-            solid = Solid(key, "tree", placed[name].joint, placed[name].frame * place, shape.shape, shape.sizes)
+            place = placed[name].frame * pin.SE3(rotation(shape.orientation), np.array(shape.position))
+            group = f"{name.rpartition('.')[0]}."
+            solid = Solid(key, group, placed[name].joint, place, shape.shape, shape.sizes, joined=shape.continues)
             solid = replace(solid, surface=shape.surface).kept_near(body)
             led = all(body.model.names[k] in tree.on_paths for k in body.model.supports[solid.joint] if k)
             solids.append(replace(solid, prescribed=led))

@@ -11,8 +11,8 @@ import pinocchio as pin
 from finger_pin.description.caching import cached_property
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
-from finger_pin.description.tree_parts import TreeJoint
 from finger_pin.description.waypoints import Waypoint
+from finger_pin.mechanism.body_places import Placed, rotation
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import RowSignals, weighted_sum
@@ -20,23 +20,6 @@ from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
 from finger_pin.mechanism.spans.span import COINCIDENT, SIDE_ON_OTHER_BODY
 from finger_pin.mechanism.tendon_wraps import Wrap
 from finger_pin.typing import Array
-
-
-@dataclass(frozen=True)
-class Placed:
-    """The place of a body.
-
-    Attributes:
-        joint: Index of the joint that carries it in Pinocchio's model, 0 for the base.
-        frame: Its placement in that joint's frame.
-    """
-
-    joint: int
-    frame: pin.SE3
-
-    def place(self, position: tuple[float, float, float]) -> Place:
-        """Return a point of the body."""
-        return Place(self.joint, np.array(self.frame.act(np.array(position))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +76,7 @@ class TendonPaths:
     ) -> TendonPaths:
         """Read the tendons of a finger on a rigid body, on which the bodies of its tree have their places."""
         tree, joints = description.tree, list(description.joints)
-        references = np.array([joint.reference for joint in tree.joints.values()])
+        references = np.array([tree.joints[name].reference if name in tree.joints else 0.0 for name in joints])
         placements = body.placements(references)[0] if tree.tendons else []
         routes = {}
         for name, tendon in tree.tendons.items():
@@ -184,20 +167,6 @@ def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[s
     third = (placed[elsewhere.body].place(elsewhere.position),) if elsewhere else ()
     shape = CYLINDER if wrap.kind == "cylinder" else SPHERE
     return PathElement(shape, numbers, (first, second, *third), body.joint, frame)
-
-
-def rotation(quaternion: tuple[float, float, float, float]) -> Array:
-    """Return the rotation of a unit quaternion x, y, z, w, shape (3, 3)."""
-    matrix: Array = pin.Quaternion(np.array(quaternion)).normalized().matrix()
-    return matrix
-
-
-def joint_placement(place: pin.SE3, joint: TreeJoint) -> pin.SE3:
-    """Return the placement of a joint at zero, of a body with a place: at the joint's reference the body is there."""
-    back = np.zeros(6)
-    first = 3 if joint.kind == "hinge" else 0
-    back[first : first + 3] = -joint.reference * np.array(joint.axis)
-    return place * pin.SE3(np.eye(3), np.array(joint.anchor)) * pin.exp6(back)
 
 
 class Excursions:

@@ -24,14 +24,14 @@ from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.muscle import MUSCLE
 from finger_pin.laws.spring import CONSTANT_FORCE, DEAD_BAND_SPRING, ELASTIC_TENDON, JOINT_SPRING
+from finger_pin.mechanism.bodies import place_bodies
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
-from finger_pin.mechanism.tendon_paths import Placed, TendonPath, TendonPaths, joint_placement, rotation
+from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
 from finger_pin.mechanism.tendon_wraps import find_wraps
 from finger_pin.mechanism.tendons import SOURCES
-from finger_pin.mechanism.urdf import TIP_FRAME, build_rigid_body
 from finger_pin.typing import Array
 
 #: The tables of actuators without and with a state.
@@ -42,8 +42,6 @@ ELASTIC = "elastic_cords"
 _DRY_STICTION = 1e-4
 # How soon an actuator of limited rate follows its input, s.
 _INPUT_LAG, _UNLIMITED = 1e-4, (-np.inf, np.inf)
-# Inertia of what moves along a path, which takes none, kg or kg m2.
-_ON_PATH = 1e-9
 # What rows of a tree store and exchange, by table.
 _STORED = {
     "tendon_spring": Energy("tendon_spring", "tendons' springs"),
@@ -75,43 +73,17 @@ def build_body(description: FingerDescription, body: RigidBody | None = None) ->
         description: Of the finger.
         body: In place of the body that its links would make.
     """
-    if not description.tree.bodies:
-        body = body or build_rigid_body(description)
-        return body, TendonPaths.from_description(description, body)
-    if body is not None:
+    if body is None:
+        return _tendons_on_bodies(description)
+    if description.tree.bodies:
         raise InputError("rigid_body", "has no place beside a tree, whose bodies are its own")
-    return _body_of_tree(description)
+    return body, TendonPaths.from_description(description, body)
 
 
-@memoised(lambda it: (it.name, it.gravity, *routing_parts(it), *it.joints.values()))
-def _body_of_tree(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
-    tree, model = description.tree, pin.Model()
-    model.name = description.name
-    model.gravity.linear[:] = description.gravity
-    placed: dict[str | None, Placed] = {None: Placed(0, pin.SE3.Identity())}
-    for name, body in tree.bodies.items():
-        joint, place = placed[body.parent].joint, placed[body.parent].frame
-        place = place * pin.SE3(rotation(body.orientation), np.array(body.position))
-        for joint_name, moved in tree.joints.items():
-            if moved.body == name:
-                kind = pin.JointModelRevoluteUnaligned if moved.kind == "hinge" else pin.JointModelPrismaticUnaligned
-                joint = model.addJoint(joint, kind(np.array(moved.axis)), joint_placement(place, moved), joint_name)
-                model.armature[model.joints[joint].idx_v] = moved.armature if moved.path is None else _ON_PATH
-                place = pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
-        placed[name] = Placed(joint, place)
-        xx, yy, zz, xy, xz, yz = body.inertia
-        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if joint:
-            model.appendBodyToJoint(joint, pin.Inertia(body.mass, np.array(body.centre), inertia), place)
-    tips = {TIP_FRAME: tree.tip} if tree.tip else {f"{name}.{TIP_FRAME}": tip for name, tip in tree.tips.items()}
-    for name, tip in tips.items():
-        placement = placed[tip.body].frame * pin.SE3(np.eye(3), np.array(tip.position))
-        model.addFrame(pin.Frame(name, placed[tip.body].joint, 0, placement, pin.FrameType.OP_FRAME))
-    rigid_body = RigidBody(model, list(tips))
-    for name, moment in zip(tree.joints, np.diag(rigid_body.mass_matrix(pin.neutral(model))), strict=True):
-        if not moment > 0.0:
-            raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
-    return rigid_body, TendonPaths.from_description(description, rigid_body, placed)
+@memoised(lambda it: (place_bodies(it)[0], *routing_parts(it)))
+def _tendons_on_bodies(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
+    body, placed = place_bodies(description)
+    return body, TendonPaths.from_description(description, body, placed)
 
 
 def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows) -> Rows:

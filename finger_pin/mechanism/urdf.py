@@ -1,238 +1,225 @@
-"""URDF of a finger, and the Pinocchio model read from it."""
+"""URDF of a finger, a hand or a tree: links, joints and shapes; tendons and what drives joints have no place in it."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping
-from functools import lru_cache
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.caching import memoised
-from finger_pin.description.finger_description import FingerDescription, HandSettings
+from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.links import BASE, TIP
 from finger_pin.description.loading import DescriptionLike, describe
-from finger_pin.description.parameters import Link
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import InputError
-from finger_pin.mechanism.rigid_body import RigidBody, Topology
-from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
-from finger_pin.mechanism.urdf_tree import add_inertial, tree_to_urdf
+from finger_pin.description.surface import BodyShape
+from finger_pin.description.tree import Tree
+from finger_pin.description.tree_parts import MATERIALS, Body, Coupling, TreeJoint, TreeSolid
+from finger_pin.mechanism.body_places import joint_placement, rotation
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
 
-BASE_FRAME = "base"
-TIP_FRAME = "fingertip"
+BASE_FRAME, TIP_FRAME = BASE, TIP
 
 #: Tension that the effort limits allow each tendon, N, and the velocity limit of each joint, rad/s.
 #: They are for readers of the URDF that want some; the simulation applies neither.
 TENSION_LIMIT = 100.0
 VELOCITY_LIMIT = 20.0
 
-# Names that the URDF or Pinocchio gives to something else, so that looking them up would be ambiguous.
-_RESERVED = (TIP_FRAME, f"{TIP_FRAME}_fixed", "universe")
+# The geometry of a solid in a body's frame: its kind, sizes, m, place and attitude.
+_Geometry = tuple[str, Sequence[float], pin.SE3]
+_SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length")}
+# Mass and moments of the links between several joints of a body, kg and kg m2: MuJoCo refuses moving ones without.
+_SLIGHT = 1e-14
+_SLIGHT_INERTIA = (_SLIGHT,) * 3 + (0.0,) * 3
+_NOTES = """
+  {title}
+
+  Written from a tree of bodies. A body with several joints has a link for each, of which the last has its mass
+  and the others 1e-14 kg.
+  Left out, because a URDF has no place for it: tendons, actuators, loops, springs, the inertia of rotors;
+  couplings by more than a ratio and an offset, meshes, ellipsoids, objects.{rest}
+"""
 
 
 def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
-    """Return the URDF of a finger as text: Table I, inertias, joint ranges and shapes.
+    """Return the URDF of a finger, a hand or a tree as text: Table I, inertias, joint ranges and shapes.
 
-    Links are named ``base``, ``<joint>_link`` and ``fingertip``. A link's frame is its joint's: the axis is z
-    and the link runs along x, its ``offset`` along the axis away. Numbers are written so that reading them gives the
-    same floats.
+    Links are named ``base``, ``<joint>_link`` and ``fingertip``, those of a tree as its bodies. A link's frame is that
+    of its (last) joint: of a finger of links the axis is z and the link runs along x, its ``offset`` along the axis
+    away. Numbers are written so that reading them gives the same floats. What a URDF has no place for is named in that
+    of a tree.
 
     Args:
-        description: The finger, its name, the path of its file, or the scenario that has it; not a hand of several.
+        description: The finger, its name, the path of its file, or the scenario that has it.
         drawn: With shapes, and indented. Its motion needs neither.
-
-    Of a tree of bodies, links have the names of these, and the frame of their last joint; tendons, actuators and what
-    else a URDF has no place for are named in it.
 
     Raises:
         InputError: If it is no finger, it has a joint without a link, or a name that the URDF needs itself.
     """
     description = describe(description.finger if isinstance(description, Scenario) else description)
+    tree = description.bodies
+    root = ET.Element("robot", name=description.name)
     if description.tree.bodies:
-        return tree_to_urdf(description, drawn, BASE_FRAME, TIP_FRAME, TENSION_LIMIT, VELOCITY_LIMIT)
-    if description.hand is not None:
-        allowed = "is a hand; write its fingers one by one: description.hand.built()"
-        raise InputError("finger", allowed, description.name)
-    links = _links(description)
-    shapes = _shapes(description, links) if drawn else {}
-    robot = ET.Element("robot", name=description.name)
-    for material, colour in (MATERIALS if drawn else {}).items():
-        ET.SubElement(ET.SubElement(robot, "material", name=material), "color", rgba=_numbers(*colour))
-    _add_link(robot, BASE_FRAME, shapes.get(BASE_FRAME, ()))
-    parent, place, twist = BASE_FRAME, (0.0, 0.0, 0.0), 0.0
-    for name, link in links.items():
-        child = f"{name}_link"
-        _add_link(robot, child, shapes.get(name, ()), inertia_of=link)
-        joint = _add_joint(robot, name, "revolute", parent, child, place, twist)
-        ET.SubElement(joint, "axis", xyz=_numbers(0, 0, 1))
-        lower, upper = description.joints[name].range
-        limits = {"lower": lower, "upper": upper, "effort": effort_limit(description, name)}
-        limits["velocity"] = VELOCITY_LIMIT
-        ET.SubElement(joint, "limit", {key: _numbers(value) for key, value in limits.items()})
-        parent, place, twist = child, (link.length, 0.0, link.offset), link.twist
-    _add_link(robot, TIP_FRAME, shapes.get(TIP_FRAME, ()))
-    _add_joint(robot, f"{TIP_FRAME}_fixed", "fixed", parent, TIP_FRAME, place, twist)
+        root.append(ET.Comment(_notes(description)))
+    used = {solid.material for body in tree.bodies.values() for solid in body.solids.values()} if drawn else set()
+    for material, colour in MATERIALS.items():
+        if material in used:
+            ET.SubElement(ET.SubElement(root, "material", name=material), "color", rgba=_numbers(*colour))
+    base = BASE_FRAME
+    while base in tree.bodies and not _is_base(tree, base):
+        base += "_"
+    if base not in tree.bodies:
+        _add_massless_link(root, base)
+    placed: dict[str | None, tuple[str, pin.SE3]] = {None: (base, pin.SE3.Identity())}
+    courses = {each.joint: each for each in tree.couplings.values() if each.other and not any(each.higher)}
+    for name, body in tree.bodies.items():
+        link, place = placed[body.parent]
+        place = place * pin.SE3(rotation(body.orientation), np.array(body.position))
+        joints = _joints_of(tree, name)
+        for key in joints:
+            moved, child = tree.joints[key], name if key == joints[-1] else f"{name}_{key}"
+            joint = _add_joint(root, key, _kind(description, key, moved), link, child, joint_placement(place, moved))
+            ET.SubElement(joint, "axis", xyz=_numbers(*moved.axis))
+            _complete(joint, description, key, moved, courses.get(key))
+            if child != name:
+                add_inertial(ET.SubElement(root, "link", name=child), pin.SE3.Identity(), _SLIGHT, _SLIGHT_INERTIA)
+            link, place = child, pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
+        if not joints and name != base:
+            _add_joint(root, f"{name}_fixed", "fixed", link, name, place)
+            place = pin.SE3.Identity()
+        placed[name] = name, place
+        _add_link(root, name, body, place, drawn)
+    for name, end in tree.fingertips.items():
+        (link, place), last = placed[end.body], f"{name}_{TIP_FRAME}" if name else TIP_FRAME
+        if not any(end.position) and end.body and not _joints_of(tree, end.body) and not tree.bodies[end.body].mass:
+            continue
+        while last in tree.bodies:
+            last += "_"
+        _add_joint(root, f"{last}_fixed", "fixed", link, last, place * pin.SE3(np.eye(3), np.array(end.position)))
+        _add_massless_link(root, last)
     if drawn:
-        ET.indent(robot)
-    return ET.tostring(robot, encoding="unicode") + "\n"
+        ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
 
 
 def effort_limit(description: FingerDescription, joint: str) -> float:
-    """Return the torque on a joint, N m, when the tendons on its stronger side all carry `TENSION_LIMIT`."""
+    """Return the torque on a joint, N m, when the tendons on its stronger side all carry `TENSION_LIMIT`.
+
+    On a joint about which no tendon winds it is as many N m, or N.
+    """
     crossings = [tendon.crossings.get(joint) for tendon in description.tendons.values()]
     radii = [crossing.radius for crossing in crossings if crossing]
-    return TENSION_LIMIT * max(sum(r for r in radii if r > 0.0), -sum(r for r in radii if r < 0.0))
+    return TENSION_LIMIT * (max(sum(r for r in radii if r > 0.0), -sum(r for r in radii if r < 0.0)) or 1.0)
 
 
-def build_rigid_body(description: FingerDescription) -> RigidBody:
-    """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
-    return _build(description) if description.hand is None else build_hand(description.hand)
+def _notes(description: FingerDescription) -> str:
+    """Return the comment that says what of a tree is left out."""
+    asymmetry = "by how much the drag of joints differs by direction (drag_asymmetry): friction is the mean"
+    is_asymmetric = bool(np.any(description.joint_friction.drag_asymmetry))
+    left_out = (*description.tree.left_out, *[asymmetry] * is_asymmetric)
+    rest = "".join(f"\n  - {line}" for line in left_out)
+    return _NOTES.format(title=description.title or description.name, rest=rest).replace("--", "- -")
 
 
-def _body_key(description: FingerDescription) -> tuple[object, ...]:
-    """Return all that a finger's body depends on, by value."""
-    links = (joint.link for joint in description.joints.values())
-    values = (link and tuple(getattr(link, name) for name in Link.model_fields) for link in links)
-    return (description.name, description.gravity, *description.joints, *values)
+def _joints_of(tree: Tree, body: str) -> list[str]:
+    return [key for key, joint in tree.joints.items() if joint.body == body]
 
 
-@memoised(_body_key)
-def _build(description: FingerDescription) -> RigidBody:
-    model = _read(to_urdf(description, drawn=False)).copy()
-    model.gravity.linear[:] = description.gravity
-    body = RigidBody(model, TIP_FRAME)
-    places = [(name, each.length, each.offset, each.twist) for name, each in _links(description).items()]
-    body.topology = _topology(*places)
-    return body
+def _is_base(tree: Tree, name: str) -> bool:
+    """Return whether a body is the base itself: fixed on it, in its place."""
+    body = tree.bodies[name]
+    is_placed = any(body.position) or any(body.orientation[:3])
+    return body.parent is None and not is_placed and not _joints_of(tree, name)
 
 
-@memoised(lambda *places: places)
-def _topology(*places: object) -> Topology:
-    """Return the topology shared by links of equal lengths, offsets and twists."""
-    return Topology()
+def _kind(description: FingerDescription, joint: str, moved: TreeJoint) -> str:
+    if moved.kind == "slide":
+        return "prismatic"
+    # Continuous joints have two coordinates in Pinocchio, which reads fingers of links from here.
+    return "revolute" if description.joints[joint].limited or joint in description.links else "continuous"
 
 
-@lru_cache(maxsize=16)
-def _read(text: str) -> pin.Model:
-    """Return the model of a URDF; a hand is read as a whole and finger by finger."""
-    return pin.buildModelFromXML(text)
+def _complete(
+    joint: ET.Element, description: FingerDescription, name: str, moved: TreeJoint, course: Coupling | None
+) -> None:
+    """Add limits, damping and friction of a joint, and the joint that it follows."""
+    place, spring = list(description.joints).index(name), description.joints[name].spring
+    friction = description.numbers["joint_friction"]
+    lower, upper = description.joints[name].range
+    ends = {} if joint.get("type") == "continuous" else {"lower": _numbers(lower), "upper": _numbers(upper)}
+    ET.SubElement(
+        joint,
+        "limit",
+        ends | {"effort": _numbers(effort_limit(description, name)), "velocity": _numbers(VELOCITY_LIMIT)},
+    )
+    damping = float(friction["viscous"][place]) * moved.bearing + (spring.damping if spring else 0.0)
+    loss = max(float(friction[entry][place]) for entry in ("floor", "drag")) * moved.bearing
+    ET.SubElement(joint, "dynamics", damping=_numbers(damping), friction=_numbers(loss))
+    if course is not None and course.other is not None:
+        followed = {"joint": course.other, "multiplier": _numbers(course.slope), "offset": _numbers(course.offset)}
+        ET.SubElement(joint, "mimic", followed)
 
 
-def build_hand(hand: HandSettings) -> RigidBody:
-    """Return the rigid body of a hand: its fingers in their places, in the palm's frame."""
-    pulled = {"gravity": hand.gravity}
-    parts = {name: build_rigid_body(finger.model_copy(update=pulled)) for name, finger in hand.built().items()}
-    placed = tuple((name, each.position, each.orientation) for name, each in hand.fingers.items())
-    return _weighed_hand(hand, placed, parts)
-
-
-@memoised(lambda hand, placed, parts: (hand.gravity, *placed, *parts.values()))
-def _weighed_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping[str, RigidBody]) -> RigidBody:
-    joined = _joined_hand(hand, placed, parts)
-    return joined.with_inertias([each for part in parts.values() for each in part.inertias], hand.gravity)
-
-
-@memoised(lambda hand, placed, parts: (*placed, *(part.topology for part in parts.values())))
-def _joined_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping[str, RigidBody]) -> RigidBody:
-    places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
-    return join_bodies(parts, places)
-
-
-def _links(description: FingerDescription) -> dict[str, Link]:
-    links = {}
-    for name, joint in description.joints.items():
-        if name in _RESERVED:
-            raise InputError(f"finger.joints.{name}", f"a joint cannot be called {' or '.join(_RESERVED)}")
-        if joint.link is None:
-            raise InputError(f"finger.joints.{name}.link", "is needed to generate a URDF")
-        links[name] = joint.link
-    return links
-
-
-def _shapes(description: FingerDescription, links: dict[str, Link]) -> dict[str, list[Shape]]:
-    """Return the shapes of the links, by joint, of the palm and of the fingertip, by frame."""
-    first, last = next(iter(links)), next(reversed(links.values()))
-    palm, pad = palm_shapes(description, first, links[first]), pad_shapes(last)
-    return {BASE_FRAME: palm, **link_shapes(description, links), TIP_FRAME: pad}
-
-
-def _add_link(robot: ET.Element, name: str, shapes: Iterable[Shape], inertia_of: Link | None = None) -> None:
-    element = ET.SubElement(robot, "link", name=name)
-    if inertia_of is None:
-        add_inertial(element, pin.SE3.Identity(), 0.0)
-    else:
-        axial, transverse = inertia_of.inertia
-        place = pin.SE3(np.eye(3), np.array([inertia_of.mass_centre, 0.0, inertia_of.offset]))
-        add_inertial(element, place, inertia_of.mass, (axial, transverse, transverse, 0.0, 0.0, 0.0))
-    for shape in shapes:
-        visual = _add_shape(element, "visual", shape)
-        ET.SubElement(visual, "material", name=shape.material)
-    for shape in shapes:
-        if shape.collides:
-            _add_shape(element, "collision", shape)
-
-
-def _add_shape(link: ET.Element, role: str, shape: Shape) -> ET.Element:
-    element = ET.SubElement(link, role)
-    ET.SubElement(element, "origin", xyz=_numbers(*shape.position), rpy=_numbers(*shape.rotation))
-    geometry = ET.SubElement(element, "geometry")
-    if shape.kind == "box":
-        ET.SubElement(geometry, "box", size=_numbers(*shape.size))
-    else:
-        sizes = zip(("radius", "length"), shape.size, strict=False)
-        ET.SubElement(geometry, shape.kind, {key: _numbers(value) for key, value in sizes})
-    return element
-
-
-def _add_joint(
-    robot: ET.Element, name: str, kind: str, parent: str, child: str, place: tuple[float, float, float], twist: float
-) -> ET.Element:
-    joint = ET.SubElement(robot, "joint", name=name, type=kind)
+def _add_joint(root: ET.Element, name: str, kind: str, parent: str, child: str, place: pin.SE3) -> ET.Element:
+    joint = ET.SubElement(root, "joint", name=name, type=kind)
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
-    ET.SubElement(joint, "origin", xyz=_numbers(*place), rpy=_numbers(twist, 0, 0))
+    _add_origin(joint, place)
     return joint
 
 
-def join_bodies(parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | None = None) -> RigidBody:
-    """Return several bodies on one base; names of joints and tips begin with that of their part and a dot.
+def _add_origin(element: ET.Element, place: pin.SE3) -> None:
+    ET.SubElement(
+        element, "origin", xyz=_numbers(*place.translation), rpy=_numbers(*pin.rpy.matrixToRpy(place.rotation))
+    )
+
+
+def _add_massless_link(root: ET.Element, name: str) -> None:
+    add_inertial(ET.SubElement(root, "link", name=name), pin.SE3.Identity(), 0.0)
+
+
+def _add_link(root: ET.Element, name: str, body: Body, place: pin.SE3, drawn: bool) -> None:
+    """Add a link whose frame is that of its body's last joint, in which the body has a place."""
+    link = ET.SubElement(root, "link", name=name)
+    add_inertial(link, place * pin.SE3(np.eye(3), np.array(body.centre)), body.mass, body.inertia)
+    for role, solids in (("visual", body.solids), ("collision", body.shapes)) if drawn else ():
+        for solid in solids.values():
+            for kind, sizes, where in _geometries(solid):
+                element = ET.SubElement(link, role)
+                _add_origin(element, place * where)
+                geometry = ET.SubElement(element, "geometry")
+                if isinstance(solid, TreeSolid):
+                    ET.SubElement(element, "material", name=solid.material)
+                values = [_numbers(*sizes)] if kind == "box" else map(_numbers, sizes)
+                ET.SubElement(geometry, kind, dict(zip(_SIZES[kind], values, strict=True)))
+
+
+def add_inertial(link: ET.Element, place: pin.SE3, mass: float, inertia: Sequence[float] = (0.0,) * 6) -> None:
+    """Add what a link weighs, also nothing: of links that do not say, MuJoCo weighs the shapes, and Bullet takes 1 kg.
 
     Args:
-        parts: By name.
-        places: Placements of the parts' base frames on the common base; there itself by default. Gravity is that
-            of the common base.
-
-    Raises:
-        InputError: If gravity is not the same for all.
+        link: Its element.
+        place: Of the mass centre, and the axes of the moments, in its frame.
+        mass: In kg.
+        inertia: Moments about the mass centre, xx, yy, zz, xy, xz, yz, kg m2.
     """
-    model, tips = pin.Model(), []
-    axes, carriers = [np.array([1.0, 0.0, 0.0])], [0]
-    model.gravity = next(iter(parts.values())).model.gravity
-    for part, body in parts.items():
-        part_model, shift = body.model, model.njoints - 1
-        place = (places or {}).get(part, pin.SE3.Identity())
-        if part_model.gravity != model.gravity:
-            raise InputError(f"{part}.gravity", f"must be {model.gravity.linear}", part_model.gravity.linear)
-        for index in range(1, part_model.njoints):
-            parent = int(part_model.parents[index])
-            joint, placement = part_model.joints[index], part_model.jointPlacements[index]
-            placement = placement if parent else place * placement
-            at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{part_model.names[index]}")
-            # Appending bodies, or frames with theirs, would round.
-            model.inertias[at] = part_model.inertias[index]
-            at, moved = model.joints[at].idx_v, part_model.joints[index]
-            model.armature[at : at + moved.nv] = part_model.armature[moved.idx_v : moved.idx_v + moved.nv]
-        for tip in body.tips:
-            frame = part_model.frames[tip]
-            holder = frame.parentJoint and frame.parentJoint + shift
-            tips.append(f"{part}.{frame.name}")
-            frame_placement = frame.placement if holder else place * frame.placement
-            model.addFrame(pin.Frame(tips[-1], holder, 0, frame_placement, pin.FrameType.OP_FRAME), False)
-        along = zip(body.proximal_axes[1:], body.parent_links[1:], strict=True)
-        axes += [axis if carrier else place.rotation @ axis for axis, carrier in along]
-        carriers += [carrier and carrier + shift for carrier in body.parent_links[1:]]
-    joined = RigidBody(model, tips)
-    joined.proximal_axes, joined.parent_links = axes, carriers
-    return joined
+    inertial = ET.SubElement(link, "inertial")
+    _add_origin(inertial, place)
+    ET.SubElement(inertial, "mass", value=_numbers(mass))
+    moments = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), map(_numbers, inertia), strict=True))
+    ET.SubElement(inertial, "inertia", moments)
+
+
+def _geometries(solid: TreeSolid | BodyShape) -> Iterator[_Geometry]:
+    """Yield the geometry of a solid; a capsule is a cylinder and two spheres."""
+    place = pin.SE3(rotation(solid.orientation), np.array(solid.position))
+    kind = solid.kind if isinstance(solid, TreeSolid) else solid.shape
+    radius, length = float(solid.radius or 0.0), float(solid.length or 0.0)
+    if kind == "box":
+        yield "box", solid.sides or (0.0,) * 3, place
+    elif kind == "sphere":
+        yield "sphere", (radius,), place
+    elif kind in ("cylinder", "capsule"):
+        yield "cylinder", (radius, length), place
+    for end in (-0.5, 0.5) if kind == "capsule" else ():
+        yield "sphere", (radius,), place * pin.SE3(np.eye(3), np.array([0.0, 0.0, end * length]))

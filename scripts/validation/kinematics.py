@@ -11,7 +11,8 @@ import numpy as np
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import load_finger
-from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
+from finger_pin.mechanism.bodies import build_rigid_body
+from finger_pin.mechanism.urdf import to_urdf
 from finger_pin.typing import Array
 from validation.check import Check, Comparison, Section, compare, skipped
 

@@ -12,7 +12,8 @@ from validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 from finger_pin.description.loading import load_finger
 from finger_pin.description.tables import list_fingers
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
+from finger_pin.mechanism.bodies import build_rigid_body
+from finger_pin.mechanism.urdf import to_urdf
 
 ROOT = Path(__file__).resolve().parents[2]
 

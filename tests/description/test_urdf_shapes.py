@@ -10,7 +10,7 @@ from urdf_cases import FINGERS, links_of, read_by_pinocchio
 from validation.kinematics import read_by_yourdfpy
 
 from finger_pin.description.loading import load_finger
-from finger_pin.mechanism.shapes import MATERIALS
+from finger_pin.description.tree_parts import MATERIALS
 from finger_pin.mechanism.urdf import to_urdf
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,11 +27,21 @@ def test_the_urdf_refers_to_no_file(finger):
     assert not [element for element in root.iter() if "filename" in element.attrib]
 
 
-def test_every_link_has_visual_and_collision_shapes(finger):
+def test_every_link_is_drawn_and_those_that_touch_in_a_run_touch_as_the_same_capsules(finger):
+    """A capsule is as wide as its link and goes from joint to joint; the last one's round end is the pad."""
     robot = read_by_yourdfpy(to_urdf(finger))
     assert set(robot.link_map) == {"base", "fingertip", *(f"{name}_link" for name in finger.joints)}
-    for link in robot.link_map.values():
-        assert link.visuals and link.collisions, link.name
+    assert all(link.visuals for link in robot.link_map.values())
+    assert not robot.link_map["base"].collisions and not robot.link_map["fingertip"].collisions
+    *_, last = finger.joints
+    for name, joint in finger.joints.items():
+        barrel, *ends = robot.link_map[f"{name}_link"].collisions
+        radius, length = 0.5 * joint.link.width, joint.link.length
+        length = max(length - radius, 0.0) if name == last else length
+        assert barrel.geometry.cylinder.radius == radius and barrel.geometry.cylinder.length == length
+        assert [end.geometry.sphere.radius for end in ends] == [radius, radius]
+        centres = [end.origin[:3, 3] for end in ends]
+        np.testing.assert_allclose(centres, [[0.0] * 3, [length, 0.0, 0.0]], atol=1e-15)
 
 
 def test_pinocchio_reads_every_shape_of_the_urdf(finger):
@@ -67,7 +77,7 @@ def test_shapes_stay_within_half_a_width_of_their_link(finger):
     for name, joint in finger.joints.items():
         link = robot.link_map[f"{name}_link"]
         length, width = joint.link.length, joint.link.width
-        for shape in (*link.visuals, *link.collisions):
+        for shape in link.visuals:
             low, high = bounds(shape.geometry, shape.origin)
             assert np.all(low >= [-0.5 * width - 1e-12, -0.51 * width, -0.56 * width])
             assert np.all(high <= [length + 1e-12, 0.51 * width, 0.56 * width])
@@ -77,9 +87,9 @@ def test_a_phalanx_lies_along_x_between_its_joints_and_covers_most_of_the_link(f
     robot = read_by_yourdfpy(to_urdf(finger))
     for name, joint in finger.joints.items():
         link = robot.link_map[f"{name}_link"]
-        (collision,) = link.collisions
-        low, high = bounds(collision.geometry, collision.origin)
-        assert (collision.geometry.box is not None) == (joint.link.section == "square")
+        shell = link.visuals[0]
+        low, high = bounds(shell.geometry, shell.origin)
+        assert (shell.geometry.box is not None) == (joint.link.section == "square")
         assert 0.0 < low[0] < high[0] < joint.link.length
         assert high[0] - low[0] >= 0.19 * joint.link.length
         np.testing.assert_allclose(high[1:] - low[1:], joint.link.width, rtol=1e-12)
@@ -87,7 +97,7 @@ def test_a_phalanx_lies_along_x_between_its_joints_and_covers_most_of_the_link(f
 
 def test_the_pad_ends_at_the_fingertip(finger):
     link = read_by_yourdfpy(to_urdf(finger)).link_map["fingertip"]
-    for shape in (*link.visuals, *link.collisions):
+    for shape in link.visuals:
         _, high = bounds(shape.geometry, shape.origin)
         assert shape.geometry.sphere is not None
         assert high[0] == 0.0

@@ -170,8 +170,11 @@ def test_masses_frames_ranges_and_the_fingertip_are_those_of_the_urdf(name):
 def test_shapes_are_those_of_the_urdf_and_do_not_collide_with_each_other(name):
     description = fp.load_finger(name)
     model, urdf = load(to_mjcf(description)), ET.fromstring(to_urdf(description))
-    assert model.ngeom == len(list(urdf.iter("visual")))
-    assert int((model.geom_conaffinity == 1).sum()) == len(list(urdf.iter("collision")))
+    touching = model.geom_conaffinity == 1
+    assert int((~touching).sum()) == len(list(urdf.iter("visual")))
+    # A capsule is a cylinder and two spheres there.
+    assert (model.geom_type[touching] == mujoco.mjtGeom.mjGEOM_CAPSULE).all()
+    assert 3 * int(touching.sum()) == len(list(urdf.iter("collision")))
     assert not model.geom_contype.any()
     assert load(to_mjcf(description, shapes=False)).ngeom == 0
 

@@ -7,10 +7,10 @@ import pytest
 import finger_pin as fp
 from finger_pin.description.objects import Object
 from finger_pin.laws.contact_law import CONTACT
+from finger_pin.mechanism.bodies import place_bodies
 from finger_pin.mechanism.contact_rows import check_start, contact_rows
 from finger_pin.mechanism.path_elements import path_kinematics
-from finger_pin.mechanism.solids import add_free_objects, finger_solids, object_solids
-from finger_pin.mechanism.urdf import build_rigid_body
+from finger_pin.mechanism.solids import add_free_objects, body_solids, object_solids
 
 TABLE = Object(shape="half_space", position=(0.0, 0.0, -0.1))
 #: Within reach of every link.
@@ -21,9 +21,14 @@ BALL = Object(shape="sphere", radius=0.02, mass=0.05, position=(0.1, 0.0, -0.08)
 def scene(**objects):
     """Return rigid body, links of the paper's finger, and the contacts of both with objects."""
     description = fp.load_finger("ub_stand_in")
-    body = add_free_objects(build_rigid_body(description), objects)
+    alone, placed = place_bodies(description)
+    body = add_free_objects(alone, objects)
     links = {name: joint.link for name, joint in description.joints.items()}
-    return body, links, contact_rows([*finger_solids(links, body), *object_solids(objects, body)], body.model.nv)
+    return (
+        body,
+        links,
+        contact_rows([*body_solids(description.bodies, placed, body), *object_solids(objects, body)], body.model.nv),
+    )
 
 
 def distances(contacts, body, q):

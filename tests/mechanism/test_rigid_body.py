@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from finger_pin.description.loading import load_finger, load_hand
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.bodies import build_rigid_body
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.urdf import build_rigid_body
 
 SAMPLES = 30
 

@@ -4,43 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.finger_description import FingerDescription, HandSettings
-from finger_pin.exceptions import InputError
+from finger_pin.description.finger_description import FingerDescription
+from finger_pin.mechanism.bodies import build_rigid_body
 from finger_pin.mechanism.from_pinocchio import chain, finger_width, placed_solids, turned_model
 from finger_pin.mechanism.geometry.cord_pieces import Arc, Leg, WoundSpan
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes, tendon_lanes
+from finger_pin.mechanism.geometry.visuals import Visual, model_visual
 from finger_pin.mechanism.geometry.wound_tendon import BASE_LEAD, joint_chains, wind
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.shapes import MATERIALS
-from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
 from finger_pin.typing import Array
-
-
-@dataclass(frozen=True)
-class Visual:
-    """A solid that is fixed to a link.
-
-    Attributes:
-        name: Of the solid.
-        link: Index of the link, 0 for the base.
-        shape: Geometry of Pinocchio: a box, a cylinder, a sphere or a mesh.
-        placement: In the frame of the link.
-        colour: Red, green, blue and opacity, 0 to 1.
-        framed: Whether the camera must have its corners in view; of links their joints suffice.
-    """
-
-    name: str
-    link: int
-    shape: Any
-    placement: pin.SE3
-    colour: tuple[float, float, float, float]
-    framed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +45,6 @@ class WoundFinger:
     Attributes:
         pieces: Of its tendons, by name.
         pulleys: Winding surfaces whose radius is not zero.
-        visuals: Its solids.
         lanes: Offset of each tendon along the joint axes.
         widths: Of its links, m.
         size: Largest distance of its tip from its base, about, m.
@@ -78,7 +53,6 @@ class WoundFinger:
 
     pieces: dict[str, tuple[WoundSpan | Arc, ...]]
     pulleys: tuple[Pulley, ...]
-    visuals: tuple[Visual, ...]
     lanes: Lanes
     widths: tuple[float, ...]
     size: float
@@ -89,11 +63,9 @@ class WoundFinger:
         """Wind the tendons of a finger that is made of links."""
         model = build_rigid_body(description).model
         links = [joint.link for joint in description.joints.values() if joint.link is not None]
-        solids = pin.buildGeomFromUrdfString(model, to_urdf(description), pin.GeometryType.VISUAL).geometryObjects
-        visuals = tuple(_visual(each, each.placement) for each in solids)
         widths = tuple(link.width for link in links)
         size = BASE_LEAD * widths[0] + sum(link.length for link in links)
-        return cls._wound(description, model, visuals, widths, size, resolution)
+        return cls._wound(description, model, widths, size, resolution)
 
     @classmethod
     def from_chain(cls, description: FingerDescription, model: pin.Model, resolution: int) -> WoundFinger:
@@ -101,17 +73,11 @@ class WoundFinger:
         width = finger_width(description)
         lengths = [float(np.linalg.norm(each.translation)) for each in list(model.jointPlacements)[2:]]
         size = BASE_LEAD * width + sum(lengths) + max(lengths, default=width)
-        return cls._wound(description, model, (), (width,) * len(description.joints), size, resolution)
+        return cls._wound(description, model, (width,) * len(description.joints), size, resolution)
 
     @classmethod
     def _wound(
-        cls,
-        description: FingerDescription,
-        model: pin.Model,
-        visuals: tuple[Visual, ...],
-        widths: tuple[float, ...],
-        size: float,
-        resolution: int,
+        cls, description: FingerDescription, model: pin.Model, widths: tuple[float, ...], size: float, resolution: int
     ) -> WoundFinger:
         indices = {name: index for index, name in enumerate(description.joints, start=1)}
         ranges = dict(enumerate((joint.range for joint in description.joints.values()), start=1))
@@ -125,7 +91,7 @@ class WoundFinger:
             (radius,) = joint_chains(description.cord(name), indices, model)
             mass_link = _mass_link(description, name, list(arms[name]))
             pieces[name] = wind(radius, ranges, model, lanes, name, resolution, mass_link)
-        return cls(pieces, winding_surfaces(arms, lanes), visuals, lanes, widths, size)
+        return cls(pieces, winding_surfaces(arms, lanes), lanes, widths, size)
 
     def placed(self, name: str, place: pin.SE3, first: int) -> WoundFinger:
         """Return the finger as part of a hand: under dotted names, at its place, after ``first`` other joints."""
@@ -135,15 +101,6 @@ class WoundFinger:
             families=tuple(tuple(first + joint for joint in family) for family in self.lanes.families),
         )
         pulleys = (replace(each, tendon=f"{name}.{each.tendon}", joint=first + each.joint) for each in self.pulleys)
-        visuals = (
-            replace(
-                each,
-                name=f"{name}.{each.name}",
-                link=each.link and first + each.link,
-                placement=each.placement if each.link else place * each.placement,
-            )
-            for each in self.visuals
-        )
         return replace(
             self,
             pieces={
@@ -151,7 +108,6 @@ class WoundFinger:
                 for key, pieces in self.pieces.items()
             },
             pulleys=tuple(pulleys),
-            visuals=tuple(visuals),
             lanes=lanes,
             size=self.size + float(np.linalg.norm(place.translation)),
         )
@@ -159,10 +115,6 @@ class WoundFinger:
 
 def fingers_of_links(description: FingerDescription, resolution: int) -> list[WoundFinger]:
     """Return the fingers of a hand that is made of links, or the only one."""
-    for name, joint in description.joints.items():
-        if joint.link is None:
-            allowed = "is missing; the viewer shows links, or with finger= the model of the user's own"
-            raise InputError(f"finger.joints.{name}.link", allowed)
     hand, first, fingers = description.hand, 0, []
     if hand is None:
         return [WoundFinger.from_links(description, resolution)]
@@ -185,15 +137,7 @@ def fingers_on_model(
         fingers.append(wound.placed(name, pin.SE3.Identity(), first) if name else wound)
         first += len(finger.joints)
     placed = placed_solids(solids, turns) if solids is not None else ()
-    return model, fingers, tuple(_visual(each, placement) for each, placement in placed)
-
-
-def palm_box(hand: HandSettings | None) -> tuple[Visual, ...]:
-    """Return the box of a palm, if it has one."""
-    if hand is None or not all(hand.palm.size):
-        return ()
-    place = pin.SE3(np.eye(3), np.array(hand.palm.centre))
-    return (Visual("palm", 0, coal.Box(*hand.palm.size), place, MATERIALS["palm"], framed=True),)
+    return model, fingers, tuple(model_visual(each, placement) for each, placement in placed)
 
 
 def winding_surfaces(arms: Mapping[str, Mapping[int, float]], lanes: Lanes) -> tuple[Pulley, ...]:
@@ -212,8 +156,3 @@ def _mass_link(description: FingerDescription, tendon: str, crossed: list[int]) 
         return len(description.joints) + 1
     before = description.tendons[tendon].proximal_crossings
     return crossed[before - 1] if before else crossed[0] - 1
-
-
-def _visual(solid: pin.GeometryObject, placement: pin.SE3) -> Visual:
-    red, green, blue, opacity = (float(part) for part in solid.meshColor)
-    return Visual(solid.name, int(solid.parentJoint), solid.geometry, placement, (red, green, blue, opacity))

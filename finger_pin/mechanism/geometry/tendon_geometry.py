@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.bodies import place_bodies
 from finger_pin.mechanism.from_pinocchio import turned_model
 from finger_pin.mechanism.geometry.cord_pieces import LinkPoses, Piece, link_poses
-from finger_pin.mechanism.geometry.fingers import Visual, fingers_of_links, fingers_on_model, palm_box
+from finger_pin.mechanism.geometry.fingers import fingers_of_links, fingers_on_model
 from finger_pin.mechanism.geometry.tree_geometry import finger_of_tree
+from finger_pin.mechanism.geometry.visuals import body_visuals
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.urdf import build_rigid_body
 from finger_pin.typing import Array
 
 
@@ -67,16 +68,15 @@ class TendonGeometry:
             solids: Of that body.
         """
         self.description, self.first_seen = description, 0 if description.links else 1
-        fixed: tuple[Visual, ...] = ()
-        if not description.links:
-            body, tree = finger_of_tree(description, resolution)
-            self.model, fingers = body.model, [tree]
-        elif body is None:
-            fingers, fixed = fingers_of_links(description, resolution), palm_box(description.hand)
-            body = build_rigid_body(description)
-            self.model = body.model
+        if body is not None and description.links:
+            self.model, fingers, self.visuals = fingers_on_model(description, body, solids, resolution)
         else:
-            self.model, fingers, fixed = fingers_on_model(description, body, solids, resolution)
+            body, placed = place_bodies(description)
+            if description.links:
+                fingers = fingers_of_links(description, resolution)
+            else:
+                fingers = [finger_of_tree(description, resolution)]
+            self.model, self.visuals = body.model, body_visuals(description.bodies, placed)
         rotations = [np.eye(3)] * self.model.njoints if body.model is self.model else turned_model(body)[1]
         frames = [body.model.frames[tip] for tip in body.tips]
         self.tips = tuple((int(f.parentJoint), rotations[f.parentJoint].T @ f.placement.translation) for f in frames)
@@ -85,7 +85,6 @@ class TendonGeometry:
             pieces |= {**finger.legs, **finger.pieces}
         self.pieces = {name: pieces.pop(name) for name in description.tendons if name in pieces} | pieces
         self.pulleys = tuple(pulley for finger in fingers for pulley in finger.pulleys)
-        self.visuals = (*fixed, *(visual for finger in fingers for visual in finger.visuals))
         self.widths = tuple(width for finger in fingers for width in finger.widths)
         travel = 0.0
         if description.hand is not None:

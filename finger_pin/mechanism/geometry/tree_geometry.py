@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
-import coal
 import numpy as np
-import pinocchio as pin
 
 from finger_pin.description.cords import Cord
 from finger_pin.description.finger_description import FingerDescription
-from finger_pin.description.meshes import Mesh
 from finger_pin.description.tree import LARGEST_RADIUS, Tree
-from finger_pin.description.tree_parts import TreeSolid
 from finger_pin.mechanism.from_pinocchio import turned_model
 from finger_pin.mechanism.geometry.cord_pieces import Leg, link_poses
-from finger_pin.mechanism.geometry.fingers import Visual, WoundFinger, winding_surfaces
+from finger_pin.mechanism.geometry.fingers import WoundFinger, winding_surfaces
 from finger_pin.mechanism.geometry.lateral_offsets import joint_axes, tendon_lanes
 from finger_pin.mechanism.geometry.wound_tendon import joint_chains, wind
 from finger_pin.mechanism.path_elements import PathTerm
-from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.shapes import MATERIALS
-from finger_pin.mechanism.tendon_paths import Placed, TendonPaths, rotation
+from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tree_mechanism import build_body
 
 # Of the extent of a tree: distance between neighbouring tendons, and width of a link.
 _SPACING, _WIDTH = 0.012, 0.06
 
 
-def finger_of_tree(description: FingerDescription, resolution: int) -> tuple[RigidBody, WoundFinger]:
-    """Return the body of a tree, and on it its solids and cords.
+def finger_of_tree(description: FingerDescription, resolution: int) -> WoundFinger:
+    """Return the cords of a tree.
 
     A cord that is a sum of joint positions winds around its hinges at radii of its coefficients. A sum over a slide, or
     with a coefficient that is no radius, is a transmission: it lies nowhere in space and is not drawn. Branches behind
@@ -63,10 +57,9 @@ def finger_of_tree(description: FingerDescription, resolution: int) -> tuple[Rig
         places += [piece.place(*taut, still, np.zeros(3)) for piece in pieces[name]]
     axes = joint_axes(model)
     along = np.where(axes.any(axis=1), np.abs(axes @ np.array(description.gravity)), np.inf)
-    return body, WoundFinger(
+    return WoundFinger(
         pieces,
         tuple(replace(pulley, frame=turns[pulley.joint]) for pulley in winding_surfaces(arms, lanes)),
-        _solids(description.tree, routes.placed),
         replace(lanes, spacing=_SPACING * extent, families=((1 + int(np.argmin(along)),),)),
         (_WIDTH * extent,),
         float(np.linalg.norm(np.concatenate(places), axis=1).max()) or reach,
@@ -111,50 +104,3 @@ def _branches(legs: Sequence[PathTerm]) -> list[list[PathTerm]]:
         else:
             branches.append([leg])
     return branches
-
-
-def _solids(tree: Tree, placed: Mapping[str | None, Placed]) -> tuple[Visual, ...]:
-    """Return the solids of a tree's bodies, which have their places on joints."""
-    meshes = {name: _surface(mesh) for name, mesh in tree.meshes.items()}
-    return tuple(
-        visual
-        for name, body in tree.bodies.items()
-        for key, solid in body.solids.items()
-        for visual in _visuals(
-            f"{name}_{key}", placed[name].joint, placed[name].frame, solid, meshes.get(solid.mesh or "")
-        )
-    )
-
-
-def _surface(mesh: Mesh) -> coal.BVHModelBase:
-    points, faces = mesh.unpacked()
-    bvh = coal.BVHModelOBBRSS()
-    bvh.beginModel(len(faces), len(points))
-    bvh.addVertices(points)
-    bvh.addTriangles(faces.astype(np.uint64))
-    bvh.endModel()
-    return bvh
-
-
-def _visuals(
-    name: str, joint: int, frame: pin.SE3, solid: TreeSolid, surface: coal.BVHModelBase | None
-) -> list[Visual]:
-    """Return a solid as boxes, cylinders, spheres, an ellipsoid, or its surface, if it is a mesh."""
-    place = frame * pin.SE3(rotation(solid.orientation), np.array(solid.position))
-    colour = MATERIALS["shell"]
-    if surface is not None:
-        return [Visual(name, joint, surface, place, colour, framed=True)]
-    if solid.kind == "box":
-        return [Visual(name, joint, coal.Box(*solid.sides), place, colour, framed=True)]
-    if solid.kind == "ellipsoid":
-        return [Visual(name, joint, coal.Ellipsoid(*solid.semi_axes), place, colour, framed=True)]
-    if solid.kind == "sphere":
-        return [Visual(name, joint, coal.Sphere(solid.radius), place, colour, framed=True)]
-    barrel = Visual(name, joint, coal.Cylinder(solid.radius, solid.length), place, colour, framed=True)
-    if solid.kind == "cylinder":
-        return [barrel]
-    ends = (place * pin.SE3(np.eye(3), np.array([0.0, 0.0, sign * solid.length / 2.0])) for sign in (-1.0, 1.0))
-    balls = [
-        Visual(f"{name}_{k}", joint, coal.Sphere(solid.radius), end, colour, framed=True) for k, end in enumerate(ends)
-    ]
-    return [barrel, *balls]

@@ -18,7 +18,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, Visual, joint_axes
 from finger_pin.typing import Array
 from finger_pin.views.viewer.force_set import ForceSet
-from finger_pin.views.viewer.meshcat_solids import ROOT, encode, is_mesh, link_names, root_command, solid_commands
+from finger_pin.views.viewer.meshcat_solids import ROOT, encode, link_names, root_command, solid_commands
 
 #: Below this tension a tendon is drawn loose, wholly at none, N.
 SLACK_TENSION = 0.05
@@ -165,8 +165,7 @@ class Scene:
         poses = geometry.poses(joint_positions, palm)
         paths = geometry.paths(joint_positions, poses=poses)
         visible = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
-        framed = [visual for visual in geometry.visuals if visual.framed or is_mesh(visual.shape)]
-        visible += [*(_box_corners(visual, poses) for visual in framed), *extra_points]
+        visible += [*(_box_corners(visual, poses) for visual in geometry.visuals), *extra_points]
         corners: Array = np.concatenate([points.reshape(-1, 3) for points in visible]) @ rotation.T
         if not self._slides:
             return corners
