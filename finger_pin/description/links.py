@@ -51,10 +51,8 @@ def tree_of_links(joints: Mapping[str, Joint], tendons: Mapping[str, Tendon]) ->
     links: dict[str, Link] = {}
     for name, joint in joints.items():
         if joint.link is None:
-            raise InputError(
-                f"finger.joints.{name}.link",
-                "is missing; the viewer shows a model of your own with finger=, all else needs sizes",
-            )
+            allowed = "is missing; the viewer shows a model of your own with finger=, all else needs sizes"
+            raise InputError(f"finger.joints.{name}.link", allowed)
         if name in (TIP, f"{TIP}_fixed", "universe"):
             raise InputError(f"finger.joints.{name}", f"a joint cannot be called {TIP}, {TIP}_fixed or universe")
         links[name] = joint.link
