@@ -142,26 +142,7 @@ OF_FINGER = (
         lambda _, piece: piece.kind in ("cylinder", "sphere"),
         'is for kind = "cylinder" or "sphere"',
     ),
-    Rule("tree.bodies.*.solids.*", ("sides",), lambda _, solid: solid.kind == "box", 'is for kind = "box"'),
-    Rule(
-        "tree.bodies.*.solids.*",
-        ("semi_axes",),
-        lambda _, solid: solid.kind == "ellipsoid",
-        'is for kind = "ellipsoid"',
-    ),
     Rule("tree.bodies.*.solids.*", ("mesh",), lambda _, solid: solid.kind == "mesh", 'is for kind = "mesh"'),
-    Rule(
-        "tree.bodies.*.solids.*",
-        ("radius",),
-        lambda _, solid: solid.kind not in ("box", "mesh", "ellipsoid"),
-        'is for kind = "sphere", "capsule" or "cylinder"',
-    ),
-    Rule(
-        "tree.bodies.*.solids.*",
-        ("length",),
-        lambda _, solid: solid.kind in ("capsule", "cylinder"),
-        'is for kind = "capsule" or "cylinder"',
-    ),
 )
 #: Of a hand.
 OF_HAND = (Rule("", ("fingers_touch",), lambda hand, _: len(hand.fingers) > 1, "has no effect with a single finger"),)

@@ -10,8 +10,9 @@ import numpy as np
 from pydantic import AfterValidator, Field, field_serializer, field_validator, model_validator
 
 from finger_pin.description.placement import PathSignal
+from finger_pin.description.primitives import KINDS, MILLIMETRES
 from finger_pin.description.signals import ForceSignal, check_axes
-from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
+from finger_pin.description.surface import Shaped
 from finger_pin.description.tables import dump_set_fields
 from finger_pin.description.validation import Description, FullName, Name, choice, problem, quantity, real, vector
 from finger_pin.typing import Array
@@ -91,7 +92,7 @@ class Object(ObjectState, Shaped):
     @classmethod
     def _no_mesh(cls, value: object) -> object:
         if value == "mesh":
-            raise problem("", f"meshes are not supported; put the body together of {', '.join(SIZES)}", value)
+            raise problem("", f"meshes are not supported; put the body together of {', '.join(KINDS)}", value)
         return value
 
     @field_validator("inertia")
@@ -146,25 +147,9 @@ class Object(ObjectState, Shaped):
     @property
     def even_moments(self) -> tuple[float, float, float]:
         """Moments of inertia of a solid of even density about x, y and z of its frame, kg m2; zero for a fixed one."""
-        mass = self.mass
-        if mass is None:
-            return 0.0, 0.0, 0.0
-        if self.sides is not None:
-            x, y, z = (side * side for side in self.sides)
-            return mass * (y + z) / 12.0, mass * (z + x) / 12.0, mass * (x + y) / 12.0
-        if self.semi_axes is not None:
-            x, y, z = (mass * axis * axis / 5.0 for axis in self.semi_axes)
-            return y + z, z + x, x + y
-        radius, length = self.radius or 0.0, self.length or 0.0
-        if self.shape == "cylinder":
-            across = mass * (3.0 * radius**2 + length**2) / 12.0
-            return across, across, mass * radius**2 / 2.0
-        # A capsule: a cylinder, and two halves of a ball whose centres of mass are 3/8 of the radius from its ends.
-        ball = mass * 4.0 * radius / (4.0 * radius + 3.0 * length)
-        middle = mass - ball
-        across = middle * (3.0 * radius**2 + length**2) / 12.0
-        across += ball * (0.4 * radius**2 + length**2 / 4.0 + 3.0 * length * radius / 8.0)
-        return across, across, middle * radius**2 / 2.0 + ball * 0.4 * radius**2
+        x, y, z = KINDS[self.shape].moments(self.sizes)
+        mass = self.mass or 0.0
+        return mass * x, mass * y, mass * z
 
 
 class EnvironmentSettings(Description):

@@ -6,18 +6,8 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from finger_pin.description.primitives import KINDS, MILLIMETRES, Sized
 from finger_pin.description.validation import Description, choice, direction, problem, quantity, real, vector
-
-#: The sizes of each shape. Solids are about their origin, cylinder and capsule along z; a half-space is z < 0.
-SIZES: dict[str, tuple[str, ...]] = {
-    "half_space": (),
-    "sphere": ("radius",),
-    "box": ("sides",),
-    "cylinder": ("radius", "length"),
-    "capsule": ("radius", "length"),
-    "ellipsoid": ("semi_axes",),
-}
-MILLIMETRES = " m (is it in millimetres?)"
 
 
 class Surface(Description):
@@ -70,43 +60,13 @@ class Surface(Description):
         return self
 
 
-class Shaped(Description):
+class Shaped(Sized):
     """A convex solid, or a half-space, with a surface."""
 
-    shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*SIZES)] = (
-        quantity(..., unit="1", source="design", doc="One of half_space, sphere, box, cylinder, capsule, ellipsoid.")
-    )
-    radius: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
-        None, unit="m", source="design", doc="Of a sphere, cylinder or capsule."
-    )
-    length: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
-        None, unit="m", source="design", doc="Of a cylinder; of a capsule without its round ends; along z."
-    )
-    sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
-        None, unit="m", source="design", doc="Of a box, along x, y and z."
-    )
-    semi_axes: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
-        None, unit="m", source="design", doc="Of an ellipsoid, along x, y and z."
+    shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*KINDS)] = (
+        quantity(..., unit="1", source="design", doc=f"One of {', '.join(KINDS)}.")
     )
     surface: Surface | None = Field(None, description="Its contact; by default that of the other surface.")
-
-    @model_validator(mode="after")
-    def _sized(self) -> Self:
-        for entry in ("radius", "length", "sides", "semi_axes"):
-            size, needed = getattr(self, entry), entry in SIZES[self.shape]
-            if size is None and needed:
-                raise problem(entry, f'is missing: shape = "{self.shape}" needs {", ".join(SIZES[self.shape])}')
-            if size is not None and not needed:
-                shapes = ", ".join(each for each, entries in SIZES.items() if entry in entries)
-                raise problem(entry, f'is for {shapes}, not for shape = "{self.shape}"', size)
-        return self
-
-    @property
-    def sizes(self) -> tuple[float, ...]:
-        """Sizes of the shape in the order of `SIZES`, m."""
-        if self.sides or self.semi_axes:
-            return self.sides or self.semi_axes or ()
-        return tuple(getattr(self, name) for name in SIZES[self.shape])
 
 
 class BodyShape(Shaped):
@@ -118,7 +78,7 @@ class BodyShape(Shaped):
 
     continues: ClassVar[bool] = False
 
-    shape: Annotated[Literal["sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*SIZES)] = quantity(
+    shape: Annotated[Literal["sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*KINDS)] = quantity(
         ..., unit="1", source="design", doc="One of sphere, box, cylinder, capsule, ellipsoid."
     )
     position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(

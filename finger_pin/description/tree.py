@@ -19,6 +19,7 @@ from finger_pin.description.cords import Cord, CordElement, CordPart
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.objects import Object
 from finger_pin.description.placement import PathSignal
+from finger_pin.description.primitives import KINDS
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeJoint, TreeSolid, TreeTendon
@@ -199,11 +200,9 @@ class Tree(Description):
 
     def _axis_ends(self, solid: TreeSolid | BodyShape) -> Array:
         """Return the ends of the axes of a solid, or the corners of a mesh, shape (k, 3), m, in its frame."""
-        mesh = getattr(solid, "mesh", None)
-        if mesh is not None:
-            return self.meshes[mesh].unpacked()[0]
-        half = np.array(solid.sides or (0.0, 0.0, 0.0)) / 2.0 + np.array(solid.semi_axes or (0.0, 0.0, 0.0))
-        half[2] += (solid.length or 0.0) / 2.0
+        if isinstance(solid, TreeSolid) and solid.mesh is not None:
+            return self.meshes[solid.mesh].unpacked()[0]
+        half = KINDS[solid.primitive].half_axis(solid.sizes)
         return np.concatenate([np.diag(half), -np.diag(half)])
 
     def _legs(self, path: Mapping[str, Waypoint]) -> list[tuple[float, list[CordElement]]]:

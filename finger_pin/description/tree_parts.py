@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.objects import ObjectState, check_moments
 from finger_pin.description.placement import PathSignal
+from finger_pin.description.primitives import Sized
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.validation import (
     MOST_ANGLE,
@@ -39,26 +40,16 @@ MOST_POWER = 7
 Pair = tuple[float, float]
 
 
-class TreeSolid(Description):
+class TreeSolid(Sized):
     """A solid of a body, for pictures."""
+
+    kind_entry: ClassVar[str] = "kind"
 
     kind: Annotated[
         Literal["sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh"],
         choice("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh"),
     ] = quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder, box, ellipsoid or mesh.")
     mesh: Name | None = Field(None, description="Of a mesh, which one of the tree's.")
-    radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
-        0.0, unit="m", source="design", doc="Of a sphere, a capsule and a cylinder."
-    )
-    length: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
-        0.0, unit="m", source="design", doc="Of a cylinder, or of a capsule without its round ends, along z."
-    )
-    sides: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
-        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box, along x, y and z."
-    )
-    semi_axes: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
-        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of an ellipsoid, along x, y and z."
-    )
     position: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, or a mesh's origin, in the body's frame."
     )
@@ -72,6 +63,12 @@ class TreeSolid(Description):
     def material(self) -> str:
         """Key of `MATERIALS`."""
         return self._material
+
+    @field_validator("radius", "length", "sides", "semi_axes", mode="before")
+    @classmethod
+    def _given(cls, value: object) -> object:
+        # Results of earlier versions have zeros where a solid has no such size.
+        return None if value in (0.0, [0.0] * 3, (0.0,) * 3) else value
 
     @model_validator(mode="after")
     def _which(self) -> Self:

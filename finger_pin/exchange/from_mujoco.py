@@ -15,6 +15,7 @@ import numpy as np
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.meshes import Mesh
+from finger_pin.description.primitives import KINDS
 from finger_pin.description.tree_parts import Tip
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError, LeftOutWarning
@@ -26,6 +27,7 @@ from finger_pin.exchange.mujoco_keyframes import read_keyframes
 from finger_pin.exchange.mujoco_names import Names, Table, entry_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
+from finger_pin.exchange.mujoco_sizes import described_sizes, geom_kind
 from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies
 from finger_pin.exchange.mujoco_unsupported import ElementReader, LeftOutElements, apply_flags, within_margin
 from finger_pin.mechanism.body_places import rotation
@@ -207,23 +209,15 @@ class _Reader:
 
     def _solids(self, body: int) -> Table:
         """Return the visible geoms of a body, or all if none is; meshes of moving bodies only."""
-        model, kinds, solids = self.model, self.mujoco.mjtGeom, {}
+        model, solids = self.model, {}
         geoms = np.flatnonzero(model.geom_bodyid == body)
         visible = geoms[model.geom_group[geoms] < _FIRST_HIDDEN_GROUP]
         for i in visible if len(visible) else geoms:
-            kind, size = model.geom_type[i], model.geom_size[i]
+            kind = geom_kind(self.mujoco, model, int(i))
             pose = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
-            radius, length = float(size[0]), 2.0 * float(size[1])
-            if kind == kinds.mjGEOM_SPHERE:
-                solids[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **pose}
-            elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
-                name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
-                solids[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **pose}
-            elif kind == kinds.mjGEOM_ELLIPSOID:
-                solids[self.names.geoms[i]] = {"kind": "ellipsoid", "semi_axes": size.tolist(), **pose}
-            elif kind == kinds.mjGEOM_BOX:
-                solids[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **pose}
-            elif kind == kinds.mjGEOM_MESH and model.body_weldid[body]:
+            if kind in KINDS:
+                solids[self.names.geoms[i]] = {"kind": kind, **described_sizes(kind, model.geom_size[i]), **pose}
+            elif kind == "mesh" and model.body_weldid[body]:
                 # A forearm that stands still would be in the way.
                 name = self.names.meshes[model.geom_dataid[i]]
                 solids[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **pose}

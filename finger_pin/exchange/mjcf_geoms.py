@@ -11,6 +11,7 @@ from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import MATERIALS, Body
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_compliance import Mobility, impact_ratio, quaternion, soft
+from finger_pin.exchange.mujoco_sizes import mujoco_sizes
 from finger_pin.mechanism.contact_rows import law_numbers
 from finger_pin.mechanism.solids import pairs_apart
 from finger_pin.mechanism.xml_numbers import numbers
@@ -43,8 +44,7 @@ def add_body_geoms(element: ET.Element, body: Body) -> None:
             mesh_attributes = {"name": key, "type": "mesh", "mesh": str(solid.mesh), "mass": "0"}
             ET.SubElement(element, "geom", mesh_attributes | pose | drawn)
         elif key not in body.shapes:
-            sizes = {"box": solid.sides, "ellipsoid": solid.semi_axes}.get(solid.kind, (solid.radius, solid.length))
-            add_geom(element, key, solid.kind, sizes, solid.position, solid.orientation, drawn)
+            add_geom(element, key, solid.kind, solid.sizes, solid.position, solid.orientation, drawn)
     for key, shape in body.shapes.items():
         contact = _CONTACT | _friction(shape.surface) | ({} if key in body.solids else {"group": HIDDEN})
         add_geom(element, key, shape.shape, shape.sizes, shape.position, shape.orientation, contact)
@@ -60,10 +60,7 @@ def add_geom(
     attributes: Mapping[str, str],
 ) -> None:
     """Add a geom of a kind of this package, with its sizes, m, and its place in a body."""
-    size = [0.5 * each for each in sizes] if kind == "box" else [*sizes[:1], *(0.5 * each for each in sizes[1:])]
-    if kind == "ellipsoid":
-        size = [*sizes]
-    shape = {"type": kind, "size": numbers(*size)}
+    shape = {"type": kind, "size": numbers(*mujoco_sizes(kind, sizes))}
     if kind == "half_space":
         shape = {"type": "plane", "size": "1 1 0.1"}
     pose = {"pos": numbers(*position), "quat": quaternion(orientation)}

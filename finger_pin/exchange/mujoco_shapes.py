@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.objects import Object
+from finger_pin.description.primitives import KINDS
 from finger_pin.exchange.mujoco_names import Table, model_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_pairs import Pairs
+from finger_pin.exchange.mujoco_sizes import described_sizes, geom_kind
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.mechanism.body_places import rotation
 from finger_pin.mechanism.contact_rows import DEEPEST_START
@@ -25,18 +27,10 @@ class Shapes:
         mujoco, model = reader.mujoco, reader.model
         self.mujoco, self.model, self.names, self.left_out = mujoco, model, reader.names, reader.left_out
         self._moves = reader.moves[model.geom_bodyid]
-        kinds = mujoco.mjtGeom
-        self._kinds = {
-            int(kinds.mjGEOM_SPHERE): "sphere",
-            int(kinds.mjGEOM_CAPSULE): "capsule",
-            int(kinds.mjGEOM_CYLINDER): "cylinder",
-            int(kinds.mjGEOM_BOX): "box",
-            int(kinds.mjGEOM_ELLIPSOID): "ellipsoid",
-        }
         contacts_enabled = "contact" not in disabled(mujoco, model)
         self._colliding = reader.colliding
         for i in self._colliding:
-            kind = kinds(int(model.geom_type[i])).name.removeprefix("mjGEOM_").lower()
+            kind = geom_kind(mujoco, model, i)
             if not self._is_solid(i) and not self._is_plane(i):
                 moves = bool(self._moves[i])
                 article = "an" if kind[0] in "aeiou" else "a"
@@ -54,7 +48,7 @@ class Shapes:
         return model_name(self.model, "geom", i)
 
     def _is_solid(self, i: int) -> bool:
-        return int(self.model.geom_type[i]) in self._kinds
+        return geom_kind(self.mujoco, self.model, i) in KINDS
 
     def _is_plane(self, i: int) -> bool:
         model = self.model
@@ -88,16 +82,10 @@ class Shapes:
     def _shape(self, i: int) -> Table:
         """Return shape, sizes and surface of a geom."""
         model = self.model
-        shape, size = self._kinds.get(int(model.geom_type[i]), "half_space"), model.geom_size[i]
-        sizes: Table = {} if shape == "half_space" else {"radius": float(size[0])}
-        if shape == "box":
-            sizes = {"sides": (2.0 * size).tolist()}
-        elif shape == "ellipsoid":
-            sizes = {"semi_axes": size.tolist()}
-        elif shape in ("capsule", "cylinder"):
-            sizes["length"] = 2.0 * float(size[1])
+        kind, size = geom_kind(self.mujoco, model, i), model.geom_size[i]
+        shape = "half_space" if kind == "plane" else kind
         default_surface = {"friction": float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0}
-        return {"shape": shape, **sizes, "surface": self._surfaces.get(i, default_surface)}
+        return {"shape": shape, **described_sizes(shape, size), "surface": self._surfaces.get(i, default_surface)}
 
     def fixed_bodies(self) -> set[int]:
         """Return the bodies that stand still, have something to touch, and are not the world."""

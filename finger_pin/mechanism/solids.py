@@ -12,6 +12,7 @@ from finger_pin.description.caching import memoised
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.objects import Object, inertia_matrix
 from finger_pin.description.placement import Palm
+from finger_pin.description.primitives import KINDS
 from finger_pin.description.surface import Surface
 from finger_pin.description.tree import Tree
 from finger_pin.exceptions import InputError
@@ -42,8 +43,8 @@ class Solid:
         group: Solids of one group never touch, such as the links of a finger.
         joint: Index of the joint of the Pinocchio model that carries it, 0 for the base.
         place: Of its shape in the frame of that joint.
-        shape: ``half_space``, ``sphere``, ``box``, ``cylinder``, ``capsule`` or ``ellipsoid``.
-        sizes: As `prism_parameters` takes them, m; of an ellipsoid its semi-axes.
+        shape: A key of `KINDS`.
+        sizes: Of that kind, m.
         home: Centre of a ball, base frame, shape (3,), m, that it never leaves.
         range: Radius of that ball, m; infinite for what is free.
         joined: Whether it is a capsule whose near end lies in another one, which stands for it on a plane.
@@ -66,14 +67,7 @@ class Solid:
     @property
     def reach(self) -> float:
         """Largest distance of a point from the origin of its shape, m; infinite for a half-space."""
-        if self.shape == "half_space":
-            return np.inf
-        if self.shape == "box":
-            return 0.5 * float(np.linalg.norm(self.sizes))
-        if self.shape == "ellipsoid":
-            return max(self.sizes)
-        radius, length = (*self.sizes, 0.0)[:2]
-        return float(np.hypot(radius, 0.5 * length)) if self.shape == "cylinder" else radius + 0.5 * length
+        return KINDS[self.shape].reach(self.sizes)
 
     def never_meets(self, other: Solid) -> bool:
         """Return whether no motion can bring the solid to another one."""

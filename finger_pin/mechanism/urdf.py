@@ -211,15 +211,8 @@ def add_inertial(link: ET.Element, place: pin.SE3, mass: float, inertia: Sequenc
 
 
 def _geometries(solid: TreeSolid | BodyShape) -> Iterator[_Geometry]:
-    """Yield the geometry of a solid; a capsule is a cylinder and two spheres."""
+    """Yield the geometries of a solid that a URDF has; a capsule is a cylinder and two spheres."""
     place = pin.SE3(rotation(solid.orientation), np.array(solid.position))
-    kind = solid.kind if isinstance(solid, TreeSolid) else solid.shape
-    radius, length = float(solid.radius or 0.0), float(solid.length or 0.0)
-    if kind == "box":
-        yield "box", solid.sides or (0.0,) * 3, place
-    elif kind == "sphere":
-        yield "sphere", (radius,), place
-    elif kind in ("cylinder", "capsule"):
-        yield "cylinder", (radius, length), place
-    for end in (-0.5, 0.5) if kind == "capsule" else ():
-        yield "sphere", (radius,), place * pin.SE3(np.eye(3), np.array([0.0, 0.0, end * length]))
+    for part in solid.parts:
+        if part.kind in _SIZES:
+            yield part.kind, part.sizes, place * pin.SE3(np.eye(3), np.array([0.0, 0.0, part.height]))

@@ -16,6 +16,8 @@ from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import MATERIALS, TreeSolid
 from finger_pin.mechanism.body_places import Placed, rotation
 
+_COAL = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder, "ellipsoid": coal.Ellipsoid}
+
 
 @dataclass(frozen=True)
 class Visual:
@@ -68,22 +70,19 @@ def _visuals(
     name: str, joint: int, frame: pin.SE3, solid: TreeSolid, surface: coal.BVHModelBase | None
 ) -> list[Visual]:
     """Return a solid as boxes, cylinders, spheres, an ellipsoid, or its surface, if it is a mesh."""
-    place = frame * pin.SE3(rotation(solid.orientation), np.array(solid.position))
-    colour = MATERIALS[solid.material]
+    place, colour = frame * pin.SE3(rotation(solid.orientation), np.array(solid.position)), MATERIALS[solid.material]
     if surface is not None:
         return [Visual(name, joint, surface, place, colour)]
-    if solid.kind == "box":
-        return [Visual(name, joint, coal.Box(*solid.sides), place, colour)]
-    if solid.kind == "ellipsoid":
-        return [Visual(name, joint, coal.Ellipsoid(*solid.semi_axes), place, colour)]
-    if solid.kind == "sphere":
-        return [Visual(name, joint, coal.Sphere(solid.radius), place, colour)]
-    barrel = Visual(name, joint, coal.Cylinder(solid.radius, solid.length), place, colour)
-    if solid.kind == "cylinder":
-        return [barrel]
-    ends = (place * pin.SE3(np.eye(3), np.array([0.0, 0.0, sign * solid.length / 2.0])) for sign in (-1.0, 1.0))
-    balls = [Visual(f"{name}_{k}", joint, coal.Sphere(solid.radius), end, colour) for k, end in enumerate(ends)]
-    return [barrel, *balls]
+    return [
+        Visual(
+            f"{name}_{k}" if k else name,
+            joint,
+            _COAL[part.kind](*part.sizes),
+            place * pin.SE3(np.eye(3), np.array([0.0, 0.0, part.height])),
+            colour,
+        )
+        for k, part in enumerate(solid.parts)
+    ]
 
 
 def model_visual(solid: pin.GeometryObject, placement: pin.SE3) -> Visual:

@@ -64,18 +64,28 @@ def root_command(rotation: Array) -> Command:
 
 def primitive(name: str, shape: Any) -> tuple[Command, Array]:
     """Return meshcat's geometry for one of Pinocchio, and the rotation between them; of an ellipsoid a stretch, too."""
-    kind = type(shape).__name__
-    if kind == "Cylinder":
-        return cylinder(shape.radius, 2.0 * shape.halfLength), Y_TO_Z
-    if kind == "Sphere":
-        return ball(shape.radius), np.eye(3)
-    if kind == "Ellipsoid":
-        return ball(1.0), np.diag(shape.radii)
+    kind = type(shape).__name__.lower()
     if is_mesh(shape):
         return _mesh_geometry(shape), np.eye(3)
-    if kind == "Box":
-        return box(*(2.0 * float(half) for half in shape.halfSide)), np.eye(3)
+    if kind == "cylinder":
+        return drawn(kind, (shape.radius, 2.0 * shape.halfLength))
+    if kind == "sphere":
+        return drawn(kind, (shape.radius,))
+    if kind == "ellipsoid":
+        return drawn(kind, shape.radii)
+    if kind == "box":
+        return drawn(kind, 2.0 * np.asarray(shape.halfSide))
     raise InputError(f"visual {name}", "must be a box, a cylinder, a sphere, an ellipsoid or a mesh", kind)
+
+
+def drawn(kind: str, sizes: ArrayLike) -> tuple[Command, Array]:
+    """Return meshcat's geometry for a part of a primitive, and the rotation between them, or the stretch."""
+    numbers = np.asarray(sizes, dtype=float).tolist()
+    if kind == "cylinder":
+        return cylinder(*numbers), Y_TO_Z
+    if kind == "ellipsoid":
+        return ball(1.0), np.diag(numbers)
+    return (ball if kind == "sphere" else box)(*numbers), np.eye(3)
 
 
 def is_mesh(shape: Any) -> bool:

@@ -12,17 +12,16 @@ import pinocchio as pin
 import xarray as xr
 
 from finger_pin.description.objects import Object
+from finger_pin.description.primitives import KINDS
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
 from finger_pin.views.viewer.meshcat_solids import (
     ROOT,
     SOLID_OPACITY,
-    Y_TO_Z,
     Command,
-    ball,
     box,
-    cylinder,
+    drawn,
     encode,
     mesh,
     newton_length,
@@ -174,7 +173,7 @@ class SceneObjects:
     def parts(self, name: str) -> Iterator[tuple[Command, Array, Array, tuple[float, float, float]]]:
         """Yield the solids of an object: meshcat's geometry, its rotation or stretch, its place there, its colour."""
         scene_object = self.by_name[name]
-        sizes, colour = scene_object.sizes, _FIXED_COLOUR if scene_object.mass is None else _FREE_COLOUR
+        colour = _FIXED_COLOUR if scene_object.mass is None else _FREE_COLOUR
         rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
         position = np.array(scene_object.position)
         if scene_object.shape == "half_space":
@@ -182,28 +181,14 @@ class SceneObjects:
             side, thickness = 2.0 * _PLATE_RADIUS * self.size, _PLATE_THICKNESS * self.size
             centre = rotation.T @ (self.middle - position) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thickness]
             parts = [(box(side, side, thickness), np.eye(3), centre)]
-        elif scene_object.shape == "box":
-            parts = [(box(*sizes), np.eye(3), np.zeros(3))]
-        elif scene_object.shape == "ellipsoid":
-            parts = [(ball(1.0), np.diag(sizes), np.zeros(3))]
-        elif scene_object.shape == "sphere":
-            parts = [(ball(sizes[0]), np.eye(3), np.zeros(3))]
         else:
-            parts = [(cylinder(*sizes), Y_TO_Z, np.zeros(3))]
-            if scene_object.shape == "capsule":
-                ends = np.array([0.0, 0.0, 0.5 * sizes[1]])
-                parts += [(ball(sizes[0]), np.eye(3), end) for end in (-ends, ends)]
+            parts = [(*drawn(part.kind, part.sizes), np.array([0.0, 0.0, part.height])) for part in scene_object.parts]
         yield from ((*part, colour) for part in parts)
 
 
 def _box_corners(scene_object: Object) -> Array:
     """Return the corners of the box around a fixed object, shape (8, 3), m."""
-    radius = scene_object.radius or 0.0
-    round_ends = 0.0 if scene_object.shape == "cylinder" else 2.0 * radius
-    sides = (
-        tuple(2.0 * axis for axis in scene_object.semi_axes or ())
-        or scene_object.sides
-        or (2.0 * radius, 2.0 * radius, (scene_object.length or 0.0) + round_ends)
-    )
+    half_sides = KINDS[scene_object.shape].half_sides(scene_object.sizes)
     rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
-    return np.asarray(0.5 * np.array(list(product((-1.0, 1.0), repeat=3))) * sides @ rotation.T + scene_object.position)
+    corners = np.array(list(product((-1.0, 1.0), repeat=3))) * half_sides
+    return np.asarray(corners @ rotation.T + scene_object.position)
