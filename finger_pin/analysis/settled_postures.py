@@ -50,14 +50,14 @@ def settled_posture(
     size = np.append(np.ones(joints), np.full(len(state.passive_position), _PASSIVE_POSITION_SCALE))
 
     def at_rest(y: Array) -> tuple[Array, Evaluation]:
-        """Return the packed state at rest in a posture, and its evaluation with the friction that sliding has left."""
-        x = finger.rest_state((size * y)[:joints])
-        layout.unpack(x).passive_position[:] = (size * y)[joints:]
+        """Return the packed states at rest in postures, (..., k), and their evaluation with what sliding has left."""
+        x = np.apply_along_axis(finger.rest_state, -1, (size * y)[..., :joints])
+        layout.unpack(x).passive_position[:] = (size * y)[..., joints:]
         return x, finger.mechanism.evaluate(x, command, force, sliding=sliding)
 
     def acceleration(y: Array) -> Array:
         rates = layout.unpack(at_rest(y)[1].rate)
-        return np.asarray(np.append(rates.velocity, rates.passive_velocity) / size)
+        return np.asarray(np.concatenate([rates.velocity, rates.passive_velocity], axis=-1) / size)
 
     y = np.append(state.position, state.passive_position) / size
     root = _newton(acceleration, y)
@@ -82,12 +82,13 @@ def settled_posture(
 def _newton(acceleration: Callable[[Array], Array], start: Array) -> Array | None:
     """Return the stable zero of accelerations near a start, by Newton's method; None if it fails."""
     y, slopes, previous_length = start, np.zeros((0, 0)), 0.0
+    shifts = _ANGLE_DIFFERENCE * np.eye(len(y))
     for _ in range(_MAX_STEPS):
-        value = acceleration(y)
-        if not previous_length:
-            shifts = _ANGLE_DIFFERENCE * np.eye(len(y))
-            differences = [acceleration(y + e) - acceleration(y - e) for e in shifts]
-            slopes = np.transpose(differences) / (2.0 * _ANGLE_DIFFERENCE)
+        if previous_length:
+            value = acceleration(y)
+        else:
+            value, *beside = acceleration(y + np.concatenate([np.zeros((1, len(y))), shifts, -shifts]))
+            slopes = np.subtract(*np.split(np.array(beside), 2)).T / (2.0 * _ANGLE_DIFFERENCE)
         try:
             step = -np.linalg.solve(slopes, value)
         except np.linalg.LinAlgError:

@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.analysis.printing import BriefRepr
+from finger_pin.description.caching import memoised
+from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.loading import describe
 from finger_pin.laws.gearbox import loss_share, stribeck_share
 from finger_pin.mechanism.canals import is_canal
 from finger_pin.mechanism.coerce import FingerLike, as_finger
@@ -45,9 +48,9 @@ def steady_state(
         position: theta, shape (m, n), rad, for the curvature of the paths; zero by default.
         at_rest: Whether they rest after having slid so: bristles keep what they hold, viscous friction is gone.
     """
-    finger = as_finger(finger)
+    finger, pulled = _with_ideal_sources(finger) if isinstance(finger, Finger) else _from_description(describe(finger))
     actuators, v = finger.actuators, np.asarray(speed, dtype=float)[:, None]
-    actuated, pulled = finger.routing.actuated, _with_ideal_sources(finger)
+    actuated = finger.routing.actuated
     postures = np.zeros((len(v), len(finger.routing.joints))) if position is None else position
     x = np.tile(pulled.rest_state(np.zeros(postures.shape[1])), (len(v), 1))
     state = pulled.layout.unpack(x)
@@ -89,14 +92,20 @@ def rubbing_cords(finger: FingerLike) -> NDArray[np.bool_]:
     return np.concatenate(masks)
 
 
-def _with_ideal_sources(finger: Finger) -> Finger:
-    """Return a finger whose tendons are pulled by their inputs alone, whatever drives them."""
+@memoised(lambda description: (description,), most=4)
+def _from_description(description: FingerDescription) -> tuple[Finger, Finger]:
+    """Return a finger, and the same without drives; one for all calls with the same description."""
+    return _with_ideal_sources(Finger(description))
+
+
+def _with_ideal_sources(finger: Finger) -> tuple[Finger, Finger]:
+    """Return a finger, and the same whose tendons are pulled by their inputs alone, whatever drives them."""
     description = finger.description
     tendons = {name: each.updated(winch=None, maximum_tension=None) for name, each in description.tendons.items()}
     if not description.actuators and tendons == description.tendons:
-        return finger
+        return finger, finger
     objects = finger.constructor_args.objects
-    return finger.changed(description.updated(actuators={}, tendons=tendons), objects)
+    return finger, finger.changed(description.updated(actuators={}, tendons=tendons), objects)
 
 
 def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> Array:

@@ -23,6 +23,9 @@ def identify(
     profiles: Annotated[
         bool, typer.Option(help="Whether intervals follow the likelihood, or only its curvature, which is faster.")
     ] = True,
+    refits: Annotated[
+        bool, typer.Option(help="Whether refits without each recording or load judge bands, and open combinations.")
+    ] = True,
     output: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Where results go; default results/identify-<bench>.")
     ] = None,
@@ -55,6 +58,7 @@ def identify(
                 seed=seed,
                 loss="soft_l1" if robust else "linear",
                 profiles=profiles,
+                refits=refits,
                 restart=restart,
                 progress=progress,
                 stop=token,

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.stats import t as student
 
-from finger_pin.identification.estimate import Fit, fit, information
+from finger_pin.identification.estimate import GAIN_REFIT, Fit, fit, information
 from finger_pin.identification.intervals import LEAST_FREEDOM, NORMAL_95, inverse_within_bounds
 from finger_pin.identification.misfit import outliers
 from finger_pin.identification.problem import Problem
@@ -141,17 +141,41 @@ def refit_without(problem: Problem, minimum: Fit, settings: Mapping[str, Setting
     """
     ratios = outliers(problem, minimum.residuals)
     kept = [~out & (ratio == 0.0) for out, ratio in zip(settings[name], ratios, strict=True)]
-    slopes = [j[rows] for j, rows in zip(problem.slopes(minimum.z), kept, strict=True)]
+    all_slopes = problem.slopes(minimum.z)
+    slopes = [j[rows] for j, rows in zip(all_slopes, kept, strict=True)]
     if len(settings) > (_MAX_MOTION_REFITS if problem.has_motion else _MAX_READING_REFITS):
         z = _step(problem, minimum, kept, slopes)
+        if not problem.has_motion:
+            return replace(minimum, z=z, residuals=shifted_errors(minimum.residuals, all_slopes, z - minimum.z))
     else:
         subset = problem.subset(kept)
         # Of few independent samples no step would be worth its run, and the refit would stay where it starts.
         count = sum(w * np.count_nonzero(rows) for w, rows in zip(minimum.weights, kept, strict=True))
         weights = minimum.weights * max(1.0, _LEAST_COUNT / count)
-        z = fit(subset, minimum.z, weights=weights, loss=loss, slopes=slopes).z
+        z = fit(subset, minimum.z, weights=weights, loss=loss, slopes=slopes, least_gain=GAIN_REFIT).z
         problem.evaluations += subset.evaluations
     return fit(problem, z, fixed=dict(enumerate(z)), weights=minimum.weights)
+
+
+def shifted_errors(errors: Sequence[Array], slopes: Sequence[Array], shift: Array) -> list[Array]:
+    """Return the errors of every signal after a shift of z, shape (m,) each, to first order."""
+    return [e + j @ shift for e, j in zip(errors, slopes, strict=True)]
+
+
+def refitted_errors(problem: Problem, z: Array, errors: Sequence[Array], places: Sequence[Array]) -> list[list[Array]]:
+    """Return the errors of every signal at the places of refits, of many of readings to first order as their refits.
+
+    Args:
+        problem: Of the signals.
+        z: The estimate.
+        errors: At the estimate, of every signal, shape (m,) each.
+        places: z of every refit; one where a motion fails is left out.
+    """
+    if not problem.has_motion and len(places) > _MAX_READING_REFITS:
+        slopes = problem.error_slopes(z)
+        return [shifted_errors(errors, slopes, place - z) for place in places]
+    computed = [problem.errors(place) for place in places]
+    return [each for each in computed if all(np.isfinite(e).all() for e in each)]
 
 
 def _step(problem: Problem, minimum: Fit, kept: Setting, slopes: Sequence[Array]) -> Array:

@@ -19,6 +19,8 @@ _MAX_ROUNDS, _MAX_STEPS, _MAX_FAILURES = 5, 40, 3
 # Gain of minus twice the log-likelihood that is not worth a step. A gain g leaves parameters within sqrt(g) of their
 # standard deviation: one for means of motions, 0.2 for motions, 0.03 for those computed finely, none for closed forms.
 _GAIN_ROUGH, _GAIN, _GAIN_FINE, _GAIN_CLOSED = 1.0, 0.05, 1e-3, 1e-9
+#: The same of refits beside an estimate, whose rise or shift counts: 1e-7 leaves 3e-4 of a standard deviation.
+GAIN_REFIT = 1e-7
 # Difference of minus twice the log-likelihood that errors of runs hide: half the 0.1 by which fine ones make it jump.
 _LIKELIHOOD_JUMP = 0.05
 # Largest step, and the least that limits of parameters on each other cut it to, part of a parameter's range.
@@ -75,6 +77,7 @@ def fit(
     loss: str = "linear",
     slopes: Sequence[Array] | None = None,
     scale: Array | None = None,
+    least_gain: float = 0.0,
 ) -> Fit:
     """Return the minimum that is reached from a start.
 
@@ -86,6 +89,7 @@ def fit(
         loss: One of `LOSSES`, for outliers.
         slopes: Of the residuals near the start, to step with as long as they serve; by default those at the start.
         scale: Beyond which residuals are outliers, of the signals; by default their noise.
+        least_gain: Gain of minus twice the log-likelihood that is not worth a step, if more than that of estimates.
     """
     z, free = start.copy(), np.ones(len(start), dtype=bool)
     for k, value in (fixed or {}).items():
@@ -100,7 +104,9 @@ def fit(
     converged = True
     for k in range(_MAX_ROUNDS if free.any() else 0):
         previous = z
-        z, residuals, slopes, converged = _descend(problem, z, residuals, free, signal_weights, loss, slopes, scale)
+        z, residuals, slopes, converged = _descend(
+            problem, z, residuals, free, signal_weights, loss, slopes, scale, max(_least_gain(problem), least_gain)
+        )
         if weights is not None or not converged or (k > 0 and z is previous):
             break
         signal_weights = _independent(problem, residuals)[1]
@@ -143,6 +149,7 @@ def _descend(
     loss: str,
     slopes: Sequence[Array] | None,
     scale: Array | None,
+    least_gain: float,
 ) -> tuple[Array, Sequence[Array], Sequence[Array], bool]:
     """Return the point of greatest likelihood, its residuals, the slopes of the last step, and convergence.
 
@@ -152,7 +159,7 @@ def _descend(
     """
     slopes_are_current, radius, failed = slopes is None, _RADIUS, 0
     slopes = problem.slopes(z) if slopes is None else list(slopes)
-    least_gain, updates_slopes = _least_gain(problem), problem.has_motion and not problem.is_fine
+    updates_slopes = problem.has_motion and not problem.is_fine
     jump = max(least_gain, _LIKELIHOOD_JUMP) if problem.has_motion else least_gain
     count = float(sum(w * len(e) for w, e in zip(weights, residuals, strict=True)))
     slope_error_gain = max(_GAIN_ROUGH, 0.0 if problem.is_fine else _SLOPE_ERROR_GAIN * count)

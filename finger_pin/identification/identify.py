@@ -47,6 +47,7 @@ def identify(
     seed: int = 0,
     loss: str = "linear",
     profiles: bool = True,
+    refits: bool = True,
     restart: bool = False,
     progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
@@ -74,6 +75,9 @@ def identify(
             `scipy.optimize.least_squares`.
         profiles: Whether intervals follow the likelihood; without, they are those of its curvature at the estimate,
             which of long motions takes a part of the time.
+        refits: Whether to refit without each recording or load, which widens bands of predictions and names recordings
+            that disagree, and along combinations that the recordings leave open. Without, bands are those of the noise
+            and the covariance, and such combinations those by slopes; estimates and intervals stay.
         restart: Whether to forget what the folder holds of this.
         progress: Called with what is being done, how much of it is finished, and how much there is.
         stop: Asked now and then; when it returns true the best so far is returned, attribute ``unfinished``.
@@ -114,9 +118,11 @@ def identify(
     )
     with Checkpoint(None if output is None else Path(output), request, restart) as checkpoint:
         pipeline = FitPipeline(problem, checkpoint, loss, progress)
-        result = _run_pipeline(problem, settings, starting_points(problem, starts, seed), starts, pipeline, profiles)
+        result = _run_pipeline(
+            problem, settings, starting_points(problem, starts, seed), starts, pipeline, profiles, refits
+        )
         result.attrs["ringing"] = _ringing(problem, pipeline.best.z)
-        result.attrs["profiles"] = int(profiles)
+        result.attrs["profiles"], result.attrs["refits"] = int(profiles), int(refits)
         result.attrs["custom_finger"] = int(custom_finger is not None)
         result.update(predictions(result, scenario, held_out, recorded, custom_finger))
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
@@ -145,13 +151,15 @@ def _run_pipeline(
     starts: int,
     pipeline: FitPipeline,
     profiles: bool,
+    refits: bool,
 ) -> xr.Dataset:
     unfinished = ""
     try:
         pipeline.search(pipeline.screen_starts(points, starts))
         (pipeline.profile_all if profiles else pipeline.linearise)(pipeline.best)
-        pipeline.cross_validate()
-        pipeline.find_open_directions()
+        if refits:
+            pipeline.cross_validate()
+        pipeline.find_open_directions(refits)
         pipeline.compare(settings)
     except Stopped:
         unfinished = "interrupted: the best so far, and the intervals that are finished"

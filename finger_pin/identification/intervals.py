@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from finger_pin.identification.estimate import Fit, fit, information
+from finger_pin.identification.estimate import GAIN_REFIT, Fit, fit, information
 from finger_pin.identification.problem import Problem
 from finger_pin.typing import Array
 
@@ -197,7 +197,8 @@ def profile(
     for _ in range(_MAX_REFITS if room > 1e-9 * (high[k] - low[k]) else 0):
         value = minimum.z[k] + side * distance
         guess = np.clip(inner_fit.z + direction * (value - inner_fit.z[k]), low, high)
-        refit = partial(fit, problem, fixed={k: value}, weights=minimum.weights, scale=minimum.noise, loss=loss)
+        known = partial(fit, problem, weights=minimum.weights, scale=minimum.noise, loss=loss, least_gain=GAIN_REFIT)
+        refit = partial(known, fixed={k: value})
         refitted = refit(guess, slopes=slopes)
         if not refitted.converged and math.isfinite(refitted.objective):
             refitted = refit(refitted.z)

@@ -36,13 +36,14 @@ class OpenDirection:
     parameters: tuple[int, ...]
 
 
-def open_directions(problem: Problem, minimum: Fit, loss: str = "linear") -> list[OpenDirection]:
+def open_directions(problem: Problem, minimum: Fit, loss: str = "linear", refits: bool = True) -> list[OpenDirection]:
     """Return the combinations that the recordings leave open, each with a step along it that a refit has tried.
 
     Args:
         problem: The problem that was fitted.
         minimum: Of the problem.
         loss: As for `fit`.
+        refits: Whether a refit tries it.
     """
     low, high = problem.box
     width = high - low
@@ -54,11 +55,13 @@ def open_directions(problem: Problem, minimum: Fit, loss: str = "linear") -> lis
             # In parts of the ranges: what has little room is moved across it by little.
             size = np.abs(vector) / np.max(np.abs(vector))
             shown = [k for k in range(len(size)) if size[k] > _SMALL_ENTRY]
-            directions.append(_describe(problem, minimum, direction, shown, loss))
+            directions.append(_describe(problem, minimum, direction, shown, loss, refits))
     return directions
 
 
-def _describe(problem: Problem, minimum: Fit, direction: Array, shown: Sequence[int], loss: str) -> OpenDirection:
+def _describe(
+    problem: Problem, minimum: Fit, direction: Array, shown: Sequence[int], loss: str, refits: bool
+) -> OpenDirection:
     """Return a direction of z in words, after a try if there is no simpler form."""
     size = np.abs(direction) / np.max(np.abs(direction))
     names = [problem.keys[k] for k in shown]
@@ -70,9 +73,10 @@ def _describe(problem: Problem, minimum: Fit, direction: Array, shown: Sequence[
         text = f"of {names[0]} and {names[1]} only the {combination} is determined"
         return OpenDirection(text, tuple(shown))
     listed = f"{', '.join(names[:-1])} and {names[-1]}"
-    step = _step_within_bounds(problem, minimum.z, direction)
+    step = _step_within_bounds(problem, minimum.z, direction) if refits else None
     if step is None:
-        text = f"by slopes a combination of {listed} is open, along which the bounds leave no room for a try"
+        reason = "the bounds leave no room for a try" if refits else "nothing was tried"
+        text = f"by slopes a combination of {listed} is open, along which {reason}"
         return OpenDirection(text, tuple(shown))
     low, high = problem.box
     moved, rise = _refit_after(problem, minimum, step, int(np.argmax(np.abs(step) / (high - low))), loss)

@@ -205,15 +205,16 @@ class FitPipeline:
         def refit(item: tuple[int, Problem]) -> Fit:
             name, twin = names[item[0]], item[1]
             work = partial(refit_without, twin, best, settings, name, self.loss)
-            return self.checkpoint.fit(f"without {name}", twin, work)
+            # Those of readings are sooner made than read back.
+            return work() if not twin.has_motion else self.checkpoint.fit(f"without {name}", twin, work)
 
         refits = self._side_by_side("leaving out one at a time", refit, len(names), fine)
         self.left_out = cross_validation(settings, refits)
 
-    def find_open_directions(self) -> None:
-        """Refit along the directions that the recordings leave open by slopes."""
+    def find_open_directions(self, refits: bool) -> None:
+        """Find the directions that the recordings leave open by slopes, and try them by refits if asked."""
         assert self._fine is not None
-        self.open_directions = open_directions(self._fine, self.best, self.loss)
+        self.open_directions = open_directions(self._fine, self.best, self.loss, refits)
         self.problem.join(self._fine)
 
     def _side_by_side(

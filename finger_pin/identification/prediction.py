@@ -15,7 +15,7 @@ from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
-from finger_pin.identification.cross_validation import parameter_variance
+from finger_pin.identification.cross_validation import parameter_variance, refitted_errors
 from finger_pin.identification.intervals import NORMAL_95
 from finger_pin.identification.misfit import scatter as scatter_of
 from finger_pin.identification.models import held_out_rows, recording_models
@@ -112,8 +112,7 @@ def predictions(
     for recording in recordings:
         problem, z, covariance, left_out = _problem(result, scenario, recording, finger)
         residuals = problem.errors(z)
-        refits = [problem.errors(each) for each in left_out]
-        refits = [errors for errors in refits if all(np.isfinite(each).all() for each in errors)]
+        refits = refitted_errors(problem, z, residuals, left_out)
         growths = problem.growth.growth(residuals)
         refitted = [np.array([errors[k] for errors in refits]) for k in range(len(residuals))]
         computed = zip(problem.signals, residuals, problem.error_slopes(z), growths, refitted, strict=True)

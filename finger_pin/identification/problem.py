@@ -31,7 +31,7 @@ from finger_pin.identification.scenario_parameters import (
     is_scenario_key,
     key_in,
     recording_pattern,
-    with_parameters,
+    scenario_parts,
 )
 from finger_pin.typing import Array
 
@@ -100,12 +100,9 @@ class Problem:
         self._scenario_indices = np.flatnonzero([is_scenario_key(key, self.units) for key in requested])
         keys = tuple(self.keys[k] for k in self._scenario_indices)
 
-        def part(model: RecordingModel) -> ScenarioPart:
-            check_shadowing(model.recording.name, model.recording.settings, [*keys, *self.fixed])
-            scenario = with_parameters(model.scenario, self.fixed) if self.fixed else model.scenario
-            return ScenarioPart.from_keys(scenario, model.recording.name, keys)
-
-        self._parts = [part(model) for model in self.models]
+        for recording in recordings:
+            check_shadowing(recording.name, recording.settings, [*keys, *self.fixed])
+        self._parts = scenario_parts([(each.scenario, each.recording.name) for each in self.models], keys, self.fixed)
         self.logarithmic = self.low > 0.0
         # One recording stands for all that limit parameters alike.
         by_recording = {model.recording.name: k for k, model in reversed(list(enumerate(self.models)))}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ class ScenarioPart:
 
     def scenario_at(self, values: Array) -> Scenario:
         """Return the scenario at values of all parameters that are keys of a scenario."""
-        return self.family.with_values((self.factors * values[self.indices]).tolist())
+        return _with_values(self, tuple((self.factors * values[self.indices]).tolist()))
 
     @classmethod
     def from_keys(cls, scenario: Scenario, recording: str | None, keys: Sequence[str]) -> ScenarioPart:
@@ -65,11 +66,38 @@ class ScenarioPart:
         return cls(family, np.array([k for k, *_ in entries], dtype=np.intp), factors)
 
 
+@lru_cache(maxsize=32)
+def _with_values(part: ScenarioPart, values: tuple[float, ...]) -> Scenario:
+    """Return the scenario with other values; the limits of a place, and its recordings, ask for the same in turn."""
+    return part.family.with_values(values)
+
+
 def with_parameters(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
     """Return a scenario with values of parameters that all recordings share, by key."""
     for key in filter(recording_pattern, values):
         raise InputError(key, "is of recordings, and this is a number of the scenario for all of them")
     return ScenarioPart.from_keys(scenario, None, tuple(values)).scenario_at(np.array([*values.values()], dtype=float))
+
+
+def scenario_parts(
+    recordings: Sequence[tuple[Scenario, str]], keys: Sequence[str], fixed: Mapping[str, float]
+) -> list[ScenarioPart]:
+    """Return the scenarios of every recording; those of one scenario on which the same keys act share them.
+
+    Args:
+        recordings: Scenario and name of each.
+        keys: Parameters that are keys of a scenario.
+        fixed: Values that every scenario is given first, by key.
+    """
+    shared = dict[tuple[int, tuple[str, ...]], ScenarioPart]()
+    parts = []
+    for original, name in recordings:
+        place = id(original), tuple(key for key in keys if acts_on(key, name))
+        if place not in shared:
+            scenario = with_parameters(original, fixed) if fixed else original
+            shared[place] = ScenarioPart.from_keys(scenario, name, keys)
+        parts.append(shared[place])
+    return parts
 
 
 def tied_entries(key: str) -> list[tuple[str, float]]:

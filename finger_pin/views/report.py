@@ -183,6 +183,8 @@ def _remarks(result: xr.Dataset) -> list[str]:
         sentences.append(f"Runs take long: {result.attrs['ringing']}.")
     if not result.attrs.get("profiles", 1):
         sentences.append("The intervals are those of slopes at the estimate: where they are wide, profiles are surer.")
+    if not result.attrs.get("refits", 1):
+        sentences.append("No recording was left out by a refit: bands of predictions may be too narrow.")
     sentences += _outliers(result) + misfit_remarks
     if "law" in result.dims:
         order = np.argsort(result["law_bic"].values)

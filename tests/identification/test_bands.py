@@ -120,6 +120,51 @@ def test_refits_without_a_load_stay_within_the_bounds():
     assert refits["pull at 3 N"] == pytest.approx(-np.log(share) / TURN, rel=1e-4)
 
 
+def test_refits_without_one_of_many_loads_are_regressions_to_first_order_and_run_nothing():
+    """A line through the origin without each of its 60 readings; half the band by their jackknife (Tukey, 1958)."""
+    data = readings(np.random.default_rng(8), 0.2, np.linspace(3.0, 12.0, 60), noise=0.02, repeats=1)
+    result = identify({"pull": STEADY}, {"pull": data}, profiles=False)
+    without = [np.delete([data["in"], data["out"]], k, axis=1) for k in range(60)]
+    shares = np.array([load @ out / (load @ load) for load, out in without])
+    np.testing.assert_allclose(result.left_out_estimate[:, 0], -np.log(shares) / TURN, rtol=1e-4)
+    assert result.attrs["evaluations"] < 60
+    later = fp.predict(result, {"next": STEADY}, data={"next": {"in": [100.0], "out": [70.0]}})
+    size = data["in"] @ data["in"]
+    off = data["out"] - data["in"] @ data["out"] / size * data["in"]
+    noise = student.ppf(0.975, 59) * np.sqrt(off @ off / 59)
+    unsure = max(noise / np.sqrt(size), student.ppf(0.975, 59) * np.sqrt(59 * np.var(shares)))
+    expected = float(result.band_factor[0]) * np.hypot(noise, unsure * 100.0)
+    assert float(later.predicted_band[0]) == pytest.approx(expected, rel=5e-3)
+
+
+def test_a_fit_without_refits_keeps_estimate_and_intervals_and_has_the_band_of_a_regression():
+    rng = np.random.default_rng(9)
+    data = {name: readings(rng, coulomb) for name, coulomb in (("one", 0.2), ("next", 0.25))}
+    recordings = {"one": STEADY, "next": {**STEADY, "held_out": True}}
+    whole, quick = (identify(recordings, data, refits=refits) for refits in (True, False))
+    for name in ("estimate", "lower", "upper", "noise", "predicted_value"):
+        np.testing.assert_array_equal(quick[name], whole[name])
+    assert "left_out" in whole.dims and "left_out" not in quick.dims
+    load, out = data["one"].values()
+    off = out - load @ out / (load @ load) * load
+    noise = student.ppf(0.975, 11) * np.sqrt(off @ off / 11)
+    band = np.hypot(noise, noise / np.sqrt(load @ load) * data["next"]["in"])
+    np.testing.assert_allclose(quick.predicted_band, band, rtol=6e-3)
+    assert "No recording was left out by a refit" in told(quick) and "No recording was left out" not in told(whole)
+
+
+@pytest.mark.parametrize("refits", [True, False])
+def test_open_combinations_are_said_to_be_tried_only_where_refits_are_asked_for(refits):
+    """Of coefficient, turn and gain a line through the origin tells exp(-mu phi) over the gain alone."""
+    turn, gain = "finger.tendons.T1.curvature_offset", "recordings.pull.tendon_tension.T1.scale"
+    bounds = {COULOMB: (0.05, 0.5), turn: (0.5, 4.0), gain: (0.5, 2.0)}
+    data = {"pull": readings(np.random.default_rng(2), 0.2)}
+    result = identify({"pull": STEADY}, data, parameters=bounds, profiles=False, refits=refits)
+    assert not result.determined.any() and len(result.attrs["undetermined"]) == 2
+    for text in result.attrs["undetermined"]:
+        assert ("the recordings are met as well" if refits else "is open, along which nothing was tried") in text
+
+
 @pytest.mark.parametrize("rho", [0.0, 0.9])
 def test_recordings_are_said_to_determine_every_parameter_only_where_residuals_are_white(rho):
     time = np.arange(0.0, 2.01, 0.02)

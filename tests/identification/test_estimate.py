@@ -70,6 +70,7 @@ def test_a_search_that_starts_below_the_floor_of_the_law_ends_at_the_least_squar
         overrides=entries,
         starts=1,
         profiles=False,
+        refits=False,
     )
     estimate = dict(zip(result.parameter.values, result.estimate.values, strict=True))
     if coulomb is None:
@@ -94,6 +95,7 @@ def test_a_search_that_starts_below_the_floor_of_the_law_ends_at_the_least_squar
         overrides={COULOMB: 0.0, DRAG: 0.0},
         starts=1,
         profiles=False,
+        refits=False,
     )
     # Bristles and viscous friction take some millinewtons.
     assert float(result.estimate[0]) == pytest.approx(np.mean((pull - measured)[late]), abs=5e-3)
@@ -131,6 +133,7 @@ def test_what_is_found_of_an_output_leaves_the_same_when_it_is_written_at_its_co
             overrides={DRAG: 0.4, "finger.tendons.T1.curvature_offset": TURN},
             starts=1,
             profiles=False,
+            refits=False,
         )
 
     bounds = {"offset": (-2.0, 2.0)} | ({"scale": (0.5, 2.0)} if gain != 1.0 else {})

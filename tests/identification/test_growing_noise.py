@@ -19,7 +19,7 @@ def table(rng, scale=1.0):
     return {"in": load, "out": out + scale * np.hypot(FLOOR, SHARE * out) * rng.normal(size=load.size)}
 
 
-def fitted(data, **output):
+def fitted(data, refits=True, **output):
     recording = {
         "kind": "steady",
         "speed": 0.05,
@@ -28,7 +28,7 @@ def fitted(data, **output):
     }
     overrides = {"finger.tendons.T1.curvature_offset": TURN, "finger.tendon_friction.drag": 0.0}
     given = {"recordings": {"pull": recording}, "data": {"pull": data}, "overrides": overrides}
-    found = fp.identify("canal", parameters={COULOMB: (0.02, 0.5)}, starts=1, **given)
+    found = fp.identify("canal", parameters={COULOMB: (0.02, 0.5)}, starts=1, refits=refits, **given)
     return found, recording
 
 
@@ -53,7 +53,7 @@ def test_noise_that_grows_weighs_readings_as_weighted_least_squares_do():
     # The spread of noise tells a little of the line as well: 2 SHARE^2 of the information.
     width = float(found.linear_upper[0] - found.linear_lower[0])
     assert width / (4.0 * deviation) == pytest.approx(1.0, abs=0.04)
-    plain, _ = fitted(data)
+    plain, _ = fitted(data, refits=False)
     assert abs(float(plain.estimate[0] - found.estimate[0])) > 1e-3
     np.testing.assert_allclose(found.residual, data["out"] - share * data["in"], atol=1e-4)
     later = fp.predict(found, {"pull": recording}, data={"pull": data})
@@ -65,7 +65,7 @@ def test_noise_that_grows_weighs_readings_as_weighted_least_squares_do():
 def test_intervals_under_noise_that_grows_hold_the_truth():
     rng, held = np.random.default_rng(6), 0
     for _ in range(60):
-        found, _ = fitted(table(rng), **GROWING)
+        found, _ = fitted(table(rng), refits=False, **GROWING)
         held += bool(found.lower[0] <= TRUE <= found.upper[0])
     # 95 % of 60 within three standard deviations of a binomial distribution.
     assert 57 - 5 <= held <= 60
@@ -124,7 +124,8 @@ def test_outputs_that_share_a_noise_are_weighed_alike():
     def identify(**column):
         out = {"tendon_tension.T1": {"column": "out", **column}}
         recording = {"kind": "steady", "speed": 0.01, "inputs": {"tendon_command.T1": "in"}, "outputs": out}
-        given = {"parameters": {"finger.tendon_friction.coulomb": (0.01, 1.0)}, "starts": 1, "profiles": False}
+        given = {"parameters": {"finger.tendon_friction.coulomb": (0.01, 1.0)}, "starts": 1}
+        given |= {"profiles": False, "refits": False}
         return fp.identify("canal", recordings=dict.fromkeys(data, recording), data=data, **given)
 
     shared, own = identify(noise="cell"), identify()

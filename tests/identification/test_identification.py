@@ -29,8 +29,8 @@ def steady(**more):
 
 def found(data, parameters=BOUNDS, **more):
     changed = {"finger.tendons.T1.curvature_offset": 2.5}
-    given = {"recordings": {"pull": steady()}, "data": {"pull": data}, "overrides": changed, "starts": 1, **more}
-    return fp.identify("canal", parameters=parameters, **given)
+    given = {"recordings": {"pull": steady()}, "data": {"pull": data}, "overrides": changed, "starts": 1}
+    return fp.identify("canal", parameters=parameters, **(given | {"refits": False} | more))
 
 
 @pytest.mark.slow
@@ -149,7 +149,7 @@ def test_wrong_benches_are_refused_in_one_line(change, said):
 @pytest.mark.slow
 def test_weights_on_a_servo_tell_what_its_gears_lose_either_way():
     """Written out by hand: 12 mN m, 4.6 mN m s/rad, 0.22 lifting, 0.08 letting down, a noise of 4 mA."""
-    result = fp.identify("weights", starts=1)
+    result = fp.identify("weights", starts=1, refits=False)
     truth = [0.012, 4.6e-3, 0.22, 0.08]
     assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and result.determined.all()
     assert result.noise.values == pytest.approx([4e-3], rel=0.2)
@@ -167,7 +167,7 @@ def with_outliers():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("loss", ["soft_l1", "huber", "cauchy", "arctan"])
+@pytest.mark.parametrize("loss", ["soft_l1", "cauchy"])
 def test_outliers_count_less_under_a_loss_that_is_robust(loss, with_outliers):
     spoilt, expected, plain = with_outliers
     robust = found(spoilt, loss=loss)
@@ -207,7 +207,7 @@ def test_a_loss_that_is_none_is_refused():
 @pytest.mark.slow
 def test_the_current_and_the_angle_of_a_servo_against_a_spring_tell_the_same():
     """Integrated apart from the package: 12 mN m, 4.6 mN m s/rad, 0.22 in, 0.08 out; noise 1 mrad, 4096 steps."""
-    result = fp.identify("winding", starts=1)
+    result = fp.identify("winding", starts=1, refits=False)
     truth = [0.012, 4.6e-3, 0.22, 0.08]
     assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and result.determined.all()
     assert result.noise.values == pytest.approx([np.hypot(1e-3, 2.0 * np.pi / 4096 / np.sqrt(12.0))], rel=0.15)

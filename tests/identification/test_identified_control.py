@@ -52,7 +52,7 @@ def test_slopes_that_searches_ask_for_know_what_bends_and_bends_back():
 def test_what_a_finger_under_control_tells_to_a_hundredth_has_nearly_the_intervals_of_its_slopes():
     entries, data = under_control(1.0)
     changed = {COULOMB: 0.16, "finger.joint_friction.viscous": 1.5e-3}
-    result = fp.identify("reversals", **entries, data=data, overrides=changed, starts=1)
+    result = fp.identify("reversals", **entries, data=data, overrides=changed, starts=1, refits=False)
     truth, width = np.array([0.11, 1e-3]), (result.upper - result.lower).values
     assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and np.all(width < 0.02 * truth)
     np.testing.assert_allclose(result.noise.values, [NOISE[v] for v, _, _ in SEEN], rtol=0.2)
@@ -87,7 +87,9 @@ def test_coulomb_and_stiction_of_joints_are_found_together_though_their_bounds_o
     swing = {"time": "t", "outputs": {f"joint_position.{joint}": joint for joint in joints}}
     # No stiction within its bounds goes with the greatest Coulomb coefficient.
     bounds = {JOINT_COULOMB: (1e-4, 1.5e-3), JOINT_STICTION: (1e-4, 1.2e-3)}
-    found = fp.identify(base, parameters=bounds, recordings={"swing": swing}, data={"swing": data}, starts=2)
+    found = fp.identify(
+        base, parameters=bounds, recordings={"swing": swing}, data={"swing": data}, starts=2, refits=False
+    )
     true = list(truth.values())
     assert found.estimate.values == pytest.approx(true, rel=5e-3)
     assert np.all((found.lower.values <= true) & (true <= found.upper.values)) and found.determined.all()

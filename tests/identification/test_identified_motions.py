@@ -13,6 +13,8 @@ from finger_pin.laws.spring import JOINT_SPRING
 
 COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"
 BOUNDS = {COULOMB: (0.005, 1.0), DRAG: (0.0, 3.0)}
+# Where the estimate alone is asked for.
+QUICK = {"starts": 1, "profiles": False, "refits": False}
 
 
 def ramp(rng, coulomb, drag, correlation=0.0, rate=100.0):
@@ -51,7 +53,7 @@ def test_a_recorded_motion_gives_the_friction_that_it_was_made_with(more):
     truth = {COULOMB: 0.15, DRAG: 0.5}
     data = ramp(np.random.default_rng(4), *truth.values())
     recordings = {"pull": {**MOTION, **more}}
-    result = fp.identify("canal", parameters=BOUNDS, recordings=recordings, data={"pull": data}, starts=1)
+    result = fp.identify("canal", parameters=BOUNDS, recordings=recordings, data={"pull": data}, **QUICK)
     np.testing.assert_allclose(result.estimate, list(truth.values()), rtol=0.05)
     np.testing.assert_allclose(result.noise, [0.03, 2e-3], rtol=0.2)
     assert result.parameter.size == 2 and result.signal.size == 2
@@ -64,7 +66,7 @@ def test_a_finger_of_ones_own_is_identified_with_the_rows_that_it_has():
     spring = fp.Rows("drum_spring", JOINT_SPRING, ("drum",), [[0.1], [0.0], [0.0]], np.ones((1, 1)))
     finger = fp.Finger(fp.load_scenario("canal", half).finger, rows=[spring])
     data = {"pull": ramp(np.random.default_rng(4), *truth.values())}
-    result = fp.identify("canal", parameters=BOUNDS, recordings={"pull": MOTION}, data=data, starts=1, finger=finger)
+    result = fp.identify("canal", parameters=BOUNDS, recordings={"pull": MOTION}, data=data, finger=finger, **QUICK)
     np.testing.assert_allclose(result.estimate, list(truth.values()), rtol=0.05)
     np.testing.assert_allclose(result.noise, [0.03, 2e-3], rtol=0.2)
 
@@ -180,7 +182,7 @@ def test_windows_begin_before_what_is_compared_so_that_no_sample_but_the_first_i
     parts = [recording.time[rows] for rows in windows(recording)]
     np.testing.assert_allclose([part[0] for part in parts], [0.0, 0.8, 1.8], atol=1e-9)
     np.testing.assert_allclose([part[-1] for part in parts], [0.99, 1.99, 2.49], atol=1e-9)
-    given = {"recordings": {"pull": {**MOTION, "window": 1.0}}, "data": {"pull": data}, "starts": 1}
+    given = {"recordings": {"pull": {**MOTION, "window": 1.0}}, "data": {"pull": data}, **QUICK}
     result = fp.identify("canal", parameters=BOUNDS, **given)
     assert result.signal_samples.values.tolist() == [230, 230]
 
@@ -188,7 +190,7 @@ def test_windows_begin_before_what_is_compared_so_that_no_sample_but_the_first_i
 @pytest.mark.slow
 def test_residuals_that_follow_each_other_count_as_fewer():
     """With a correlation of 0.9 between neighbours, one sample in 19 is independent (Bartlett)."""
-    given = {"parameters": BOUNDS, "recordings": {"pull": MOTION}, "starts": 1}
+    given = {"parameters": BOUNDS, "recordings": {"pull": MOTION}, **QUICK}
     white, red = (
         fp.identify("canal", data={"pull": ramp(np.random.default_rng(8), 0.15, 0.5, rho)}, **given)
         for rho in (0.0, 0.9)
@@ -207,7 +209,7 @@ def test_an_offset_and_a_delay_of_an_output_are_found():
     parameters = {COULOMB: (0.005, 1.0), f"{key}.offset": (-1.0, 1.0)}
     columns = {**MOTION["outputs"], "tendon_tension.T1": {"column": "f", "delay": 0.05}}
     recordings = {"pull": {**MOTION, "outputs": columns}}
-    given = {"data": {"pull": data}, "starts": 1, "overrides": {DRAG: 0.5}}
+    given = {"data": {"pull": data}, "overrides": {DRAG: 0.5}, **QUICK}
     result = fp.identify("canal", parameters=parameters, recordings=recordings, **given)
     np.testing.assert_allclose(result.estimate, [0.15, -0.2], rtol=0.05)
     assert result.units.values.tolist() == ["1", "N"]

@@ -273,6 +273,7 @@ def test_only_commands_that_a_recording_gives_pull_where_efforts_are_compared(va
             overrides=overrides,
             starts=1,
             profiles=False,
+            refits=False,
         )
     said = [str(each.message) for each in seen if "of the scenario is zero here" in str(each.message)]
     assert float(found.estimate[0]) == pytest.approx(0.2, rel=2e-4)

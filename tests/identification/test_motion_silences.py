@@ -69,7 +69,13 @@ def test_a_recorded_start_is_that_of_a_joint_whose_column_has_a_wrong_zero(late)
 def test_a_start_far_from_the_first_row_of_a_recording_is_told():
     data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
     table = {name: values[:60] for name, values in data.items()}
-    given = {"parameters": {COULOMB: (0.1, 0.2)}, "starts": 1, "profiles": False, "data": {"pull": table}}
+    given = {
+        "parameters": {COULOMB: (0.1, 0.2)},
+        "starts": 1,
+        "profiles": False,
+        "refits": False,
+        "data": {"pull": table},
+    }
     columns = {"tendon_tension.T1": "out", "joint_position.drum": "angle"}
     recordings = {"pull": {**MOTION, "start": "rest", "outputs": columns, "settle": 0.2}}
     with pytest.warns(ScenarioWarning, match=r"drum begins at .* rad, and the scenario starts at 0\.9 rad"):

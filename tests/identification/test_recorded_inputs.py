@@ -64,7 +64,9 @@ def test_a_stop_is_found_though_where_the_search_starts_nothing_touches_it():
     stop = "finger.joints.drum.range[1]"
     told = {"time": "t", "inputs": {"tendon_command.T1": "in"}, "outputs": {"joint_position.drum": "angle"}}
     data = {"t": time, "in": pull, "angle": angle + np.random.default_rng(3).normal(0.0, 1e-3, len(time))}
-    found = fp.identify("canal", parameters={stop: (0.5, 4.0)}, recordings={"pull": told}, data={"pull": data})
+    found = fp.identify(
+        "canal", parameters={stop: (0.5, 4.0)}, recordings={"pull": told}, data={"pull": data}, profiles=False
+    )
     assert float(found.estimate[0]) == pytest.approx(1.2, abs=2e-3)
 
 
@@ -111,6 +113,7 @@ def test_a_motor_is_found_under_a_supply_that_sags_beside_its_goal():
             overrides=overrides,
             starts=1,
             profiles=False,
+            refits=False,
         )
         found.append(float(result.estimate[0]))
     assert found[1] == pytest.approx(0.5, rel=5e-3) and abs(found[0] - 0.5) > 0.05, found

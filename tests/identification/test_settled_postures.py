@@ -51,6 +51,7 @@ def test_springs_come_from_settled_postures_as_linear_regression_has_them(tmp_pa
         recordings={"settled": {"kind": "steady", **columns}},
         data={"settled": {"pull": pull, **{name: np.degrees(each) for name, each in data.items()}}},
         starts=1,
+        refits=False,
     )
     seen = {name: np.isfinite(each) for name, each in data.items()}
     expected = [
@@ -68,7 +69,9 @@ def test_drawn_in_and_let_out_tell_the_spring_and_the_friction_of_the_canal():
     exact = 0.02 * pull * np.exp(-0.15 * way * TURN) / 0.3
     data = {"in": pull, "way": way, "q": exact + np.random.default_rng(4).normal(0.0, 1e-3, 6)}
     parameters = {STIFFNESS: (0.1, 1.0), COULOMB: (0.01, 1.0)}
-    result = fp.identify("canal", parameters=parameters, recordings=drum(), data={"settled": data}, starts=1)
+    result = fp.identify(
+        "canal", parameters=parameters, recordings=drum(), data={"settled": data}, starts=1, refits=False
+    )
     np.testing.assert_allclose(result.estimate, [0.3, 0.15], rtol=0.01)
     assert np.all((result.lower.values < [0.3, 0.15]) & (result.upper.values > [0.3, 0.15]))
 
@@ -140,6 +143,7 @@ def test_springs_come_from_what_a_winch_winds_as_its_cord_shares_it(tmp_path):
             "finger.joints.mcp.spring.stiffness": SPRING["mcp"],
         },
         "starts": 1,
+        "refits": False,
     }
     bench = str(tmp_path / "three.toml")
     found = fp.identify(bench, recordings={"settled": recording}, **given)

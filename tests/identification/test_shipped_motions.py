@@ -24,7 +24,7 @@ def test_the_made_up_recording_that_ships_tells_the_numbers_it_was_made_with():
 
 def test_weights_on_a_cord_tell_the_springs_of_three_joints():
     """Written out by hand: k theta = r T with 0.08, 0.05 and 0.03 N m/rad, read to 0.7 degrees."""
-    result = fp.identify("postures", starts=1)
+    result = fp.identify("postures", starts=1, refits=False)
     truth = [0.08, 0.05, 0.03]
     assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and result.determined.all()
     assert result.noise.values == pytest.approx(np.full(3, np.deg2rad(0.7)), rel=0.3)
@@ -32,7 +32,7 @@ def test_weights_on_a_cord_tell_the_springs_of_three_joints():
 
 def test_the_angle_of_a_spool_tells_friction_at_the_bends_and_how_springs_share_the_cord():
     """Three joints and their bristles were integrated apart from the package: 0.18, 0.05 and 0.03 N m/rad."""
-    result = fp.identify("spool_finger", starts=1)
+    result = fp.identify("spool_finger", starts=1, refits=False)
     truth = [0.18, 0.05, 0.03]
     assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and result.determined.all()
     assert result.replicate_noise.values == pytest.approx(np.full(6, 8e-3), rel=0.1)
@@ -46,7 +46,7 @@ def test_a_cord_that_is_loose_at_first_is_found_as_an_offset_of_what_is_wound():
     table["spool_rad"] = np.array(table["spool_rad"]) + 0.1
     offsets = {f"recordings.{run}.tendon_winding.flexor.offset": (-2e-3, 2e-3) for run in ("first", "second")}
     data = dict.fromkeys(("first", "second"), table)
-    result = fp.identify("spool_finger", parameters=offsets, data=data, starts=1)
+    result = fp.identify("spool_finger", parameters=offsets, data=data, starts=1, profiles=False, refits=False)
     found = dict(zip(result.parameter.values, result.estimate.values, strict=True))
     assert [found[key] for key in offsets] == pytest.approx([-8e-4, -8e-4], abs=2e-5)
     assert found["finger.tendon_friction.coulomb"] == pytest.approx(0.18, abs=4e-3)
@@ -119,7 +119,7 @@ def test_three_numbers_of_its_own_predict_the_torque_of_a_second_grasper_better_
 
 def test_a_fingertip_against_a_load_cell_tells_the_friction_of_its_canals_and_the_wrong_zero():
     """Two links, bristles and pad were integrated apart from the package: 0.14, 0.05 N too much; a noise of 4 mN."""
-    result = fp.identify("pressing", starts=2)
+    result = fp.identify("pressing", starts=2, refits=False)
     assert np.all((result.lower.values <= [0.14, -0.05]) & (result.upper.values >= [0.14, -0.05]))
     assert np.all(result.upper - result.lower < [0.001, 0.002])
     assert result.attrs["searches_alike"] == 2

@@ -96,7 +96,7 @@ def test_below_its_level_coulomb_friction_creeps_where_bristles_hold():
 def test_the_compiled_and_the_readable_path_agree_on_every_law(own):
     drag = {"drag": 2e-3, "drag_asymmetry": 0.4}
     for law, more in (("lugre", drag), ("dahl", drag), ("coulomb", drag), ("laws_of_mine:SOFT", {})):
-        given = scenario(law, **more).updated(simulation={"duration": 0.1})
+        given = scenario(law, **more).updated(simulation={"duration": 0.04})
         both = [fp.simulate(given.updated(simulation={"method": method})) for method in ("Rodas5P", "BDF")]
         np.testing.assert_allclose(*(each.joint_position.values for each in both), atol=2e-5)
 
