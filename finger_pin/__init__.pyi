@@ -33,7 +33,7 @@ from .simulation.netcdf import save as save
 from .simulation.prepared import prepare as prepare
 from .simulation.simulate import simulate as simulate
 from .simulation.simulator import Simulator as Simulator
-from .simulation.simulator import step_many as step_many
+from .simulation.simulators import step_many as step_many
 from .studies import optimise as optimise
 from .studies import sweep as sweep
 from .studies.batch import simulate_many as simulate_many

@@ -180,15 +180,6 @@ class ClosedLoop:
         signals = (*self.reference.signals(), *self.controller.signals(), *signals_beside)
         return np.unique(np.concatenate([np.zeros(0), *(each.step_ends(tolerance) for each in signals)]))
 
-    def spool_goals(self, time: Array) -> Array | None:
-        """Return theta_m^d of the motors in position drive at times (m,), shape (m, k), rad; None without loops."""
-        drives = None if self.drives is None else self.drives.compiled
-        return None if drives is None else drives.zero_order_hold(drives.goals, time)
-
-    def wound_lengths(self, angle: Array) -> Array:
-        """Return the lengths that spools at angles (m, k), rad, wind in of their k' cords, shape (m, k'), m."""
-        return angle @ self.finger.actuators.spools.T
-
     def longest_step(self, tolerance: float) -> float:
         """Return the longest step, s, in which no signal has more than one knot; infinite without knots."""
         return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST_STEP)

@@ -18,10 +18,11 @@ from finger_pin.typing import Array
 Inputs = ArrayLike | Mapping[str, float]
 
 
-def input_indices(finger: Finger) -> dict[str, int]:
+def input_indices(finger: Finger, *, goals: bool = False) -> dict[str, int]:
     """Return the indices of the inputs by name, as in ``tensions.T1``: those of winches are ``tendon_winding``.
 
-    ``motor_voltage`` is that of a motor in position drive, ``inputs`` are of a tree's actuators.
+    ``motor_voltage`` is that of a motor in position drive, or ``spool_angle`` where its input is the goal of its loop;
+    ``inputs`` are of a tree's actuators.
     """
     description, routing = finger.description, finger.routing
     tendons = list(routing.tendons[: routing.actuated])
@@ -29,11 +30,14 @@ def input_indices(finger: Finger) -> dict[str, int]:
     driven = {tendon for cords in positioned.values() for tendon in cords}
     kinds = ["tendon_winding" if winched else "tensions" for winched in routing.winched]
     indices = {f"{kinds[index]}.{tendon}": index for index, tendon in enumerate(tendons) if tendon not in driven}
-    indices |= {f"motor_voltage.{name}": tendons.index(cords[0]) for name, cords in positioned.items()}
+    kind = "spool_angle" if goals else "motor_voltage"
+    indices |= {f"{kind}.{name}": tendons.index(cords[0]) for name, cords in positioned.items()}
     return indices | {f"inputs.{name}": routing.actuated + k for k, name in enumerate(description.tree.actuators)}
 
 
-def inputs_by_name(entry: str, commands: Mapping[str, Any], finger: Finger, *, with_loops: bool = False) -> Array:
+def inputs_by_name(
+    entry: str, commands: Mapping[str, Any], finger: Finger, *, with_loops: bool = False, goals: bool = False
+) -> Array:
     """Return the inputs that commands by name stand for, shape (channels,).
 
     Args:
@@ -41,8 +45,9 @@ def inputs_by_name(entry: str, commands: Mapping[str, Any], finger: Finger, *, w
         commands: A number by name: of `input_indices`, or of a tendon or an actuator of a tree alone.
         finger: The finger.
         with_loops: Whether motors in position drive have loops, which give them their voltages.
+        goals: Whether their inputs are goals of these loops.
     """
-    indices = input_indices(finger)
+    indices = input_indices(finger, goals=goals)
     if with_loops:
         indices = {name: index for name, index in indices.items() if not name.startswith("motor_voltage.")}
     inputs, missing = np.zeros(finger.mechanism.channels), dict(indices)

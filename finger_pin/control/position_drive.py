@@ -10,10 +10,11 @@ is given has no loop.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +22,17 @@ from numpy.typing import NDArray
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.motor_signals import sampled_voltages
 from finger_pin.core.stepping.drives import Drives, sample
+from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.actuators import Actuator
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
+
+# What loops keep of every sample; and samples that there is room for at the start of a motion that is stepped.
+_HISTORIES = ("goals", "prescribed_voltages", "supply", "voltages", "errors", "integrals")
+_FIRST_SAMPLES = 64
 
 
 class DriveSignals(Protocol):
@@ -213,6 +219,73 @@ class SteppedDrives:
         self._drives.supply[0] = sampled_voltages(supplies, np.array([time]), 0.0, self._nominal)[0, self._holds]
         sample(self._drives, time, x, self._tension)
         return np.array(self._drives.voltages[0])
+
+
+class SteppedGoals:
+    """The same loops within a motion that a caller steps, such as with `Simulator`: it holds their goals over steps.
+
+    Attributes:
+        channels: The inputs that are their voltages.
+        compiled: The loops as arrays, with room for the samples so far and some more.
+    """
+
+    def __init__(self, finger: Finger, time: float = 0.0) -> None:
+        """Create the loops of a finger's motors in position drive, m of them, that sample from a time on, s."""
+        self.channels = finger.actuators.voltages
+        room = np.zeros((_FIRST_SAMPLES, len(self.channels)))
+        self.compiled = build_drives(finger, room)._replace(first=time)
+
+    def hold(self, stepper: Stepper, goals: Array, end: float) -> None:
+        """Hold goals, shape (m,), rad, from the next sample on; have room for those of a stepper until a time, s."""
+        missing = int(self.compiled.latest(end)) + 2 - len(self.compiled.goals)
+        if missing > 0:
+            self._lengthen(max(missing, len(self.compiled.goals)))
+            for part in stepper.parts:
+                if part.drives is not None:
+                    part.drives = part.drives._replace(**self._histories)
+        # A sample at this instant has been taken already, but not at the start.
+        begun = stepper.time > self.compiled.first
+        self.compiled.goals[int(self.compiled.latest(stepper.time)) + 1 if begun else 0 :] = goals
+
+    @property
+    def _histories(self) -> dict[str, Any]:
+        return {name: getattr(self.compiled, name) for name in _HISTORIES}
+
+    def _lengthen(self, rows: int) -> None:
+        """Make room for further samples, whose goals are the last ones."""
+        longer: dict[str, Any] = {}
+        longer |= {
+            name: np.concatenate([each, np.tile(each[-1:], (rows, 1))]) for name, each in self._histories.items()
+        }
+        self.compiled = self.compiled._replace(**longer)
+
+    def copy(self, stepper: Stepper) -> SteppedGoals:
+        """Return a copy of the loops that a stepper runs, which goes on by itself."""
+        twin = copy.copy(self)
+        count = max(int(part.drives.sample_count[0]) for part in stepper.parts if part.drives is not None)
+        arrays: dict[str, Any] = {}
+        arrays |= {name: getattr(self.compiled, name).copy() for name in (*_HISTORIES, "integral", "last")}
+        twin.compiled = self.compiled._replace(sample_count=np.array([count]), **arrays)
+        return twin
+
+    def repeating(self, later: SteppedGoals) -> SteppedGoals:
+        """Return loops that go on from the samples of these to the goals of later ones; they share no memory."""
+        twin = copy.copy(self)
+        arrays: dict[str, Any] = {}
+        arrays |= {name: getattr(self.compiled, name).copy() for name in ("sample_count", "integral", "last")}
+        twin.compiled = self.compiled._replace(**arrays)
+        # At least one row, so that all histories are copies.
+        twin._lengthen(len(later.compiled.goals) - len(self.compiled.goals) + 1)
+        twin.compiled.goals[:-1] = later.compiled.goals
+        return twin
+
+    def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
+        """Return the commands as they are recorded: no tensions are planned for goals that are given."""
+        return control
+
+    def voltages(self, time: Array | float) -> Array:
+        """Return the voltages held at one time, shape (m,), or at times (k,), shape (k, m), V."""
+        return self.compiled.zero_order_hold(self.compiled.voltages, time)
 
 
 def _positioned_actuators(finger: Finger) -> list[tuple[str, Actuator]]:

@@ -1,35 +1,27 @@
-"""One world of an environment: a scenario in steps, and the draws of an episode."""
+"""One world of an environment: the simulator of a scenario, and the draws of an episode."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.control.closed_loop import ClosedLoop, sampled_control
-from finger_pin.core.stepping.batch_stepper import NO_END
-from finger_pin.core.stepping.integrator import integrate_compiled
-from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.caching import cached_property
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
-from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.learning.action import Action
 from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
-from finger_pin.learning.snapshot import instant_variables, snapshot
 from finger_pin.learning.task import Task
-from finger_pin.mechanism.coerce import FingerLike, is_other_hand, resolve_finger, with_finger, with_parameters_of
+from finger_pin.mechanism.coerce import FingerLike, is_other_hand, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.recording import record
-from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.simulator import Simulator
+from finger_pin.simulation.simulators import Instants
 from finger_pin.typing import Array
-from finger_pin.views.viewer.video import draw_picture
+from finger_pin.views.viewer import draw_picture
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,37 +31,27 @@ _MAX_STARTS, _WAY_STEPS = 100, 32
 
 
 class World:
-    """World of an environment: a scenario in steps, and the draws of an episode.
+    """World of an environment: the simulator of a scenario, and the draws of an episode.
 
     Attributes:
         task: The task of the policy.
-        origin: The scenario's own loop, whose controller does not act.
-        action: Controller that applies the actions in its place.
-        stepper: Its stepper.
+        simulator: The scenario in steps.
+        action: Turns actions into its inputs.
         sampled: Draws of the episode: parameters by key, and those of the task.
         context: Draws of the task.
         sensors: The sensors of the episode.
-        reason: Reason of a failed motion; empty otherwise.
-        now: Simulated time that the motion has reached, s.
     """
 
     def __init__(
-        self,
-        family: ParametrisedScenario,
-        task: Task,
-        randomisation: Randomisation,
-        finger: Finger | None,
-        origin: ClosedLoop | None = None,
+        self, simulator: Simulator, task: Task, randomisation: Randomisation, nominal: tuple[Finger, PassiveCoupling]
     ) -> None:
-        """Build the scenario, or share another world's loop; use `from_scenario` or `twin`."""
-        self.task, self._family, self._randomisation, self._custom_finger = task, family, randomisation, finger
+        """Take a simulator; use `from_scenario` or `twin`."""
+        self.simulator, self.task, self._randomisation, self._nominal = simulator, task, randomisation, nominal
         self.sampled: dict[str, Any] = {}
         self.context: dict[str, Array] = {}
         self.sensors: dict[str, Sensor] = {}
-        self._nominal: tuple[Finger, PassiveCoupling] | None = None
-        self.reason, self._step, self.now = "", 0, 0.0
-        self._build(family.scenario, origin)
-        self.stepper = self._stepper_at(self.origin.initial_state())
+        self._step = 0
+        self.action = Action(task.action, simulator.finger, *nominal)
 
     @classmethod
     def from_scenario(cls, scenario: ScenarioLike, task: Task, finger: FingerLike | None = None) -> World:
@@ -77,8 +59,7 @@ class World:
         loaded = load_scenario(scenario)
         custom_finger = resolve_finger(finger, loaded)
         scenario = with_finger(loaded, custom_finger)
-        if scenario.simulation.method not in TABLEAUS:
-            raise InputError("simulation.method", f"must be one of {', '.join(TABLEAUS)}", scenario.simulation.method)
+        simulator = Simulator.from_scenario(scenario, finger=custom_finger, goals=True)
         randomisation = Randomisation(task)
         for key in randomisation.keys if is_other_hand(custom_finger, scenario) else ():
             if key.startswith("hand."):
@@ -87,65 +68,23 @@ class World:
         for values in randomisation.corner_values():
             # Wrong ranges are refused now, not at the hundredth reset.
             family.with_values(values)
-        world = cls(family, task, randomisation, custom_finger)
-        available = instant_variables(world.origin)
-        for name in task.variables:
-            if name not in available:
-                entry = "observation" if name in task.sensors else "privileged"
-                raise InputError(entry, f"no such variable; there are {choices(name, available)}", name)
-        return world
+        # Drives use the parameters of the scenario, not the drawn ones.
+        nominal = simulator.finger, scenario.coupling(simulator.finger.routing)
+        return cls(simulator, task, randomisation, nominal)
 
     def twin(self) -> World:
         """Return another world of the same scenario and task; they share the parts that no reset changes."""
-        origin = None if self._randomisation.keys else self.origin
-        return World(self._family, self.task, self._randomisation, self._custom_finger, origin)
-
-    @property
-    def rebuilt(self) -> bool:
-        """True if every episode builds a new loop and stepper."""
-        return bool(self._randomisation.keys)
-
-    def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
-        """Build the loop and the action."""
-        if origin is None:
-            finger = self._custom_finger
-            if self._nominal is not None:
-                finger = with_parameters_of(self._nominal[0], self._family.scenario, scenario)
-                if finger.layout.names != self._nominal[0].layout.names:
-                    raise InputError("randomise", "must keep what the state consists of", self.sampled)
-            origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled()
-        self._scenario, self.origin = scenario, origin
-        finger, family = self.origin.finger, self._family.scenario
-        # Drives use the parameters of the scenario, not the drawn ones.
-        self._nominal = self._nominal or (finger, family.coupling(finger.routing))
-        self.action = Action(self.task.action, finger, self.task.duration, *self._nominal)
-
-    @property
-    def loop(self) -> ClosedLoop:
-        """The loop, with the actions in the place of its controller."""
-        drives = self.action if self.action.compiled is not None else None
-        return replace(self.origin, controller=self.action, drives=drives)
-
-    def _stepper_at(self, x: Array) -> Stepper:
-        """Return a stepper that starts from a state, with the loops of the action if there are any."""
-        loop, settings = self.origin, self._scenario.simulation
-        stepper = Stepper.from_finger(
-            loop.finger,
-            sampled_control(loop),
-            x,
-            loop.fingertip_force,
-            method=settings.method,
-            rtol=settings.rtol,
-            atol_scale=settings.atol_scale,
-        )
-        if self.action.compiled is not None:
-            stepper.drive(self.action.compiled)
-        return stepper
+        return World(self.simulator.clone(), self.task, self._randomisation, self._nominal)
 
     @property
     def time(self) -> float:
         """Simulated time of the episode, s."""
         return self._step * self.task.period
+
+    @property
+    def reason(self) -> str:
+        """Reason of a failed motion; empty otherwise."""
+        return self.simulator.failure
 
     @property
     def over(self) -> bool:
@@ -154,22 +93,29 @@ class World:
 
     def reset(self, random: np.random.Generator) -> None:
         """Reset for an episode."""
-        self._random, self.reason, self._step, self.now = random, "", 0, 0.0
+        self._random, self._step, task = random, 0, self.task
         self.sampled = self._randomisation.sample_context(random)
         if self._randomisation.keys:
-            self._build(self._family.with_values([self.sampled[key] for key in self._randomisation.keys]))
-        self._start_state = self._draw_start()
-        if self.rebuilt:
-            self.stepper = self._stepper_at(self._start_state)
-        else:
-            self.stepper.restart(self._start_state, time=0.0)
-        task = self.task
+            self._set_parameters({key: self.sampled[key] for key in self._randomisation.keys})
+        self._draw_start()
         self.context = self._draw_context()
         self.sampled |= self.context
         self.sensors = {
             name: self._randomisation.sensor(name, sensor, self.sampled) for name, sensor in task.sensors.items()
         }
         self.action.reset(self._randomisation.delay(self.sampled, task.delay))
+
+    def _set_parameters(self, values: Mapping[str, Any]) -> None:
+        """Give the simulator the parameters that were drawn."""
+        finger = self.simulator.finger
+        try:
+            self.simulator.set_parameters(values)
+        except InputError as error:
+            if error.entry != "values":
+                raise
+            raise InputError("randomise", error.allowed, dict(values)) from None
+        if self.simulator.finger is not finger:
+            self.action = Action(self.task.action, self.simulator.finger, *self._nominal)
 
     def _draw_context(self) -> dict[str, Array]:
         """Return the task's draws for an episode, by name."""
@@ -187,91 +133,71 @@ class World:
                 raise InputError(f"draw.{name}", f"must keep its shape {shapes[name]}", list(value.shape))
         return draws
 
-    def _draw_start(self) -> Array:
-        """Return the packed state at the start."""
-        loop, task = self.origin, self.task
+    def _draw_start(self) -> None:
+        """Reset the simulator to a start that is drawn."""
+        simulator, task = self.simulator, self.task
         if task.start == "reference":
-            return loop.initial_state()
-        joints = len(loop.finger.routing.joints)
+            simulator.reset()
+            return
+        finger = simulator.finger
+        joints = len(finger.routing.joints)
         for _ in range(_MAX_STARTS):
             if callable(task.start):
                 position = np.asarray(task.start(self._random), dtype=float)
                 if position.shape != (joints,) or not np.isfinite(position).all():
                     raise InputError("start", f"must return {joints} finite angles, rad", position.tolist())
             else:
-                limiter, coupling = loop.finger.stroke_limiter, self._scenario.coupling(loop.finger.routing)
+                limiter, coupling = finger.stroke_limiter, simulator.scenario.coupling(finger.routing)
                 free_position = self._random.uniform(limiter.lower, limiter.upper)
                 position = np.clip(coupling.matrix @ free_position + coupling.offset, limiter.lower, limiter.upper)
-            x = loop.rest_state(position, np.zeros(joints))
-            if self._is_free(x):
-                return x
+            if self._starts_at(position):
+                return
         # The nearest free posture on the way to the reference: a training must not end here.
-        reference = loop.reference.at(0.0).position
+        reference = simulator.loop.reference.at(0.0).position
         for share in np.arange(1.0, _WAY_STEPS) / _WAY_STEPS:
-            x = loop.rest_state(position + share * (reference - position), np.zeros(joints))
-            if self._is_free(x):
-                return x
-        return loop.initial_state()
+            if self._starts_at(position + share * (reference - position)):
+                return
+        simulator.reset()
 
-    def _is_free(self, x: Array) -> bool:
-        """Return whether no bodies are deep in each other at a packed state."""
-        finger = self.origin.finger
-        if finger.scene is None:
-            return True
+    def _starts_at(self, position: Array) -> bool:
+        """Reset the simulator to a posture; return whether no bodies are deep in each other there."""
         try:
-            finger.scene.check(finger.layout.unpack(x))
+            self.simulator.reset(position)
         except InputError:
             return False
         return True
 
-    def act(self, action: Array) -> float:
-        """Start a control period with an action; return the end of its first piece, s."""
+    def act(self, action: Array) -> None:
+        """Start a control period with an action."""
         self.action.apply(action, self.time)
         self._step += 1
-        return self._next_end()
 
-    def finish_piece(self, end: float, status: int) -> float:
-        """Record the status with which a stepper ended a piece; return the end of the next, s, or `NO_END`."""
-        self.now = end
-        if status:
-            self.now = self.stepper.time
-            self.reason = self.stepper.failure(status, self.origin.finger.layout.names)
-        return self._next_end()
+    def next_piece(self) -> tuple[Array, float]:
+        """Return the inputs of the next piece of the control period, and its length, s."""
+        now = self.simulator.time
+        inputs, end = self.action.next_piece(now, self.time)
+        return inputs, end - now
 
-    def _next_end(self) -> float:
-        """Apply the present inputs, and return the time of their end, s; `NO_END` after the period."""
-        end = self._step * self.task.period
-        if self.reason or self.now >= end:
-            return NO_END
-        return self.action.next_piece(self.stepper, self.now, end)
+    @property
+    def is_acting(self) -> bool:
+        """True if the control period has a further piece."""
+        return self.simulator.time < self.time and not self.reason
 
     def result(self, sample_rate: float) -> xr.Dataset:
         """Return the episode so far, repeated step by step, as a Dataset with its energy account."""
-        if not self._step:
-            raise InputError("result", "is of steps, and there are none yet: call step")
-        stepper, end = self._stepper_at(self._start_state), self.stepper.time
-        if self.action.compiled is not None:
-            stepper.drive(self.action.restarted_drives())
-        controller = self.action.recorded_inputs()
-        trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, controller=controller)
-        # Rounding must not move a sample beyond the end.
-        times = np.minimum(np.arange(int(end * sample_rate * (1.0 + 1e-12)) + 1) / sample_rate, end)
-        samples = SampledTrajectory(self.loop, trajectory, times)
-        dataset = record(self._scenario, samples, self._scenario.simulation.method)
+        dataset = self.simulator.result(sample_rate=sample_rate)
         dataset.attrs["custom"] = "policy"
         return dataset
 
     def picture(self) -> NDArray[np.uint8]:
         """Return a picture of the present posture, from a point with all postures in view, of bytes."""
-        method = self._scenario.simulation.method
-        samples = snapshot(self.loop, self.stepper.time, self.stepper.x)
-        dataset = record(self._scenario, samples, method, list(instant_variables(self.origin)))
         goal = self.context.get("goal")
-        return draw_picture(dataset, self._extreme_tips, goal if goal is not None and goal.shape == (3,) else None)
+        marked = goal if goal is not None and goal.shape == (3,) else None
+        return draw_picture(Instants([self.simulator]).dataset(), self._extreme_tips, marked)
 
     @cached_property
     def _extreme_tips(self) -> Array:
         """Fingertips at the corners of the joints' ranges, shape (k, 3), m."""
-        limiter, body = self.origin.finger.stroke_limiter, self.origin.finger.rigid_body
+        limiter, body = self.simulator.finger.stroke_limiter, self.simulator.finger.rigid_body
         corners = np.array([limiter.lower, limiter.upper, 0.5 * (limiter.lower + limiter.upper)])
         return np.array([body.tip_position(corner) for corner in corners]).reshape(-1, 3)

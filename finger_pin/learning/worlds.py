@@ -9,14 +9,14 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from finger_pin.core.stepping.batch_stepper import NO_END, BatchStepper
 from finger_pin.description.loading import ScenarioLike
+from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.learning.sensors import measurements
-from finger_pin.learning.snapshot import BatchedLoop, BatchedSnapshot, instant_variables
 from finger_pin.learning.task import Task, all_finite
 from finger_pin.learning.world import World
 from finger_pin.mechanism.coerce import FingerLike
+from finger_pin.simulation.simulators import Instants, advance, instant_variables
 from finger_pin.typing import Array
 
 _Indices = NDArray[np.int64]
@@ -34,28 +34,16 @@ class Worlds:
         """Build the worlds."""
         world_template = World.from_scenario(scenario, task, finger)
         self.task, self.worlds = task, [world_template, *(world_template.twin() for _ in range(count - 1))]
-        loops, actions = [world.origin for world in self.worlds], [world.action for world in self.worlds]
-        self._loop = BatchedLoop.from_loops(loops, actions, task.variables, separate=world_template.rebuilt)
-        self._snapshot = BatchedSnapshot(self._loop)
-        self._find_variables()
+        available = instant_variables(world_template.simulator.loop)
+        for name in task.variables:
+            if name not in available:
+                entry = "observation" if name in task.sensors else "privileged"
+                raise InputError(entry, f"no such variable; there are {choices(name, available)}", name)
+        self._instants = Instants([world.simulator for world in self.worlds], task.variables)
         self._measurements = measurements(task.sensors, count, task.period)
         self._context: dict[str, Array] = {}
         self._randoms = [np.random.default_rng(0)] * count
-        self._steppers = BatchStepper([world.stepper for world in self.worlds])
         self.reset(range(count), self._randoms)
-
-    def _find_variables(self) -> None:
-        available = instant_variables(self._loop)
-        self._variables = {name: available[name] for name in self.task.variables}
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the state without the functions of the variables, which cannot be pickled."""
-        return {name: value for name, value in self.__dict__.items() if name != "_variables"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore the state, and find the functions of the variables again."""
-        self.__dict__ |= state
-        self._find_variables()
 
     def spaces(self) -> tuple[Box, Box]:
         """Return the spaces of one world's observations and actions, both of 32-bit floats."""
@@ -82,36 +70,26 @@ class Worlds:
                 if name not in self._context:
                     self._context[name] = np.zeros((len(self.worlds), *value.shape))
                 self._context[name][i] = value
-            if world.rebuilt:
-                self._loop.replace_world(i, world.origin, world.action)
-        if self.worlds[0].rebuilt and len(indices):
-            self._steppers = BatchStepper([world.stepper for world in self.worlds])
 
     def act(self, actions: Array, indices: Sequence[int]) -> None:
         """Act in some worlds for a control period, shape (w, k).
 
         Where actions arrive within the period, it has several pieces.
         """
-        worlds, ends = self.worlds, [NO_END] * len(self.worlds)
         for i in indices:
-            ends[i] = worlds[i].act(actions[i])
-        while max(ends) != NO_END:
-            statuses = self._steppers.advance(ends)
-            for i in indices:
-                if ends[i] != NO_END:
-                    ends[i] = worlds[i].finish_piece(ends[i], statuses[i])
+            self.worlds[i].act(actions[i])
+        acting = [self.worlds[i] for i in indices]
+        while acting:
+            inputs, lengths = zip(*[world.next_piece() for world in acting], strict=True)
+            advance([world.simulator for world in acting], inputs, lengths)
+            acting = [world for world in acting if world.is_acting]
 
     def observe(self, indices: _Indices, *, for_reward: bool = True) -> tuple[NDArray[np.float32], dict[str, Array]]:
         """Return the observations in some worlds, shape (k, o), and the true signals in all by name, shapes (w, ...).
 
         Without ``for_reward`` signals are only those that sensors read.
         """
-        snapshot = self._snapshot
-        snapshot.clear_signals()
-        snapshot.times[:] = [world.now for world in self.worlds]
-        self._steppers.read(snapshot.packed)
-        names = self._variables if for_reward else self.task.sensors
-        signals = {name: np.array(self._variables[name].value(snapshot)) for name in names}
+        signals = self._instants.read(None if for_reward else list(self.task.sensors))
         count = len(indices)
         all_worlds = count == len(self.worlds)
         observations = {name: value if all_worlds else value[indices] for name, value in self._context.items()}

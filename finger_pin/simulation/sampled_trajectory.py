@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import ControlSignals
 from finger_pin.core.steps.trajectory import Trajectory
@@ -94,6 +96,21 @@ class SampledTrajectory:
     def finger(self) -> FingerSignals:
         """Signals of the finger, by the names of the paper."""
         return self.signals.finger
+
+    @property
+    def force(self) -> Array:
+        """F, shape (m, 3), of several fingers (m, f, 3), N, base frame."""
+        return np.broadcast_to(self.loop.force(self.times), (len(self.times), *self.loop.fingertip_force.shape))
+
+    @property
+    def spool_goals(self) -> Array | None:
+        """theta_m^d of the motors in position drive, shape (m, k), rad; None without loops."""
+        drives = None if self.loop.drives is None else self.loop.drives.compiled
+        return None if drives is None else drives.zero_order_hold(drives.goals, self.times)
+
+    def wound_lengths(self, angle: Array) -> Array:
+        """Return the lengths that spools at angles (m, k), rad, wind in of their k' cords, shape (m, k'), m."""
+        return angle @ self.loop.finger.actuators.spools.T
 
     @cached_property
     def touching(self) -> ContactPoints:

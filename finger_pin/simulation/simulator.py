@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from numbers import Real
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.control.input_queue import InputQueue, input_delays
-from finger_pin.control.named_inputs import Inputs, inputs_by_name
-from finger_pin.control.palm import PalmPath, PrescribedPaths, start_state, with_paths
+from finger_pin.control.closed_loop import ClosedLoop, sampled_control
+from finger_pin.control.named_inputs import Inputs
+from finger_pin.control.palm import start_state
+from finger_pin.control.position_drive import SteppedGoals
 from finger_pin.control.user_controllers import Samples
-from finger_pin.core.signals.compiled_finger import CompiledFinger
-from finger_pin.core.stepping.batch_stepper import BatchStepper
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.core.tables.inputs import held_control
 from finger_pin.description.demo_motion import start_position
-from finger_pin.description.loading import ParametrisedScenario
+from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
+from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
+from finger_pin.simulation.held_inputs import HeldInputs
 from finger_pin.simulation.initial_state import as_finite_array, check_motors, warn_beyond_ranges
-from finger_pin.simulation.step_log import StepLog
+from finger_pin.simulation.step_log import StepLog, stepped_scenario
 from finger_pin.typing import Array
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
@@ -43,6 +42,9 @@ class Simulator:
 
     Attributes:
         finger: The finger.
+        scenario: The scenario that is stepped; one of the finger alone, unless it was made of one.
+        loop: The finger with its palm, paths and forces; its controller does not act.
+        failure: Why the last step ended early; empty otherwise.
     """
 
     def __init__(
@@ -68,39 +70,68 @@ class Simulator:
         Raises:
             InputError: Naming the argument that is wrong, or bodies that start deep in each other.
         """
-        if method not in TABLEAUS:
-            raise InputError("method", f"must be one of {', '.join(TABLEAUS)}{suggestion(method, TABLEAUS)}", method)
+        _check_method("method", method)
         for name, value in (("rtol", rtol), ("atol_scale", atol_scale)):
             if not 0.0 < value <= 0.1:
                 raise InputError(name, "must be above 0 and at most 0.1", value)
-        self._settings: dict[str, Any] = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
+        settings, made = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}, as_finger(finger)
+        first = np.array([*start_position(made.description).values()])
+        posture = first if position is None else as_finite_array("position", position, first.shape)
+        self._set_up(made, stepped_scenario(made.description, settings), posture, goals=False)
+
+    @classmethod
+    def from_scenario(
+        cls, scenario: ScenarioLike, *, finger: FingerLike | None = None, goals: bool = False
+    ) -> Simulator:
+        """Return a simulator of a scenario: its finger, objects, paths, forces, start, method and tolerances.
+
+        Its controller and its reference do not act; the reference is where it starts, and that of its results.
+
+        Args:
+            scenario: The scenario, its name, or the path of a file.
+            finger: Replaces the finger that the scenario describes, as for `simulate`.
+            goals: Whether the loops of motors in position drive run: inputs are then angles of spools that they hold,
+                rad, from their next sample on, in place of voltages.
+
+        Raises:
+            InputError: Naming the entry that is wrong.
+        """
+        loaded = load_scenario(scenario)
+        custom = resolve_finger(finger, loaded)
+        loaded = with_finger(loaded, custom)
+        _check_method("simulation.method", loaded.simulation.method)
+        simulator = object.__new__(cls)
+        simulator._set_up(custom or Finger(loaded.finger, objects=loaded.environment.objects), loaded, None, goals)
+        return simulator
+
+    def _set_up(self, finger: Finger, scenario: Scenario, posture: Array | None, goals: bool) -> None:
+        """Start in a posture, or where the scenario does."""
+        self._posture, self._has_goals = posture, goals and bool(finger.actuators.holds.any())
         self._family: ParametrisedScenario | None = None
-        self._build(as_finger(finger))
-        first = np.array([*start_position(self.finger.description).values()])
-        self._posture = first if position is None else as_finite_array("position", position, first.shape)
-        self._start(self._state_at_rest(self._posture), 0.0)
+        self._build(finger, scenario)
+        self.reset()
 
     def __repr__(self) -> str:
         """Return the finger, the time and the posture."""
         posture = ", ".join(f"{angle:.4g}" for angle in self.state.position)
         return f"Simulator({self.finger.description.name} at t = {self.time:.6g} s, theta = [{posture}] rad)"
 
-    def _build(self, finger: Finger) -> None:
-        """Build the stepper of a finger; `_start` gives it a state."""
-        self.finger, mechanism = finger, finger.mechanism
-        self._guides = PrescribedPaths.from_finger(finger, 0.0, self._settings["rtol"])
-        self._palm = PalmPath.from_hand(finger.description.hand, 0.0, finger, self._settings["rtol"])
-        control = with_paths(held_control(mechanism.channels, mechanism.coordinates), self._palm, self._guides)
-        rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
-        self._stepper = Stepper.from_finger(finger, control, rest, **self._settings)
+    def _build(self, finger: Finger, scenario: Scenario) -> None:
+        """Build loop and stepper; `_start` gives them a state."""
+        self.finger, self.scenario = finger, scenario
+        self.loop = ClosedLoop.from_scenario(scenario, finger=finger).compiled()
+        rest, force = finger.rest_state(np.zeros(len(finger.routing.joints))), self.loop.fingertip_force
+        settings = {name: getattr(scenario.simulation, name) for name in ("method", "rtol", "atol_scale")}
+        self._stepper = Stepper.from_finger(finger, sampled_control(self.loop), rest, force, **settings)
         self._initial_snapshot = self._stepper.state_snapshot
-        self._compiled = CompiledFinger(finger)
-        self._tension_channels = np.setdiff1d(np.flatnonzero(~finger.routing.winched), finger.actuators.voltages)
 
     def _state_at_rest(self, position: Array) -> Array:
         """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
-        finger = self.finger
-        x = start_state(finger, finger.rest_state(position), self._palm, self._guides)
+        finger, loop = self.finger, self.loop
+        if self._posture is None:
+            x = loop.rest_state(position, np.zeros(len(position)))
+        else:
+            x = start_state(finger, finger.rest_state(position), loop.palm, loop.prescribed_motion)
         if finger.scene is not None:
             finger.scene.check(finger.layout.unpack(x))
         warn_beyond_ranges(finger, x)
@@ -108,14 +139,14 @@ class Simulator:
 
     def _start(self, x: Array, time: float) -> None:
         """Start from a state at a time, with a new record and zero inputs."""
-        tips = len(self.finger.mechanism.body.tips)
-        self._inputs = np.zeros(self.finger.mechanism.channels)
-        self._queue = InputQueue(input_delays(self.finger.description, self.finger.routing))
-        self._force = self._zero_force = np.zeros(3 if tips == 1 else (tips, 3))
+        goals = SteppedGoals(self.finger, time) if self._has_goals else None
+        self.failure, self._held = "", HeldInputs(self.loop, goals)
         # The snapshot also resets the loaded force.
         self._stepper.restore(self._initial_snapshot)
+        if goals is not None:
+            self._stepper.drive(goals.compiled)
         self._stepper.restart(x, time)
-        self._log = StepLog(self._stepper)
+        self._time, self._log = time, StepLog(self._stepper, goals)
 
     def reset(self, initial: State | ArrayLike | None = None) -> State:
         """Reset to time zero with a new record; return the state.
@@ -128,39 +159,48 @@ class Simulator:
         """
         if isinstance(initial, State):
             initial = self.finger.layout.pack(initial)
-        if initial is None or np.shape(initial) == self._posture.shape:
-            posture = self._posture if initial is None else initial
-            x = self._state_at_rest(as_finite_array("initial", posture, self._posture.shape))
+        joints = (len(self.finger.routing.joints),)
+        start = self._posture if initial is None else initial
+        if start is None:
+            x = self.loop.initial_state()
+        elif np.shape(start) == joints:
+            x = self._state_at_rest(as_finite_array("initial", start, joints))
         else:
-            x = as_finite_array("initial", initial, (self.finger.layout.size,))
+            x = as_finite_array("initial", start, (self.finger.layout.size,))
             check_motors(self.finger, x)
         self._start(x, 0.0)
         return self.state
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
-        """Change parameters of the finger, and go on from the same state at the same time, with a new record.
+        """Change parameters, and go on from the same state at the same time, with a new record and zero inputs.
 
         Args:
-            values: By dotted key, as of `load_finger`, such as ``{"finger.tendon_friction.coulomb": 0.1}``.
+            values: By dotted key, as of `load_scenario`, such as ``{"finger.tendon_friction.coulomb": 0.1}``; where the
+                simulator was not made of a scenario, of the finger or hand alone.
 
         Raises:
             InputError: Naming the entry that is wrong, or if the finger had another state; nothing changed.
         """
-        if self._family is None or self._family.keys != tuple(values):
-            self._family = ParametrisedScenario.from_finger(self.finger.description, tuple(values))
-        description = self._family.with_values([*values.values()]).finger
-        finger = self.finger.changed(description, self.finger.constructor_args.objects)
+        keys, alone = tuple(values), self._posture is not None
+        if self._family is None or self._family.keys != keys:
+            family = ParametrisedScenario
+            self._family = family.from_finger(self.finger.description, keys) if alone else family(self.scenario, keys)
+        scenario = self._family.with_values([*values.values()])
+        if alone:
+            finger = self.finger.changed(scenario.finger, self.finger.constructor_args.objects)
+            scenario = stepped_scenario(scenario.finger, self.scenario.simulation)
+        else:
+            finger = with_parameters_of(self.finger, self.scenario, scenario)
         if finger.layout.names != self.finger.layout.names:
-            raise InputError("values", "make a finger with another state: make another simulator of it")
+            raise InputError("values", "must keep what the state consists of: make another simulator")
         check_motors(finger, x := self.x, "values")
-        time = self.time
-        self._build(finger)
-        self._start(x, time)
+        self._build(finger, scenario)
+        self._start(x, self._time)
 
     @property
     def time(self) -> float:
         """Simulated time, s."""
-        return self._stepper.time
+        return self._time
 
     @property
     def x(self) -> Array:
@@ -172,7 +212,7 @@ class Simulator:
         x = as_finite_array("x", value, (self.finger.layout.size,))
         check_motors(self.finger, x, "x")
         self._stepper.restart(x)
-        self._log = StepLog(self._stepper)
+        self._log = StepLog(self._stepper, self._held.goals)
 
     @property
     def state(self) -> State:
@@ -183,49 +223,41 @@ class Simulator:
         """Advance by a time under constant tensions; return the state then.
 
         Args:
-            inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon; of
-                a winch the length wound in, m; then inputs of a tree's actuators. Or by name, as in ``{"T1": 5.0}``.
+            inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon, or
+                the goal of its loop, rad; of a winch the length wound in, m; then inputs of a tree's actuators. Or by
+                name, as in ``{"T1": 5.0}``.
             dt: s.
-            fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
+            fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame, beside that of the
+                scenario; none by default.
 
         Raises:
             InputError: If an argument is not finite or has the wrong size, or a tension is negative; nothing moved.
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
-        command, force = self._check_step(inputs, dt, fingertip_force)
-        end = self.time + dt
-        self._queue.add(self.time, command)
+        command, force = self._held.check(inputs, dt, fingertip_force)
+        end = self._command(command, dt)
         while True:
-            piece_end = self._apply_inputs(force, end)
+            piece_end = self._held.apply(self._stepper, force, self._time, end)
             status = self._stepper.advance(piece_end)
-            self._log.add(self._stepper.time, self._inputs, self._force)
+            self._end_piece(status)
             if status or piece_end == end:
-                return self._state_after(status)
+                return self._state_after_step()
 
-    def _check_step(self, inputs: Inputs, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
-        if isinstance(inputs, Mapping):
-            inputs = inputs_by_name("inputs", inputs, self.finger)
-        command, force = as_finite_array("inputs", inputs, self._inputs.shape), self._zero_force
-        if min(command.tolist(), default=0.0) < 0.0 and (command[self._tension_channels] < 0.0).any():
-            raise InputError("inputs", "a tension must not be negative: a tendon cannot push", command.tolist())
-        if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
-            raise InputError("dt", "must be above 0 and finite", dt)
-        if fingertip_force is None:
-            return command, force
-        return command, as_finite_array("fingertip_force", fingertip_force, force.shape)
+    def _command(self, inputs: Array, dt: float) -> float:
+        """Command inputs, which act once they have arrived; return the end of the step, s."""
+        self._held.command(self._time, inputs)
+        return self._time + dt
 
-    def _apply_inputs(self, force: Array, end: float) -> float:
-        """Apply a force and the inputs that have arrived; return the end, or the time of the next arrival, s."""
-        if force is not self._force:
-            self._stepper.load(force)
-        self._inputs, self._force = self._queue.at(self.time), force
-        self._stepper.hold(self._inputs)
-        return self._queue.next_arrival(self.time, end)
+    def _end_piece(self, status: int) -> None:
+        """Record what has been stepped, and how it ended."""
+        self._time = self._stepper.time
+        self._log.add(self._time, self._held.values, self._held.force)
+        self.failure = self._stepper.failure(status, self.finger.layout.names) if status else ""
 
-    def _state_after(self, status: int) -> State:
+    def _state_after_step(self) -> State:
         """Return the state after a step, unless it failed."""
-        if status:
-            raise IntegrationError(self.time, self._stepper.failure(status, self.finger.layout.names), _ADVICE)
+        if self.failure:
+            raise IntegrationError(self.time, self.failure, _ADVICE)
         return self.finger.layout.unpack(self._stepper.x)
 
     def result(self, *, sample_rate: float = 1000.0, reference: Reference | Samples | None = None) -> xr.Dataset:
@@ -236,65 +268,33 @@ class Simulator:
 
         Args:
             sample_rate: Of the signals, Hz.
-            reference: theta^d, for the record alone, as for `simulate`; by default the posture at the start.
+            reference: theta^d, for the record alone, as for `simulate`; by default the scenario's, or the posture at
+                the start.
 
         Raises:
             InputError: If nothing has been run, or an argument is wrong.
             IntegrationError: If memory holds only the first steps; its ``result`` has these.
         """
-        return self._log.result(self.finger, {**self._settings, "sample_rate": sample_rate}, reference, self._palm)
+        if self._posture is None and reference is None:
+            reference = self.loop.reference
+        return self._log.result(self.loop, self.scenario, sample_rate, reference, self._held.goals)
 
     def signals(self) -> FingerSignals:
         """Return all signals at the present state, under the tensions and force of the last step."""
-        base_motion = path.base(self.time) if (path := self._palm or self._guides) else None
-        return self._compiled.evaluate(self.x, self._inputs, self._force, base_motion)
+        inputs, force = self._held.at(self.time), self._held.force_at(self.time)
+        return self.loop.dynamics.evaluate(self.x, inputs, force, self.loop.base(self.time))
 
     def clone(self) -> Simulator:
         """Return an independent copy in the same state; both continue bit for bit the same."""
         copy = object.__new__(type(self))
         copy.__dict__ |= self.__dict__
-        copy._compiled, copy._stepper = CompiledFinger(self.finger), self._stepper.copy()
-        copy._log, copy._queue = self._log.copy(copy._stepper), self._queue.copy()
+        copy.loop, copy._stepper = self.loop.compiled(), self._stepper.copy()
+        copy._held, copy._log = self._held.copy(self._stepper, copy._stepper), self._log.copy(copy._stepper)
         return copy
 
     __copy__ = clone  # Simulators that share a stepper would step each other.
 
 
-def step_many(
-    simulators: Sequence[Simulator],
-    tensions: Sequence[Inputs],
-    dt: float,
-    fingertip_forces: Sequence[ArrayLike] | None = None,
-) -> list[State]:
-    """Advance many simulators by a time, side by side in threads; return their states then.
-
-    Each does bit by bit what `Simulator.step` does. There is no Python between the steps.
-
-    Args:
-        simulators: The simulators, none of them twice.
-        tensions: The inputs of `Simulator.step` for each.
-        dt: s.
-        fingertip_forces: The force of `Simulator.step` for each; none by default.
-
-    Raises:
-        InputError: If numbers of them differ, a simulator stands there twice, or an argument is wrong; nothing moved.
-        IntegrationError: If the integrator of one cannot go on; the others have stepped.
-    """
-    count = len(simulators)
-    forces: Sequence[ArrayLike | None] = [None] * count if fingertip_forces is None else fingertip_forces
-    for name, values in (("tensions", tensions), ("fingertip_forces", forces)):
-        if len(values) != count:
-            raise InputError(name, f"must be {count}, one per simulator", len(values))
-    if len({id(simulator) for simulator in simulators}) < count:
-        raise InputError("simulators", "must differ: one stands there twice; use clone")
-    steps = [each._check_step(inputs, dt, f) for each, inputs, f in zip(simulators, tensions, forces, strict=True)]
-    ends, statuses, active = [simulator.time + dt for simulator in simulators], [0] * count, [*range(count)]
-    for simulator, (command, _) in zip(simulators, steps, strict=True):
-        simulator._queue.add(simulator.time, command)
-    while active:
-        times = [simulators[k]._apply_inputs(steps[k][1], ends[k]) for k in active]
-        new_statuses = BatchStepper([simulators[k]._stepper for k in active]).advance(times)
-        for k, statuses[k] in zip(active, new_statuses, strict=True):
-            simulators[k]._log.add(simulators[k].time, simulators[k]._inputs, simulators[k]._force)
-        active = [k for k, time in zip(active, times, strict=True) if time < ends[k] and not statuses[k]]
-    return [simulator._state_after(status) for simulator, status in zip(simulators, statuses, strict=True)]
+def _check_method(entry: str, method: str) -> None:
+    if method not in TABLEAUS:
+        raise InputError(entry, f"must be one of {', '.join(TABLEAUS)}{suggestion(method, TABLEAUS)}", method)

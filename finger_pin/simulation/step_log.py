@@ -12,19 +12,17 @@ import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.palm import PalmPath
-from finger_pin.control.position_drive import PrescribedVoltages
-from finger_pin.control.user_controllers import Samples
-from finger_pin.core.signals.compiled_finger import CompiledFinger
+from finger_pin.control.position_drive import DriveSignals, PrescribedVoltages, SteppedGoals
+from finger_pin.control.user_controllers import Samples, choose_reference
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.simulation_settings import SimulationSettings
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.mechanism.finger import Finger
-from finger_pin.references.reference import Reference, SignalReference
+from finger_pin.references.reference import LoopReference, Reference, SignalReference
 from finger_pin.references.signal import Signal
 from finger_pin.simulation.accuracy import account_warning, residual_share
 from finger_pin.simulation.recording import check_memory, record
@@ -38,9 +36,10 @@ _SAME_TIME = 1e-9
 class StepLog:
     """The steps of a simulator since a start, in the order in which they were made."""
 
-    def __init__(self, stepper: Stepper) -> None:
-        """Create an empty log at the present time of a stepper."""
+    def __init__(self, stepper: Stepper, goals: SteppedGoals | None = None) -> None:
+        """Create an empty log at the present time of a stepper, and of the loops that it runs."""
         self._stepper, self._start_snapshot = stepper, stepper.state_snapshot
+        self._start_goals = None if goals is None else goals.copy(stepper)
         self._rows = array("d")
 
     @property
@@ -63,18 +62,20 @@ class StepLog:
 
     def result(
         self,
-        finger: Finger,
-        settings: dict[str, Any],
-        reference: Reference | Samples | None,
-        palm: PalmPath | None = None,
+        loop: ClosedLoop,
+        scenario: Scenario,
+        sample_rate: float,
+        reference: LoopReference | Reference | Samples | None,
+        goals: SteppedGoals | None = None,
     ) -> xr.Dataset:
         """Repeat the steps bit by bit, and return their signals.
 
         Args:
-            finger: The finger.
-            settings: As in ``simulation`` of a scenario, without the duration.
+            loop: What was stepped.
+            scenario: Its scenario.
+            sample_rate: Of the signals, Hz.
             reference: As for `simulate`; by default the posture at the start.
-            palm: Path of the palm, if it moves.
+            goals: The loops that have run, with their goals so far.
 
         Raises:
             InputError: If there are no steps yet, or a setting or the reference is wrong.
@@ -82,6 +83,7 @@ class StepLog:
         """
         if not self._rows:
             raise InputError("result", "is of steps, and there are none yet: call step")
+        finger = loop.finger
         tips = finger.mechanism.body.tips
         steps = np.array(self._rows).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
         stepper = self.start
@@ -89,30 +91,36 @@ class StepLog:
         inputs, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
         tension, channels = inputs.copy(), finger.actuators.voltages
         tension[:, channels] = 0.0
-        scenario = _scenario(finger.description, {"duration": float(knots[-1] - knots[0]), **settings})
+        duration = {"duration": float(knots[-1] - knots[0]), "sample_rate": sample_rate}
+        settings = validate(SimulationSettings, scenario.simulation.set_entries() | duration, ("simulation",))
+        scenario = scenario.updated(simulation=settings)
         check_memory(scenario.simulation, finger)
         if reference is None:
             posture = finger.layout.unpack(stepper.x).position
             rest_signal = Signal.from_held_values(knots[[0, -1]], posture[None])
             reference = SignalReference(rest_signal, PassiveCoupling(np.eye(joints), np.zeros(joints), ()))
+        drives: DriveSignals | None = None
+        if goals is not None and self._start_goals is not None:
+            drives = repeated = self._start_goals.repeating(goals)
+            stepper.drive(repeated.compiled)
+        elif len(channels):
+            drives = PrescribedVoltages(channels, Signal.from_held_values(knots, inputs[:, channels]))
         loop = replace(
-            ClosedLoop.from_scenario(scenario, reference=reference, finger=finger),
+            loop,
+            reference=choose_reference(reference, scenario, finger.routing),
             controller=OpenLoopTensions(Signal.from_held_values(knots, tension), finger.routing),
-            fingertip_force=np.zeros(3 if len(tips) == 1 else (len(tips), 3)),
-            varying_force=Signal.from_held_values(knots, force),
-            dynamics=CompiledFinger(finger),
-            palm=palm,
-            drives=PrescribedVoltages(channels, Signal.from_held_values(knots, inputs[:, channels]))
-            if len(channels)
-            else None,
+            drives=drives,
         )
+        if loop.varying_force is None:
+            held_force = Signal.from_held_values(knots, force)
+            loop = replace(loop, fingertip_force=0.0 * loop.fingertip_force, varying_force=held_force)
         controller = _RecordedInputs(stepper, knots, inputs, force)
         trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, controller=controller)
         # Rounding must not take a sample to the other side of a step's end, where other tensions act.
         times = knots[0] + scenario.sample_times()
         nearest_knot = knots[np.clip(np.searchsorted(knots, times - _SAME_TIME), 0, len(knots) - 1)]
         times = np.where(np.abs(nearest_knot - times) < _SAME_TIME, nearest_knot, times)
-        result = record(scenario, SampledTrajectory(loop, trajectory, times), str(settings["method"]))
+        result = record(scenario, SampledTrajectory(loop, trajectory, times), settings.method)
         result.attrs["custom"] = "loop"
         if trajectory.failure:
             end = float(trajectory.breakpoints[-1])
@@ -123,12 +131,12 @@ class StepLog:
         return result
 
 
-def _scenario(description: FingerDescription, settings: dict[str, Any]) -> Scenario:
-    """Return the scenario of a loop, in which tensions are given."""
+def stepped_scenario(description: FingerDescription, settings: SimulationSettings | dict[str, Any]) -> Scenario:
+    """Return the scenario of a finger that is stepped alone; of ``simulation`` some settings are given."""
     table = {
         "name": description.name,
         "title": f"{description.name} in a loop of one's own",
-        "finger": description,
+        **({"finger": description} if description.hand is None else {"hand": description.hand}),
         "controller": {"kind": "tensions"},
         "simulation": settings,
     }

@@ -50,7 +50,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
         ),
         "joint_reaction": Quantity(_JOINT, lambda run: run.finger.joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": Quantity(_JOINT, lambda run: run.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
-        "fingertip_force": Quantity(dims, _fingertip_force, "N", "force on the fingertip", "6"),
+        "fingertip_force": Quantity(dims, lambda run: run.force, "N", "force on the fingertip", "6"),
         "spring_torque": Quantity(_JOINT, lambda run: run.finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": Quantity(
             _JOINT, lambda run: run.finger.external_torque, "N m", "torque of the fingertip force", "6"
@@ -118,16 +118,15 @@ def _winding_variables(loop: ClosedLoop) -> dict[str, Quantity]:
 
     def angle(run: SampledTrajectory) -> Array:
         angles = np.zeros((len(run.times), len(actuators.names)))
-        goals = run.loop.spool_goals(run.times)
-        if goals is not None:
-            angles[:, actuators.holds] = goals
+        if run.spool_goals is not None:
+            angles[:, actuators.holds] = run.spool_goals
         return angles
 
     def length(run: SampledTrajectory) -> Array:
         lengths = np.zeros((len(run.times), len(routing.tendons)))
         winched = np.flatnonzero(routing.winched)
         lengths[:, winched] = run.control.tension[:, winched]
-        lengths[:, actuators.tendons] = run.loop.wound_lengths(angle(run))
+        lengths[:, actuators.tendons] = run.wound_lengths(angle(run))
         return lengths
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
@@ -177,11 +176,6 @@ def _contact_and_row_variables(loop: ClosedLoop) -> dict[str, Quantity]:
         for name, (dims, units, text) in contact_variables(loop.finger).items()
     }
     return table | extra_row_variables(loop.finger.extra_rows) | account_variables(loop.finger)
-
-
-def _fingertip_force(run: SampledTrajectory) -> Array:
-    force = run.loop.force(run.times)
-    return np.broadcast_to(force, (len(run.times), *run.loop.fingertip_force.shape))
 
 
 def _shortfall(run: SampledTrajectory) -> Array:

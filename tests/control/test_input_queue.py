@@ -8,7 +8,7 @@ import finger_pin as fp
 from finger_pin.control.input_queue import InputQueue
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
-from finger_pin.simulation.simulator import step_many
+from finger_pin.simulation.simulators import step_many
 from finger_pin.views.playground.session import Session
 
 DELAY = 0.05

@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.learning import Choice, Environment, LogUniform, Normal, Sensor, Uniform, VectorEnvironment, per_world
-from finger_pin.learning.snapshot import instant_variables
+from finger_pin.simulation.simulators import instant_variables
 
 COARSE = {"simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
 FIG6 = fp.load_scenario("reversals", COARSE)

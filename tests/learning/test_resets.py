@@ -34,14 +34,14 @@ def test_drawn_friction_of_an_imported_hand_asks_for_no_closure_and_keeps_the_st
     for seed in range(3):
         _, info = environment.reset(seed=seed)
         frictions.add(info["drawn"]["finger.tendon_friction.coulomb"])
-        structures.add(id(compile_mechanism(world.origin.finger.mechanism)[0]))
+        structures.add(id(compile_mechanism(world.simulator.finger.mechanism)[0]))
     assert (len(frictions), len(structures)) == (3, 1)
 
 
 def is_free(world, position):
-    scene = world.origin.finger.scene
+    scene = world.simulator.finger.scene
     try:
-        scene.check(world.origin.finger.layout.unpack(world.origin.rest_state(position, np.zeros(len(position)))))
+        scene.check(world.simulator.finger.layout.unpack(world.simulator.finger.rest_state(position)))
     except InputError:
         return False
     return True
@@ -52,12 +52,12 @@ def test_an_episode_starts_at_the_nearest_free_posture_towards_the_reference_whe
     """Both fingers are bent through the ball between them."""
     monkeypatch.setattr("finger_pin.learning.world._WAY_STEPS", steps)
     scenario = fp.load_scenario("grasp", {f"simulation.{name}": value for name, value in COARSE.items()})
-    reference = Environment(scenario, reward=nothing)._worlds.worlds[0].origin.reference.at(0.0).position
+    reference = Environment(scenario, reward=nothing)._worlds.worlds[0].simulator.loop.reference.at(0.0).position
     bent = reference + 1.0
     environment = Environment(scenario, reward=nothing, start=lambda random: bent)
     environment.reset(seed=1)
     world = environment._worlds.worlds[0]
-    start = world.origin.finger.layout.unpack(world.stepper.x).position
+    start = world.simulator.state.position
     free = [share for share in np.arange(steps + 1) / steps if is_free(world, bent + share * (reference - bent))]
     assert free[0] > 0.0
     np.testing.assert_allclose(start, bent + free[0] * (reference - bent), atol=1e-12)

@@ -81,5 +81,5 @@ def test_a_motor_of_two_cords_can_be_told_to_wind_in_the_one_that_needs_more():
     """Pulleys of 10 and 4 mm turn by 6 rad on spools of 5 mm: 12 and 4.8 rad, and 20 N stretch a cord by 0.2 rad."""
     made = together(SMOOTH, [0.010, 0.004], spool_radius=0.005, winds=["in", "in"], drive="position")
     coupling = PassiveCoupling(np.eye(2), np.zeros(2), ())
-    told = Action("motor_position", made, 1.0, made, coupling)
+    told = Action("motor_position", made, made, coupling)
     np.testing.assert_allclose([told.low, told.high], [[-12.0], [12.2]], rtol=1e-12)

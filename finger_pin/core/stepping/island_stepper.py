@@ -210,7 +210,7 @@ class IslandIntegrator:
     def with_loads(self, loaded: bool) -> IslandIntegrator:
         """Return the same integrator with or without forces at the tips."""
         pack = self._bound
-        return IslandIntegrator(
+        twin = IslandIntegrator(
             self.island,
             self.laws,
             self.structure,
@@ -223,6 +223,8 @@ class IslandIntegrator:
             pack.atol,
             self._memory,
         )
+        twin.drives, twin.knots, twin.steps = self.drives, self.knots, self.steps
+        return twin
 
     @property
     def state_snapshot(self) -> tuple[Array, ...]:

@@ -169,7 +169,8 @@ class Stepper:
                     sample_count=drives.sample_count.copy(),
                 )
                 if drives.sample_count[0]:
-                    part.control.tension[part.drives.channels[motors]] = drives.voltages[0, motors]
+                    latest = min(drives.sample_count[0], len(drives.voltages)) - 1
+                    part.control.tension[part.drives.channels[motors]] = drives.voltages[latest, motors]
 
     def end_steps_at(self, knots: Array) -> None:
         """End steps at these times from now on, s, positive, in order: inputs bend or jump there."""

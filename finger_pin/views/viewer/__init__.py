@@ -16,13 +16,13 @@ from finger_pin.views.viewer.drawing import draw
 from finger_pin.views.viewer.page_server import PageHandle, view, view_forces
 
 if TYPE_CHECKING:
-    from finger_pin.views.viewer.video import write_video
+    from finger_pin.views.viewer.video import draw_picture, write_video
 
-__all__ = ["PageHandle", "draw", "view", "view_forces", "write_animation", "write_video"]
+__all__ = ["PageHandle", "draw", "draw_picture", "view", "view_forces", "write_animation", "write_video"]
 
 
 def __getattr__(name: str) -> Any:
     """Import names that need matplotlib on first use."""
-    if name == "write_video":
-        return import_module("finger_pin.views.viewer.video").write_video
+    if name in ("draw_picture", "write_video"):
+        return getattr(import_module("finger_pin.views.viewer.video"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
