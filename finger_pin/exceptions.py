@@ -53,6 +53,10 @@ class ClosureWarning(ScenarioWarning):
     """A finger whose tendons run along paths loses force closure somewhere in its range."""
 
 
+class PathJumpWarning(ScenarioWarning):
+    """The length of a cord jumps where its path changes sides: what pulls it against that place cannot go on."""
+
+
 class SelfLockingWarning(ScenarioWarning):
     """A scenario comes close to the joint friction at which its finger locks itself, or exceeds it."""
 

@@ -9,6 +9,7 @@ from finger_pin.analysis.inverse_kinematics import TipPosture, inverse_kinematic
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
 from finger_pin.analysis.locking_margin import SelfLockingMargin, locking_advice, quick_margin, self_locking_margin
+from finger_pin.analysis.path_jumps import PathJump, path_jumps
 from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.analysis.settled_postures import settled_posture
@@ -23,6 +24,7 @@ __all__ = [
     "Equilibrium",
     "ForcePolytope",
     "Friction",
+    "PathJump",
     "RequiredTension",
     "SelfLockingMap",
     "SelfLockingMargin",
@@ -38,6 +40,7 @@ __all__ = [
     "largest_force",
     "locking_advice",
     "locking_over_range",
+    "path_jumps",
     "posed",
     "quick_margin",
     "rubbing_cords",

@@ -138,7 +138,9 @@ class _Statics:
         for table in finger.mechanism.rows:
             if table.group in (STATEFUL, MUSCLES):
                 # Lags have settled; the input's limits are those of an activation as well.
-                limits = [4, 5, -2, -1] if table.group == STATEFUL else [-2, -1, -2, -1]
+                of_input = ("lowest", "highest")
+                of_state = ("least_state", "most_state") if table.group == STATEFUL else of_input
+                limits = [table.law.parameters.index(name) for name in (*of_input, *of_state)]
                 lower_input, upper_input, lowest, highest = table.parameters[limits]
                 inputs = np.clip(command[table.channels], lower_input, upper_input)
                 actuator_state[: table.count] = np.clip(inputs, lowest, highest)

@@ -9,6 +9,8 @@ of a driven tendon then delivers f = f^a exp(-mu_e phi) - drag / (1 + mu^d) when
 Micro-damping depends on the normal force, which by (14) depends on the delivered tension, which depends on
 micro-damping. Near slack that loop has two solutions where bristles spring back, so it is not closed: the tension in
 (14) is max(0, f^a - F^s - b v), as it is without micro-damping.
+
+Bristles that give by a length slip as `bristle_slip` says, so that it is the capstan law while the pull changes, too.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from finger_pin.laws.bristle import (
     stiction_rate,
     stiction_rate_slopes,
 )
+from finger_pin.laws.bristle_slip import slip_level, slip_level_slopes, slip_steepness, slip_steepness_slope
 from finger_pin.laws.law import Law, Row, direction, magnitude
 from finger_pin.typing import Number, Numbers, Numeric, Parameters
 
@@ -105,34 +108,57 @@ def _level(normal: Number, sliding: Number, row: Row, p: Parameters) -> Number:
     return friction_level(1.0, normal * sliding + p[BRISTLE.drag], np.maximum(p[BRISTLE.floor], least_level))
 
 
+def _friction(row: Row, normal: Number, p: Parameters) -> Numbers:
+    """Return the rate of F^s under a normal force, the friction, mu^d, M(v) and the level."""
+    surface, ratio, base_stiffness, viscous, stribeck, _, exponent, _, hardening = p[:9]
+    coefficient = capstan_coefficient(surface, row.curvature)
+    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
+    level = _level(normal, sliding, row, p)
+    slips_at = slip_level(row.state, level, slip_steepness(coefficient, hardening))
+    stiffness = bristle_stiffness(row.state, base_stiffness, hardening)
+    rate = stiction_rate(row.state, row.speed, slips_at, stiffness, row.side)
+    loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
+    return rate, loss, coefficient, sliding, level
+
+
 def _rate_slopes(
     row: Row, normal: Number, coefficient: Number, sliding: Number, level: Number, p: Parameters
 ) -> Numbers:
-    """Return the derivatives of F^s' by v, F^s, F^n and phi."""
+    """Return the derivatives of F^s' by v, F^s, F^n and phi, and of the micro-damping's force by F^s, negative."""
     surface, ratio, base_stiffness, viscous, stribeck, floor, exponent, _, hardening, _ = p[:10]
     stiffness, speed = bristle_stiffness(row.state, base_stiffness, hardening), magnitude(row.speed, row.side)
-    by_stiction, by_speed, by_free = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side, hardening)
+    steepness = slip_steepness(coefficient, hardening)
+    slips_at = slip_level(row.state, level, steepness)
+    slips_by_stiction, slips_by_level, slips_by_steepness = slip_level_slopes(row.state, level, steepness)
+    by_stiction, by_speed, by_slip = stiction_rate_slopes(
+        row.state, row.speed, slips_at, stiffness, row.side, hardening
+    )
+    by_stiction, by_free = by_stiction + by_slip * slips_by_stiction, by_slip * slips_by_level
     level_per_speed, level_slope = _least_level_per_speed(stiffness, viscous), _least_level_slope(stiffness, viscous)
     limited = 1.0 * (level > floor) * (level <= level_per_speed * speed)
     by_stiction = by_stiction + limited * by_free * speed * level_slope * hardening * np.sign(row.state)
     by_speed = by_speed + limited * by_free * level_per_speed * direction(row.speed, row.side)
     by_level = by_free * (level > floor) * (1.0 - limited)
     slope = friction_coefficient_slope(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
-    # M is proportional to mu^d, which depends on the posture through the curvature.
+    # M is proportional to mu^d, which depends on the posture through the curvature, as s does.
     share = sliding / np.maximum(coefficient, 1e-300)
-    by_curvature = by_level * normal * share * capstan_slope(surface, coefficient)
-    return by_speed + by_level * normal * slope, by_stiction, by_level * sliding, by_curvature
+    by_steepness = by_slip * slips_by_steepness * slip_steepness_slope(coefficient, hardening)
+    by_curvature = (by_level * normal * share + by_steepness) * capstan_slope(surface, coefficient)
+    micro = micro_slope(row, slips_at, p)
+    return by_speed + by_level * normal * slope, by_stiction, by_level * sliding, by_curvature, micro
+
+
+def _account(row: Row, rate: Number, coefficient: Number, level: Number, p: Parameters) -> Numbers:
+    """Return `row_account`, with what bristles lose that slip by `slip_level`."""
+    steepness = slip_steepness(coefficient, p[BRISTLE.hardening])
+    return row_account(row, rate, slip_level(row.state, level, steepness), p)
 
 
 def _driven_value(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, base_stiffness, viscous, stribeck, _, exponent, _, hardening, _, acting = p
-    coefficient = capstan_coefficient(surface, row.curvature)
-    pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
+    acting = p[10]
+    pressing = delivered_tension(row.command, friction_force(row.state, row.speed, p[BRISTLE.viscous]))
     normal = np.abs(pressing) + np.abs(row.command)
-    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
-    level = _level(normal, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, base_stiffness, hardening), row.side)
-    loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
+    rate, loss, coefficient, sliding, level = _friction(row, normal, p)
     force = delivered_tension(row.command, loss) - acting * row.command
     return force, rate, loss, normal, coefficient, sliding, level, pressing
 
@@ -140,42 +166,37 @@ def _driven_value(row: Row, p: Parameters) -> Numbers:
 def _driven_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     (_, _, _, viscous, _, _, _, _, _, _, acting), lag = p, micro_lag(row.state, p)
     loss, normal, coefficient, sliding, level, pressing = signals
-    by_speed, by_stiction, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
+    by_speed, by_stiction, by_normal, by_curvature, micro = _rate_slopes(row, normal, coefficient, sliding, level, p)
     taut = 1.0 * (delivered_tension(row.command, loss) > 0.0)
     pressed = by_normal * (pressing > 0.0)
     by_command = pressed + by_normal * (1.0 - 2.0 * (row.command < 0.0))
-    by_state = taut * (micro_slope(row, level, p) - 1.0)
+    by_state = taut * (micro - 1.0)
     force = (0.0, -taut * viscous, by_state, -taut * lag, 0.0, taut - acting, 0.0)
     return force, (0.0, by_speed - pressed * viscous, by_stiction - pressed, 0.0, by_command, by_curvature)
 
 
 def _driven_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
     _, _, _, _, _, _, _, _, _, _, acting = p
-    stored, coulomb, viscous, micro = row_account(row, rate, signals[4], p)
+    stored, coulomb, viscous, micro = _account(row, rate, signals[2], signals[4], p)
     # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
     slack = (row.command - signals[0]) * row.speed * (row.command <= signals[0])
     return stored, (1.0 - acting) * row.command * row.speed, coulomb, viscous, micro, slack
 
 
 def _passive_value(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, base_stiffness, viscous, stribeck, _, exponent, _, hardening, _ = p
-    coefficient = capstan_coefficient(surface, row.curvature)
-    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
-    level = _level(row.load, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, base_stiffness, hardening), row.side)
-    loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
+    rate, loss, coefficient, sliding, level = _friction(row, row.load, p)
     return -loss, rate, loss, row.load, coefficient, sliding, level
 
 
 def _passive_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
     _, normal, coefficient, sliding, level = signals
-    by_speed, by_stiction, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
-    force = (0.0, -p[BRISTLE.viscous], micro_slope(row, level, p) - 1.0, -micro_lag(row.state, p), 0.0, 0.0, 0.0)
+    by_speed, by_stiction, by_normal, by_curvature, micro = _rate_slopes(row, normal, coefficient, sliding, level, p)
+    force = (0.0, -p[BRISTLE.viscous], micro - 1.0, -micro_lag(row.state, p), 0.0, 0.0, 0.0)
     return force, (0.0, by_speed, by_stiction, by_normal, 0.0, by_curvature)
 
 
 def _passive_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    return row_account(row, rate, signals[4], p)
+    return _account(row, rate, signals[2], signals[4], p)
 
 
 _PARAMETERS = ("surface", "ratio", *BRISTLE._fields)
@@ -210,18 +231,13 @@ PASSIVE_FRICTION = Law(
 
 
 def _canal_value(row: Row, p: Parameters) -> Numbers:
-    surface, ratio, base_stiffness, viscous, stribeck, _, exponent, _, hardening, _, one_way = p
     # Lowest tension: tendons that cannot push end at zero.
-    lowest = -_UNLIMITED_FORCE * (one_way <= 0.0)
+    lowest = -_UNLIMITED_FORCE * (p[10] <= 0.0)
     tension = np.maximum(row.command, lowest)
-    coefficient = capstan_coefficient(surface, row.curvature)
-    delivered = tension - friction_force(row.state, row.speed, viscous)
+    delivered = tension - friction_force(row.state, row.speed, p[BRISTLE.viscous])
     pressing = np.maximum(delivered, lowest)
     normal = np.abs(pressing) + np.abs(tension)
-    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
-    level = _level(normal, sliding, row, p)
-    rate = stiction_rate(row.state, row.speed, level, bristle_stiffness(row.state, base_stiffness, hardening), row.side)
-    loss = friction_force(row.state, row.speed, viscous, rate, micro_lag(row.state, p))
+    rate, loss, coefficient, sliding, level = _friction(row, normal, p)
     force = np.maximum(-loss, lowest - tension)
     return force, rate, loss, normal, coefficient, sliding, level, pressing
 
@@ -230,19 +246,19 @@ def _canal_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, N
     _, _, _, viscous, _, _, _, _, _, _, one_way_flag = p
     lag, one_way = micro_lag(row.state, p), 1.0 * (one_way_flag > 0.0)
     loss, normal, coefficient, sliding, level, pressing = signals
-    by_speed, by_stiction, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
+    by_speed, by_stiction, by_normal, by_curvature, micro = _rate_slopes(row, normal, coefficient, sliding, level, p)
     pulled = 1.0 - one_way * (row.command <= 0.0)
     tension = pulled * row.command
     taut = 1.0 - one_way * (loss >= tension)
     pressed = by_normal * np.sign(pressing)
     by_command = pulled * (pressed + by_normal * np.sign(tension))
-    by_state = taut * (micro_slope(row, level, p) - 1.0)
+    by_state = taut * (micro - 1.0)
     force = (0.0, -taut * viscous, by_state, -taut * lag, 0.0, pulled * (taut - 1.0), 0.0)
     return force, (0.0, by_speed - pressed * viscous, by_stiction - pressed, 0.0, by_command, by_curvature)
 
 
 def _canal_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    stored, coulomb, viscous, micro = row_account(row, rate, signals[4], p)
+    stored, coulomb, viscous, micro = _account(row, rate, signals[2], signals[4], p)
     return stored, coulomb, viscous, micro, -(signals[0] + force) * row.speed
 
 

@@ -37,6 +37,26 @@ def capstan(surface: float, turn: float) -> float:
     return loss / (2.0 - loss)
 
 
+def bristle_stiffness(
+    stiffness: float, hardening: float, force: float, level: float, speed: float, surface: float, turn: float
+) -> float:
+    """Return the stiffness with which bristles that slip by F^s / level move as they do by `laws.bristle_slip`.
+
+    With a = 1 where they are bent further and -1 where they spring back, that at F^s times (1 - a g) / (1 - a r).
+    """
+    if hardening == 0.0:
+        return stiffness
+    kinetic, share = capstan(surface, turn), abs(force) / level
+    steepness = 1.0 / max((1.0 - kinetic) * (1.0 + kinetic), 1e-6)
+    slack = max(1.0 - share, 0.0)
+    if force * speed > 0.0:
+        factor = steepness / (1.0 + (steepness - 1.0) * slack)
+    else:
+        slip = min(share, 1.0) / (1.0 + (steepness - 1.0) * slack) + steepness * max(share - 1.0, 0.0)
+        factor = (1.0 + slip) / (1.0 + share)
+    return (stiffness + hardening * abs(force)) * factor
+
+
 def slide(force: float, displacement: float, level: float) -> tuple[float, float]:
     """Return the change of F^s by (9a) over s0 v dt at this speed and level, exactly, and the share that is left."""
     slipped = one_minus_exp(abs(displacement) / level)

@@ -16,7 +16,7 @@ from finger_pin.core.jit import Pointer, njit_inline, scratch
 from finger_pin.exchange.mujoco_friction import BRANCH, ELEMENT, MASS, PIN, SIGNAL, SIGNALS
 from finger_pin.mujoco.constraint_rows import TERM, TERMS, row_forces, write_rows
 from finger_pin.mujoco.elements import LawInputs, mass_inputs, pin_inputs, tendon_inputs
-from finger_pin.mujoco.friction_step import NUMERICAL_FLOOR, row_terms, slide, sliding_level
+from finger_pin.mujoco.friction_step import NUMERICAL_FLOOR, bristle_stiffness, row_terms, slide, sliding_level
 from finger_pin.mujoco.layout import Contact, Data, Kinds, Model
 from finger_pin.mujoco.loads import actuator_forces, constraint_tensions, contact_loads
 from finger_pin.mujoco.memory import (
@@ -34,7 +34,7 @@ from finger_pin.mujoco.memory import (
 
 _LOW_WORD = 0xFFFFFFFF
 
-_level, _law, _slide = map(inlined, (sliding_level, row_terms, slide))
+_level, _law, _slide, _stiffness = map(inlined, (sliding_level, row_terms, slide, bristle_stiffness))
 
 
 @njit_inline
@@ -138,6 +138,12 @@ def compute(m: int, d: int, instance: int, model: Model, data: Data, kinds: Kind
 
 
 @njit_inline
+def _bristles_at(p: Pointer, force: float, level: float, speed: float, turn: float) -> float:
+    """Return the stiffness of a friction's bristles; pins have no turn."""
+    return _stiffness(p[ELEMENT.stiffness], p[ELEMENT.hardening], force, level, speed, p[ELEMENT.coulomb], turn)
+
+
+@njit_inline
 def _law_terms(
     p: Pointer, of_pin: bool, inputs: LawInputs, force: float, dt: float
 ) -> tuple[float, float, float, float]:
@@ -155,7 +161,7 @@ def _law_terms(
         pressing,
         turn,
     )
-    stiffness = p[ELEMENT.stiffness] + p[ELEMENT.hardening] * abs(force)
+    stiffness = _bristles_at(p, force, level, speed, turn)
     pull, damp, limit = _law(
         level, stiffness, p[ELEMENT.viscous], p[ELEMENT.micro_damping], speed, tension, largest, force, dt
     )
@@ -202,7 +208,8 @@ def advance(m: int, d: int, instance: int, model: Model, data: Data, contact: Co
         if kind != PIN and states[signal + SIGNAL.load] == 0.0 and max(level, abs(bristle)) <= NUMERICAL_FLOOR:
             # A tendon that is slack: its bristles stand up, so that the next step need not ask for them.
             bristle = speed = 0.0
-        stiffness = values[e + ELEMENT.stiffness] + values[e + ELEMENT.hardening] * abs(bristle)
+        turn = states[signal + SIGNAL.turn]
+        stiffness = _bristles_at(numbers(m, model.tuple_objprm, e), bristle, level, speed, turn)
         act[z] = bristle + _slide(bristle, stiffness * dt * speed, level)[0]
         if kind == PIN:
             load_indices[objects[e]], pins = x, True

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.analysis.path_jumps import path_jump_advice
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.position_drive import LoopMemory
 from finger_pin.description.validation import finite_vector
@@ -25,6 +26,9 @@ from finger_pin.typing import Array
 _STOPS = {"limiter": "joint", "tendon_limit": "cord"}
 # Energy in a stop that a start does not mention, J: 0.4 deg of the default stop; where (20) leads a joint is nearer.
 _LEAST_ENERGY = 1e-3
+# Part of a joint's range within which a jump of a path is why a motion ends.
+_NEAR_JUMP = 0.02
+_ADVICE = "smaller inputs, softer contacts, stops and tendons, or another rtol"
 
 
 def custom_parts(
@@ -186,3 +190,14 @@ def warn_beyond_ranges(finger: Finger, x: Array) -> None:
     """Warn of joints and cords that start beyond their ranges, before their stops throw them back."""
     if beyond := beyond_ranges(finger, x):
         warnings.warn(StartWarning(f"{finger.description.name} starts beyond its ranges: {beyond}"), stacklevel=3)
+
+
+def failure_advice(finger: Finger, reason: str, x: Array, otherwise: str = _ADVICE) -> str:
+    """Return advice for a motion that has ended at a packed state, shape (size,), for a reason."""
+    if jumps := path_jump_advice(finger, finger.layout.unpack(x).position, _NEAR_JUMP):
+        return f"another path: {jumps}"
+    if "physical range" in reason:
+        return "smaller inputs or gains, heavier links, or a start within the joints' ranges"
+    if beyond := beyond_ranges(finger, x):
+        return f"a start within the ranges, smaller inputs, or softer stops: {beyond}"
+    return otherwise

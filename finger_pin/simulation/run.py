@@ -11,6 +11,7 @@ import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
+from finger_pin.analysis.path_jumps import path_jump_advice
 from finger_pin.analysis.weight import weight_advice
 from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.control.build import closure_advice
@@ -24,6 +25,7 @@ from finger_pin.exceptions import (
     IntegrationError,
     Interrupted,
     MicroDampingWarning,
+    PathJumpWarning,
     SelfLockingWarning,
 )
 from finger_pin.simulation.accuracy import (
@@ -75,6 +77,9 @@ def run(
         warnings.warn(closure_message, ClosureWarning, stacklevel=5)
     setup = Setup.from_scenario(scenario, loop, custom, control_period)
     loop = setup.loop
+    jump_message = path_jump_advice(loop.finger, loop.finger.layout.unpack(loop.initial_state()).position)
+    if jump_message:
+        warnings.warn(jump_message, PathJumpWarning, stacklevel=5)
     if setup.touch_warning:
         warnings.warn(setup.touch_warning, AccuracyWarning, stacklevel=5)
 
@@ -104,6 +109,7 @@ def run(
         "self_locking": locking_message,
         "micro_damping": damping_message,
         "closure": closure_message,
+        "path_jump": jump_message,
         "weight": weight_advice(loop.finger) if loop.palm is None else "",
         "accuracy": stiffness_message,
         "account": account_message,

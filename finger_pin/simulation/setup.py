@@ -23,14 +23,13 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.accuracy import CHUNK_STEPS, ringing_warning
-from finger_pin.simulation.initial_state import beyond_ranges, check_motors, warn_beyond_ranges
+from finger_pin.simulation.initial_state import beyond_ranges, check_motors, failure_advice, warn_beyond_ranges
 
 #: What to try where an integrator cannot go on.
 ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
 _TIGHT_TOLERANCE = 1e-8
 _ROUNDING_ADVICE = "a larger simulation.rtol and simulation.atol_scale, or softer contacts and tendons"
-_RUNAWAY_ADVICE = "a smaller controller.gain, heavier links, or a start within the joints' ranges"
 _METHOD_WITHOUT_SAMPLING = "Radau"
 #: Steps between two looks at a compiled simulation that is observed.
 OBSERVED_CHUNK = 4
@@ -218,8 +217,8 @@ class Setup:
         if controller.problem_time >= trajectory.breakpoints[-1]:
             return controller.problem, "another controller"
         advice = _ROUNDING_ADVICE if min(settings.rtol, settings.atol_scale) < _TIGHT_TOLERANCE else ADVICE
-        if "physical range" in trajectory.failure:
-            advice = _RUNAWAY_ADVICE
-        if beyond := beyond_ranges(self.loop.finger, self.loop.initial_state()):
+        end = trajectory.interpolate(trajectory.breakpoints[-1:])[0]
+        advice = failure_advice(self.loop.finger, trajectory.failure, end, advice)
+        if "jumps" not in advice and (beyond := beyond_ranges(self.loop.finger, self.loop.initial_state())):
             advice = f"a start within the ranges: {beyond}"
         return f"{trajectory.failure}; {cause}" if cause else trajectory.failure, advice

@@ -75,6 +75,7 @@ def simulate(
         SelfLockingWarning: If the joints' friction comes close to what locks the finger on the scenario's reference;
             the result's attribute ``self_locking_margin`` says how close, not so with a custom controller or reference.
         ClosureWarning: If tendons along paths lose force closure within the joints' ranges.
+        PathJumpWarning: If the length of a cord jumps within a joint's range.
         SlowRunWarning: After ten seconds of a run that has as long before it and is slower than a tenth of real time.
         AccuracyWarning: If a contact is stiffer than what the tolerances tell, or a method may pass over touches.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.

@@ -26,11 +26,9 @@ from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.held_inputs import HeldInputs
-from finger_pin.simulation.initial_state import as_finite_array, check_motors, warn_beyond_ranges
+from finger_pin.simulation.initial_state import as_finite_array, check_motors, failure_advice, warn_beyond_ranges
 from finger_pin.simulation.step_log import StepLog, stepped_scenario
 from finger_pin.typing import Array
-
-_ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 
 
 class Simulator:
@@ -257,7 +255,8 @@ class Simulator:
     def _state_after_step(self) -> State:
         """Return the state after a step, unless it failed."""
         if self.failure:
-            raise IntegrationError(self.time, self.failure, _ADVICE)
+            advice = failure_advice(self.finger, self.failure, self._stepper.x)
+            raise IntegrationError(self.time, self.failure, advice)
         return self.finger.layout.unpack(self._stepper.x)
 
     def result(self, *, sample_rate: float = 1000.0, reference: Reference | Samples | None = None) -> xr.Dataset:

@@ -20,7 +20,10 @@ from finger_pin.views.shown_units import actuators_by_unit, joints_by_unit
 
 _SETTLING_TIME = 1.0
 _LONG_RUN = 2.0
-_WARNINGS = ("interrupted", "self_locking", "micro_damping", "closure", "weight", "accuracy", "account", "ringing")
+_WARNINGS = (
+    *("interrupted", "self_locking", "micro_damping", "closure", "path_jump", "weight", "accuracy", "account"),
+    "ringing",
+)
 # The least speed of sliding, m/s.
 _LEAST_SLIDING_SPEED = 1e-6
 

@@ -1,5 +1,6 @@
 """Postures that are looked for: that of a fingertip at a point, and that in which a finger rests."""
 
+import mujoco
 import numpy as np
 import pytest
 from closed_kinematics import equation_1
@@ -70,3 +71,16 @@ def test_a_finger_with_a_passive_tendon_rests_and_what_cannot_is_told():
         equilibrium(finger, [1.0, -1.0, 1.0, 1.0])
     with pytest.raises(fp.InputError, match=r"ideal sources .* it has actuators \(M1, M2, M3, M4\)"):
         equilibrium(fp.Finger(fp.load_scenario("servo").finger), np.ones(4))
+
+
+@pytest.mark.parametrize("slew", [None, 1.2])
+def test_actuators_with_a_lag_rest_where_their_settled_force_bends_the_spring(slew):
+    """Whatever their slew, k theta = g u with u within its limits: 0.5 x 0.3 / 0.6, and 0.5 x 0.4 / 0.6 beyond them."""
+    read = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><body><joint name="hinge" axis="0 0 1" stiffness="0.6"/>
+    <geom size="0.01" mass="0.1"/></body></worldbody><actuator><general name="late" joint="hinge" dyntype="filterexact"
+    dynprm="0.1" gainprm="0.5" ctrllimited="true" ctrlrange="-0.4 0.4"/></actuator></mujoco>""")
+    finger = fp.from_mujoco(read)
+    actuators = {"late": finger.tree.actuators["late"].updated(slew=slew)}
+    finger = finger.updated(tree=finger.tree.updated(actuators=actuators))
+    for command, angle in ((0.3, 0.25), (-2.0, -1.0 / 3.0)):
+        assert equilibrium(finger, {"late": command}).position[0] == pytest.approx(angle, abs=1e-9)

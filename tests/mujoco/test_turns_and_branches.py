@@ -3,9 +3,14 @@
 import math
 
 import mujoco
+import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.laws.bristle import stiction_rate
+from finger_pin.laws.bristle_slip import slip_level, slip_steepness
+from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.mujoco.friction_step import bristle_stiffness
 
 SLIDER = """<body name="{name}" pos="{place}"><joint name="{name}" type="slide" axis="{axis}" damping="2"
 stiffness="200"/><geom size="0.006" mass="0.05"/><site name="{name}_tip"/></body>"""
@@ -64,3 +69,16 @@ def test_branches_behind_a_pulley_rub_by_their_own_bend_at_their_own_tension():
     left = math.exp(-0.25 * 0.5 * math.pi)
     assert signals.turn == pytest.approx([0.5 * math.pi, 0.0, 0.5 * math.pi, math.pi], abs=1e-6)
     assert forces == pytest.approx([8.0 * left / 2, 8.0 * left**2 / 3, 8.0 * left**3 / 4], rel=0.02)
+
+
+def test_bristles_in_the_step_move_at_the_rate_of_our_core():
+    """At any force, speed and turn: the step's stiffness times (v - F |v| / level) is (9a) with `slip_level`."""
+    rng = np.random.default_rng(5)
+    for share, speed, turn in zip(
+        rng.uniform(-2.5, 2.5, 200), rng.normal(size=200), rng.uniform(0.0, 20.0, 200), strict=True
+    ):
+        force, steepness = 3.0 * share, slip_steepness(capstan_coefficient(0.4, turn), 5e5)
+        expected = stiction_rate(force, speed, slip_level(force, 3.0, steepness), 5e4 + 5e5 * abs(force))
+        found = bristle_stiffness(5e4, 5e5, force, 3.0, speed, 0.4, turn) * (speed - force * abs(speed) / 3.0)
+        assert found == pytest.approx(expected, rel=1e-9)
+    assert bristle_stiffness(5e4, 0.0, 2.0, 3.0, 0.1, 0.4, 9.0) == 5e4

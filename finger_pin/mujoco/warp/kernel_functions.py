@@ -24,6 +24,7 @@ coefficient, one_minus_exp, delivered = (
     _compiled(each, {}) for each in (friction_step.coefficient, friction_step.one_minus_exp, friction_step.delivered)
 )
 capstan = _compiled(friction_step.capstan, {"one_minus_exp": one_minus_exp})
+bristle_stiffness = _compiled(friction_step.bristle_stiffness, {"capstan": capstan})
 slide = _compiled(friction_step.slide, {"one_minus_exp": one_minus_exp})
 sliding_level = _compiled(friction_step.sliding_level, {"coefficient": coefficient, "capstan": capstan})
 row_terms = _compiled(friction_step.row_terms, {"slide": slide})

@@ -32,6 +32,15 @@ _NEVER, _NUMERICAL = wp.constant(NEVER), wp.constant(NUMERICAL_FLOOR)
 _UNLIMITED = wp.constant(1e30)
 
 
+@wp.func
+def _stiffness(s: State, w: int, f: int, bristle: float, level: float, speed: float, turn: float) -> float:
+    """Return the stiffness of a friction's bristles; pins have no turn."""
+    law = s.law
+    return kernel_functions.bristle_stiffness(
+        law[LAW.stiffness, w, f], law[LAW.hardening, w, f], bristle, level, speed, law[LAW.coulomb, w, f], turn
+    )
+
+
 @wp.kernel
 def finish_step(t: Table, s: State, x: TendonInputs) -> None:
     """Finish the last step where time has gone on: bristles by (9a), and loads; forget all where it has gone back."""
@@ -55,8 +64,9 @@ def finish_step(t: Table, s: State, x: TendonInputs) -> None:
             # A tendon that is slack: its bristles stand up.
             bristle, speed = float(0.0), float(0.0)
         dt = x.timestep[w % x.timestep.shape[0]]
-        stiffness = s.law[LAW.stiffness, w, f] + s.law[LAW.hardening, w, f] * wp.abs(bristle)
-        change, _left = kernel_functions.slide(bristle, stiffness * dt * speed * t.ratio[f], level)
+        speed *= t.ratio[f]
+        stiffness = _stiffness(s, w, f, bristle, level, speed, s.signals[SIGNAL.turn, w, f])
+        change, _left = kernel_functions.slide(bristle, stiffness * dt * speed, level)
         s.memory[w, f, MEMORY.bristle] = bristle + change
         for k in range(MEMORY.constraint_tension, _MEMORIES):
             s.memory[w, f, k] = s.following[w, f, k]
@@ -91,7 +101,7 @@ def _write_terms(t: Table, s: State, w: int, f: int, inputs: wp.vec4, largest: f
         inputs[2],
         turn,
     )
-    stiffness = law[LAW.stiffness, w, f] + law[LAW.hardening, w, f] * wp.abs(inputs[3])
+    stiffness = _stiffness(s, w, f, inputs[3], level, inputs[0], turn)
     pull, damp, limit = kernel_functions.row_terms(
         level,
         stiffness,

@@ -1,0 +1,130 @@
+"""Places where the length of a path jumps: where a wrap changes sides, or comes and goes at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from finger_pin.description.validation import finite_vector
+from finger_pin.mechanism.coerce import FingerLike, as_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.path_elements import PathTerm, path_kinematics
+from finger_pin.typing import Array
+
+# Postures of a joint that are compared, steps of bisection between two of them, and the smallest jump, m.
+_POSTURES, _HALVINGS, _LEAST = 61, 36, 1e-5
+
+
+class PathJump(NamedTuple):
+    """A jump of a cord's length as one joint turns.
+
+    Attributes:
+        cord: Name of the tendon.
+        wrap: Name of the waypoint over which its path jumps.
+        joint: Name of the joint.
+        position: Of the joint, rad or m.
+        size: How much longer the cord is beyond, m.
+    """
+
+    cord: str
+    wrap: str
+    joint: str
+    position: float
+    size: float
+
+    def __str__(self) -> str:
+        """Return the jump in one clause."""
+        return f"{self.cord} over {self.wrap} by {1e3 * self.size:.3g} mm at {self.joint} {self.position:.4g}"
+
+
+def path_jumps(finger: FingerLike, position: Sequence[float] | Array) -> tuple[PathJump, ...]:
+    """Return the jumps of wrapped paths within the range of every joint, the others as in a posture.
+
+    A length that is smooth changes by its arm: where it does not between two postures, and neither does in ever
+    smaller parts of that way, it jumps. Of every wrap and joint the largest is found, of at least 0.01 mm.
+
+    Args:
+        finger: A finger.
+        position: theta, shape (n,), rad.
+    """
+    finger = as_finger(finger)
+    theta = finite_vector("position", position, len(finger.routing.joints))
+    wraps = _wraps(finger)
+    if not wraps:
+        return ()
+    legs = [(replace(leg, arm=1.0),) for _, _, leg in wraps]
+    jumps = []
+    for index, (name, joint) in enumerate(finger.description.joints.items()):
+
+        def along(angle: float, index: int = index) -> Array:
+            q = theta.copy()
+            q[index] = angle
+            kinematics = path_kinematics(finger.rigid_body, q, legs, len(q))
+            return np.stack([kinematics.length, kinematics.arm[:, index]], axis=-1)
+
+        angles = np.linspace(*joint.range, _POSTURES)
+        if not np.any([along(angle)[:, 1] for angle in (angles[0], theta[index], angles[-1])]):
+            continue
+        curves = np.array([along(angle) for angle in angles])
+        missing = np.abs(_unexplained(curves[:-1], curves[1:], np.diff(angles)[:, None]))
+        for row in np.flatnonzero(missing.max(axis=0) > _LEAST):
+            first = int(missing[:, row].argmax())
+            low, high = ((angles[k], curves[k, row]) for k in (first, first + 1))
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low[0] + high[0])
+                between = middle, along(middle)[row]
+                before, after = (
+                    abs(_unexplained(one[1], other[1], other[0] - one[0]))
+                    for one, other in ((low, between), (between, high))
+                )
+                low, high = (low, between) if before > after else (between, high)
+            size = float(high[1][0] - low[1][0])
+            if abs(size) > _LEAST:
+                cord, wrap, _ = wraps[row]
+                jumps.append(PathJump(cord, wrap, name, float(low[0]), size))
+    return tuple(jumps)
+
+
+def path_jump_advice(finger: Finger, position: Array, near: float = math.inf) -> str:
+    """Return where paths jump, in one line; empty where none does.
+
+    Args:
+        finger: The finger.
+        position: theta, shape (n,), rad.
+        near: Parts of a joint's range from the posture within which jumps count.
+    """
+    joints = finger.description.joints
+    shares = {name: (at, np.ptp(joint.range)) for (name, joint), at in zip(joints.items(), position, strict=False)}
+    found = [
+        str(jump)
+        for jump in path_jumps(finger, position)
+        if abs(jump.position - shares[jump.joint][0]) <= near * shares[jump.joint][1]
+    ]
+    return f"the length of a cord jumps: {', '.join(found)}; put side points across the paths" if found else ""
+
+
+def _unexplained(first: Array, second: Array, step: Array | float) -> Array:
+    """Return the change of lengths that arms do not explain; pairs (length, arm) stand in the last axis."""
+    return np.asarray(second[..., 0] - first[..., 0] - 0.5 * step * (first[..., 1] + second[..., 1]))
+
+
+def _wraps(finger: Finger) -> list[tuple[str, str, PathTerm]]:
+    """Return the cords' legs over wraps, with the names of cord and wrap."""
+    found = []
+    for cord, tendon in finger.description.tree.tendons.items():
+        legs, before, wrap = iter(finger.paths.routes[cord].legs), False, ""
+        for name, waypoint in (tendon.path or {}).items():
+            if waypoint.kind == "pulley":
+                before = False
+            elif waypoint.kind == "point":
+                leg = next(legs) if before else None
+                if leg is not None and wrap:
+                    found.append((cord, wrap, leg))
+                before, wrap = True, ""
+            else:
+                wrap = name
+    return found
