@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finger_pin.description.caching import memoised
 from finger_pin.description.validation import finite_vector
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
@@ -52,7 +53,12 @@ def path_jumps(finger: FingerLike, position: Sequence[float] | Array) -> tuple[P
         position: theta, shape (n,), rad.
     """
     finger = as_finger(finger)
-    theta = finite_vector("position", position, len(finger.routing.joints))
+    return _jumps(finger, finite_vector("position", position, len(finger.routing.joints)))
+
+
+# Runs of a study share paths and start.
+@memoised(lambda finger, theta: (finger.paths, theta.tobytes()))
+def _jumps(finger: Finger, theta: Array) -> tuple[PathJump, ...]:
     wraps = _wraps(finger)
     if not wraps:
         return ()
