@@ -15,7 +15,7 @@ from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import TreeJoint
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.body_places import Placed, joint_placement, rotation
-from finger_pin.mechanism.rigid_body import RigidBody, Topology
+from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.urdf import TIP_FRAME, to_urdf
 
 # Inertia of what moves along a path, which takes none, kg or kg m2.
@@ -53,21 +53,15 @@ def place_bodies(description: FingerDescription) -> tuple[RigidBody, Mapping[str
         if hand is not None and not body.parent_links[index]:
             body.proximal_axes[index] = hand.fingers[name.split(".")[0]].rotation[:, 0]
     if not is_tree:
-        body.topology = _topology(*_form(tree))
+        body.topology = _form(tree)
     for name, moment in zip(tree.joints, np.diag(body.mass_matrix(pin.neutral(model))), strict=True):
         if not moment > 0.0:
             raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
     return body, placed
 
 
-@memoised(lambda *form: form)
-def _topology(*form: object) -> Topology:
-    """Return the topology that bodies of one form share."""
-    return Topology()
-
-
 def _form(tree: Tree) -> tuple[object, ...]:
-    """Return all that a tree of links has but what it weighs."""
+    """Return all that a tree of links has but what it weighs: bodies of one form share their topology."""
     places = ((name, each.parent, each.position, each.orientation) for name, each in tree.bodies.items())
     return (*places, *tree.joints, *tree.tips)
 

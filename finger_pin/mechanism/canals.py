@@ -107,11 +107,14 @@ class Canals:
         for table in self.tables:
             tendon = {row: index for index, each in enumerate(actuated) for _, row in tension_terms[each.name]}
             self.wraps[table.group] = np.eye(len(tendons.routing.tendons))[:, [tendon[name] for name in table.names]]
-        cords = {name: shares for name in self._tree.rubbing if (shares := self._tree.linked(name))}
+        # Asked once: of many cords it takes as many looks at all actuators.
+        rubbing = self._tree.rubbing
+        cords = {name: shares for name in rubbing if (shares := self._tree.linked(name))}
         if cords:
             self._tables_by_group[CORDS] = self._cords(cords)
             self.tables.append(self._tables_by_group[CORDS])
-        trunks = [self._trunk(name, routes) for name in self._tree.rubbing]
+        own = len(tendons.routing.tendons)
+        trunks = [self._trunk(name, index, routes) for index, name in enumerate(rubbing, start=own)]
         tension_terms |= {each.name: {} for each in trunks}
         self._add_wraps(CANALS, trunks, tension_terms)
         branches = [
@@ -179,8 +182,11 @@ class Canals:
         bends, wraps = self._tendons.routing.curvature_matrix[index], self._tendons.wraps[index]
         return _Canal(name, index, routes.pulled[name], True, frozenset(), drives, bends=bends, wraps=wraps)
 
-    def _trunk(self, name: str, routes: TendonPaths) -> _Canal:
-        """Return the canal of a tendon of the tree before its first pulley, at the first of its wraps."""
+    def _trunk(self, name: str, index: int, routes: TendonPaths) -> _Canal:
+        """Return the canal of a tendon of the tree before its first pulley, at the first of its wraps.
+
+        Its index is that of its friction, after the finger's own tendons.
+        """
         tree, tendon = self._tree, self._tree.tendons[name]
         sources: dict[tuple[str, str], float] = {}
         # No path through space has a length below zero, at which its spring or its range would push.
@@ -202,7 +208,6 @@ class Canals:
         cord = self._description.cord(name)
         turns = {element.name: element.turn for element in cord.elements}
         bends = np.array([turns.get(joint, 0.0) for joint in self._joints])
-        index = len(self._tendons.routing.tendons) + tree.rubbing.index(name)
         crossed, wraps = cord.parts[0].crossed, self._tendons.wraps[index]
         route = routes.routes[name]
         return _Canal(name, index, route, one_way, crossed, sources, 0.0, bends, tendon.friction, wraps)

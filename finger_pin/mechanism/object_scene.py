@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from finger_pin.mechanism.body_places import Placed
 from finger_pin.mechanism.contact_rows import check_start, contact_rows
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import RigidBody, Topology
+from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.solids import WORLD, add_free_objects, body_solids, object_solids, pairs_apart, pairs_within
 from finger_pin.mechanism.state import State
@@ -28,7 +28,7 @@ POSE, VELOCITY = 7, 6
 
 
 def _touching(
-    topology: Topology,
+    topology: Hashable,
     objects: Mapping[str, Object],
     description: FingerDescription,
     _: RigidBody,
@@ -112,7 +112,7 @@ class Scene:
     @staticmethod
     @memoised(_touching)
     def _contacts(
-        topology: Topology,
+        topology: Hashable,
         objects: Mapping[str, Object],
         description: FingerDescription,
         extended: RigidBody,

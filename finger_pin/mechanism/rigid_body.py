@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import threading
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,6 @@ from finger_pin.typing import Array
 FREE_JOINTS = ("JointModelTranslation", "JointModelSpherical")
 
 
-class Topology:
-    """Identity shared by all bodies that differ only in inertias and gravity."""
-
-
 class RigidBody:
     """A Pinocchio model with a fixed base and one or more tips.
 
@@ -36,7 +32,7 @@ class RigidBody:
         joints: Names of the joints, in the order of the model.
         proximal_axes: e_j of (17) of every joint of the model, the base first, in the frame of the body that has it.
         parent_links: Index of the joint that carries that body, 0 for the base.
-        topology: Shared by all bodies that differ in inertias and gravity alone.
+        topology: Equal for all bodies that differ in inertias and gravity alone.
     """
 
     def __init__(
@@ -67,7 +63,8 @@ class RigidBody:
         for row, tip in enumerate(self.tips):
             self.supports[row, [k - 1 for k in model.supports[model.frames[tip].parentJoint] if k]] = 1.0
         self.joints: tuple[str, ...] = tuple(model.names[1:])
-        self.topology, self._per_thread = Topology(), threading.local()
+        self.topology: Hashable = object()
+        self._per_thread = threading.local()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
         self.parent_links: list[int] = [0]
         for index in range(1, model.njoints):

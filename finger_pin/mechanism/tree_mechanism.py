@@ -153,7 +153,8 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     tendons = tree.tendons
     sprung = {name: each for name, each in tendons.items() if each.slack is None and (each.stiffness or each.damping)}
     limited = {name: each for name, each in tendons.items() if each.range is not None}
-    rubbing = {name: each for name, each in tendons.items() if each.friction and name not in tree.rubbing}
+    loaded = {*tree.rubbing}
+    rubbing = {name: each for name, each in tendons.items() if each.friction and name not in loaded}
 
     def along(names: Iterable[str]) -> dict[str, TendonPath]:
         return {name: routes.routes[name] for name in names}
