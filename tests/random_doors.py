@@ -208,15 +208,10 @@ def equilibrium_is_at_rest(model: RandomModel) -> None:
 
 
 def urdf_is_read_as_the_same_body(model: RandomModel) -> None:
-    """Pinocchio reads from the URDF the mass matrix and weight of the finger."""
-    fingers = model.scenario.finger.hand.built().values() if model.kind == "hand" else [model.scenario.finger]
-    for finger in fingers:
-        _check_urdf(finger, model.rng(6))
-
-
-def _check_urdf(description: fp.FingerDescription, rng: np.random.Generator) -> None:
+    """Pinocchio reads from the URDF the mass matrix and weight of the finger, or of a whole hand."""
     import pinocchio as pin
 
+    description, rng = model.scenario.finger, model.rng(6)
     text, body = fp.to_urdf(description), fp.Finger(description).rigid_body
     read = pin.buildModelFromXML(text)
     read.gravity.linear[:] = description.gravity

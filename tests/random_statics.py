@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 
 import numpy as np
+import xarray as xr
 from random_doors import inputs
 from random_fingers import Table, decades
 from random_models import RandomModel
@@ -95,3 +96,37 @@ def step_map_is_that_of_differences(model: RandomModel) -> None:
         if np.all(np.abs(coarse - fine) < 5e-5 * size):
             error = np.abs(found[:, k] * scales[k] / rows[:, 0] - fine) / size
             assert error.max() < 2e-4, f"{error.max():.3g} by {k}"
+
+
+def order_of_a_fit_does_not_matter(model: RandomModel) -> None:
+    """Recordings and parameters listed the other way round give the same estimates, misfit and noise."""
+    scenario = model.scenario
+    made, rng = fp.simulate(scenario), model.rng(7)
+    data = {"t": made.time.values}
+    commands, angles = scenario.finger.actuated_names, list(scenario.finger.joints)
+    data |= {f"pull {name}": made.tendon_command.sel(tendon=name).values for name in commands}
+    noise = 1e-6 * rng.normal(size=(len(angles), len(made.time)))
+    data |= {f"angle {name}": made.joint_position.sel(joint=name).values + noise[k] for k, name in enumerate(angles)}
+    columns = {
+        "time": "t",
+        "inputs": {f"tendon_command.{name}": f"pull {name}" for name in commands},
+        "outputs": {f"joint_position.{name}": f"angle {name}" for name in angles},
+    }
+    recordings = {"whole": data, "half": {name: values[: len(values) // 2] for name, values in data.items()}}
+    bounds = {"finger.tendon_friction.coulomb": (0.01, 1.0), "finger.joint_friction.viscous": (1e-6, 1.0)}
+
+    def found(step: int) -> xr.Dataset:
+        names = list(recordings)[::step]
+        quick = {"starts": 1, "profiles": False, "refits": False}
+        return fp.identify(
+            scenario,
+            parameters=dict(list(bounds.items())[::step]),
+            recordings=dict.fromkeys(names, columns),
+            data={name: recordings[name] for name in names},
+            **quick,
+        )
+
+    one, other = found(1), found(-1)
+    for name in ("estimate", "noise"):
+        expected = one[name].sel({each: other[each] for each in one[name].dims})
+        np.testing.assert_allclose(other[name], expected, rtol=1e-5, err_msg=name)

@@ -66,6 +66,8 @@ _NOT_SETTLED = (
     *("sum of joints", "tendon range", "joint path", "coupling", "loop", "motor", "joint servo", "lag", "integrator"),
     *("integral", "slew", "delay", "muscle", "fixed object", "free object", "moved object", "keyframe"),
 )
+# What is more than tensions that are held: recordings give those alone.
+_NOT_RECORDED = ("servo", "play", "position drive", "winch", "passive tendon", *_NOT_HELD)
 DOORS: dict[str, Door] = {
     "readable = compiled": Door(doors.readable_is_compiled),
     "Jacobian = differences": Door(doors.jacobian_is_that_of_differences),
@@ -95,5 +97,6 @@ DOORS: dict[str, Door] = {
     "slow pull = settled": Door(
         statics.slow_pulls_end_where_friction_lets_a_finger_settle, ("finger", "tree", "tree", "finger"), _NOT_SETTLED
     ),
+    "fit in any order": Door(statics.order_of_a_fit_does_not_matter, ("finger",), _NOT_RECORDED),
     "linearise over a step = differences": Door(statics.step_map_is_that_of_differences, ("finger",), _NOT_HELD),
 }
