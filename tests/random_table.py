@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import random_doors as doors
+import random_mujoco as in_mujoco
 import random_runs as runs
 import random_statics as statics
 from random_models import RandomModel, random_model
@@ -57,6 +58,12 @@ _NOT_IN_MUJOCO = (
     *("servo", "play", "position drive", "winch", "maximum tension", "delay", "slew", "moved object", "free object"),
     *("fixed object", "joint path", "coupling", "loop", "tendon range"),
 )
+# Its file lacks hysteresis, and damps cords with slack at any length, as it says; inputs are held there. An integral
+# may push a cord, which has no tension then.
+_NOT_RUBBING_IN_MUJOCO = (
+    *_NOT_IN_MUJOCO,
+    *("spring hysteresis", "cord", "integral", "integrator", "swinging inputs", "start time", "tip force", "palm path"),
+)
 # What is not given by held inputs of a step: swings, goals of position loops, and paths from a time on.
 _NOT_HELD = ("swinging inputs", "position drive", "moved object", "joint path", "palm path", "start time")
 # What friction at rest, and a cord that slides one way, leave open; what moves by itself.
@@ -93,6 +100,7 @@ DOORS: dict[str, Door] = {
     "welded halves": Door(runs.welded_halves_are_one_body, ("tree",)),
     "palm askew = weight askew": Door(runs.palm_askew_is_weight_askew, ("hand",), ("palm path",)),
     "MuJoCo": Door(runs.mujoco_accelerates_alike, ("tree",), _NOT_IN_MUJOCO),
+    "friction in MuJoCo's step": Door(in_mujoco.mujoco_rubs_alike, ("tree",), _NOT_RUBBING_IN_MUJOCO),
     # Even seeds are of both kinds as well.
     "slow pull = settled": Door(
         statics.slow_pulls_end_where_friction_lets_a_finger_settle, ("finger", "tree", "tree", "finger"), _NOT_SETTLED

@@ -68,6 +68,8 @@ def _header(description: FingerDescription) -> str:
     left_out += ["servos, their spools and what stretches on the way;"] if description.actuators else []
     if np.any(description.joint_friction.drag_asymmetry):
         left_out += ["by how much the drag of joints differs by direction (drag_asymmetry): frictionloss is the mean;"]
+    if any(joint.spring and joint.spring.hysteresis for joint in description.joints.values()):
+        left_out += ["what springs of joints hold against their motion (hysteresis);"]
     if any(each.slack is not None and each.damping for each in description.tree.tendons.values()):
         left_out += ["that cords with slack are not damped while they are slack: dampers act at any length;"]
     left_out += (

@@ -84,8 +84,9 @@ def turn_of_path(d: int, data: Data, tendon: int) -> float:
         if x * x + y * y + z * z < 1e-24:
             continue
         cx, cy, cz = y * z0 - z * y0, z * x0 - x * z0, x * y0 - y * x0
-        # Zero for the first length, which nothing comes before.
-        turn += math.atan2(math.sqrt(cx * cx + cy * cy + cz * cz), x * x0 + y * y0 + z * z0)
+        # Nothing comes before the first length: with a product of -0.0 it would turn by pi.
+        if x0 * x0 + y0 * y0 + z0 * z0 > 0.0:
+            turn += math.atan2(math.sqrt(cx * cx + cy * cy + cz * cz), x * x0 + y * y0 + z * z0)
         x0, y0, z0 = x, y, z
     return turn
 

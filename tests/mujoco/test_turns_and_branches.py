@@ -1,5 +1,6 @@
 """Cords around right angles, and branches behind pulleys, in MuJoCo's step: the capstan law by each path's own bend."""
 
+import itertools
 import math
 
 import mujoco
@@ -51,6 +52,16 @@ def test_any_number_of_right_angles_counts_whole(corners):
     (force,), signals = drawn(places, [slider], along(*(f"s{k}" for k in range(len(places))), "end_tip"))
     assert signals.turn[0] == pytest.approx(0.5 * math.pi * corners, abs=1e-9)
     assert force == pytest.approx(8.0 * math.exp(-0.25 * 0.5 * math.pi * corners), rel=0.01)
+
+
+@pytest.mark.parametrize("signs", list(itertools.product((-1.0, 1.0), repeat=3)))
+def test_a_straight_cord_turns_by_nothing_whichever_way_it_points(signs):
+    """Products of a leg to negative x, y and z with nothing before it are -0.0, whose angle would be half a turn."""
+    way = np.array(signs) / math.sqrt(3.0)
+    end, axis = (" ".join(map(str, each)) for each in (0.3 * way, way))
+    (force,), signals = drawn(["0 0 0"], [SLIDER.format(name="end", place=end, axis=axis)], along("s0", "end_tip"))
+    assert signals.turn[0] == 0.0
+    assert force == pytest.approx(8.0, rel=1e-3)
 
 
 def test_branches_behind_a_pulley_rub_by_their_own_bend_at_their_own_tension():

@@ -62,7 +62,9 @@ def turn_of_path(w: int, tendon: int, x: TendonInputs) -> float:
         segment = path_point(w, k, x) - path_point(w, k - 1, x)
         # Nearer points are one point, to the digits that positions have.
         if before_pulley and wp.length_sq(segment) >= 1e-12:
-            turn += wp.atan2(wp.length(wp.cross(segment, previous)), wp.dot(segment, previous))
+            # Nothing comes before the first length: with a product of -0.0 it would turn by pi.
+            if wp.length_sq(previous) > 0.0:
+                turn += wp.atan2(wp.length(wp.cross(segment, previous)), wp.dot(segment, previous))
             previous = segment
     return turn
 
