@@ -102,13 +102,19 @@ def held_inputs(model: RandomModel) -> dict[str, float]:
     return offsets
 
 
+def _fingertip_force(loop: ClosedLoop) -> np.ndarray:
+    """Return the force at every fingertip."""
+    tips = len(loop.finger.rigid_body.tips)
+    return np.broadcast_to(loop.fingertip_force, (tips, 3) if tips > 1 else (3,))
+
+
 def simulator_is_simulate(model: RandomModel) -> None:
     """Steps under held inputs end where a run does."""
     scenario = tight(model.table)
     loop = ClosedLoop.from_scenario(scenario)
     simulator = fp.Simulator(loop.finger, rtol=TIGHT["rtol"], atol_scale=TIGHT["atol_scale"])
     simulator.reset(loop.initial_state())
-    force = np.broadcast_to(loop.fingertip_force, np.shape(simulator._force))
+    force = _fingertip_force(loop)
     for _ in range(5):
         state = simulator.step(held_inputs(model), DURATION / 5.0, force)
     end = fp.simulate(scenario).isel(time=-1)
@@ -139,7 +145,7 @@ def environment_is_simulator(model: RandomModel) -> None:
     simulator = fp.Simulator(loop.finger, rtol=settings.rtol, atol_scale=settings.atol_scale)
     simulator.reset(loop.initial_state())
     inputs = dict(zip(environment.action_names, action.astype(float), strict=True))
-    force = np.broadcast_to(loop.fingertip_force, np.shape(simulator._force))
+    force = _fingertip_force(loop)
     for _ in range(4):
         seen, *_ = environment.step(action)
         state = simulator.step(inputs, period, force)

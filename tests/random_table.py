@@ -100,11 +100,11 @@ DOORS: dict[str, Door] = {
     "welded halves": Door(runs.welded_halves_are_one_body, ("tree",)),
     "palm askew = weight askew": Door(runs.palm_askew_is_weight_askew, ("hand",), ("palm path",)),
     "MuJoCo": Door(runs.mujoco_accelerates_alike, ("tree",), _NOT_IN_MUJOCO),
-    "friction in MuJoCo's step": Door(in_mujoco.mujoco_rubs_alike, ("tree",), _NOT_RUBBING_IN_MUJOCO),
     # Even seeds are of both kinds as well.
     "slow pull = settled": Door(
         statics.slow_pulls_end_where_friction_lets_a_finger_settle, ("finger", "tree", "tree", "finger"), _NOT_SETTLED
     ),
-    "fit in any order": Door(statics.order_of_a_fit_does_not_matter, ("finger",), _NOT_RECORDED),
     "linearise over a step = differences": Door(statics.step_map_is_that_of_differences, ("finger",), _NOT_HELD),
+    "friction in MuJoCo's step": Door(in_mujoco.mujoco_rubs_alike, ("tree",), _NOT_RUBBING_IN_MUJOCO),
+    "fit in any order": Door(statics.order_of_a_fit_does_not_matter, ("finger",), _NOT_RECORDED),
 }
