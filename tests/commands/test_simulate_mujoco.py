@@ -6,6 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 import xarray as xr
+from unpacked_page import unpacked
 
 from finger_pin.commands.application import run_function
 from finger_pin.commands.simulate_command import simulate
@@ -27,8 +28,9 @@ def test_a_mujoco_hand_is_simulated_and_its_scenario_runs_again(tmp_path, capsys
     assert "Not carried over" not in said
     assert "servo" in said and "finger_joint" in said
     assert sorted(each.name for each in (output / "figures").iterdir()) == ["energy.png", "motion.png"]
-    page = (output / "animation.html").read_text("utf-8")
-    assert "finger_joint_link" in page and "CylinderGeometry" in page
+    scene, _ = unpacked((output / "animation.html").read_text("utf-8"))
+    solids = [each["object"]["geometries"][0]["type"] for each in scene["commands"] if each["type"] == "set_object"]
+    assert "finger_joint_link" in scene["links"] and "CylinderGeometry" in solids
     result = xr.load_dataset(output / "trajectory.nc")
     assert np.ptp(result.joint_position.values) > 0.3
     shutil.copy(output / "scenario.toml", tmp_path / "again.toml")

@@ -5,6 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from paper.plot_workspace import plot_workspace
+from unpacked_page import unpacked
 
 import finger_pin as fp
 from finger_pin.analysis import force_polytope, self_locking_map
@@ -155,8 +156,9 @@ def test_a_hand_on_a_model_is_simulated_and_its_page_has_the_meshes(whole, hand,
     scenario = fp.Scenario.model_validate(table | {"simulation": {"duration": 0.02}})
     result = fp.simulate(scenario, finger=whole)
     assert result.sizes["joint"] == 16 and float(abs(result.energy_residual).max()) < 1e-7
-    page = write_animation(result, tmp_path / "hand.html", finger=whole).read_text()
-    assert page.count("BufferGeometry") > 20 and "ring.T5" in page
+    scene, _ = unpacked(write_animation(result, tmp_path / "hand.html", finger=whole).read_text("utf-8"))
+    solids = [each["object"]["geometries"][0]["type"] for each in scene["commands"] if each["type"] == "set_object"]
+    assert solids.count("BufferGeometry") > 20 and "ring.T5" in {tendon["name"] for tendon in scene["tendons"]}
 
 
 @pytest.mark.parametrize(

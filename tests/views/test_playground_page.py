@@ -5,11 +5,15 @@ import http.client
 import math
 import socket
 import time
+from unittest.mock import MagicMock
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.description.demo_motion import demo_motion
+from finger_pin.description.loading import read_scenario
 
 viser = pytest.importorskip("viser", reason="needs viser, which the extra 'play' brings")
 msgspec, zstandard = pytest.importorskip("msgspec"), pytest.importorskip("zstandard")
@@ -17,6 +21,8 @@ websockets = pytest.importorskip("websockets.sync.client")
 from websockets.exceptions import InvalidStatus  # noqa: E402
 
 from finger_pin.views.playground.access import own_page_only  # noqa: E402
+from finger_pin.views.playground.session import Session  # noqa: E402
+from finger_pin.views.playground.stage import Stage  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -139,3 +145,20 @@ def test_a_message_with_a_wrong_value_does_not_end_the_playing(playground):
         # A right value still acts, and what is wrong is told.
         playground.schedule(lambda: {}["nonsense"])
         until(lambda: list(received(page, 0.1)) is not None and "nonsense" in playground.message)
+
+
+EGG = """<mujoco><worldbody><body><joint name="knuckle" axis="0 1 0" range="-0.2 1.5"/>
+<geom type="ellipsoid" size=".01 .02 .03" euler="0 0 90" mass=".01"/></body></worldbody>
+<tendon><fixed name="cord"><joint joint="knuckle" coef="0.01"/></fixed></tendon>
+<actuator><motor tendon="cord" ctrlrange="0 5"/></actuator></mujoco>"""
+
+
+def test_an_ellipsoid_is_drawn_with_its_radii_and_turned_as_it_is():
+    mujoco = pytest.importorskip("mujoco")
+    finger = fp.from_mujoco(mujoco.MjModel.from_xml_string(EGG))
+    server = MagicMock()
+    Stage(server, Session(read_scenario(demo_motion(finger, 0.05))))
+    (drawn,) = [call.kwargs for call in server.scene.add_icosphere.call_args_list]
+    # A ball of the library's radius of 1 m, stretched; a quarter turn about z is cos 45 deg + k sin 45 deg.
+    np.testing.assert_allclose(drawn["scale"], [0.01, 0.02, 0.03])
+    np.testing.assert_allclose(drawn["wxyz"], np.sqrt([0.5, 0.0, 0.0, 0.5]), atol=1e-12)

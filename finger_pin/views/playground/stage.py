@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import viser
-from scipy.spatial.transform import Rotation
 
 from finger_pin.control.palm import PalmPath
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.playground.session import Reading, Session
-from finger_pin.views.viewer.drawing import FORCE_COLOUR, strand_colours
-from finger_pin.views.viewer.meshcat_solids import ROOT, Command, link_names, newton_length, solid_commands
-from finger_pin.views.viewer.scene import Scene, tension_scale
+from finger_pin.views.viewer.colours import FORCE_COLOUR, strand_colours, tension_scale
+from finger_pin.views.viewer.scene import Scene
 from finger_pin.views.viewer.scene_objects import SceneObjects
+from finger_pin.views.viewer.solids import ROOT, Solid, link_names, link_solids, newton_length
 
 # Shares of the finger's length: the longest arrow of a force, the cross to drag the tip.
 _ARROW_LENGTH, _CROSS_SIZE = 0.22, 0.16
@@ -53,8 +52,8 @@ class Stage:
         geometry, self._by_name = self.scene.geometry, dict(session.scenario.environment.objects or {})
         self._root = self._viser.add_frame(ROOT, show_axes=False)
         self._links = [self._viser.add_frame(f"{ROOT}/{name}", show_axes=False) for name in link_names(geometry)]
-        for command in solid_commands(geometry, self.scene.tube_radius):
-            self._add_solid(command)
+        for solid in link_solids(geometry, self.scene.tube_radius):
+            self._add_solid(f"{ROOT}/{solid.frame}/{solid.name}", solid)
         tips = self.scene.tips(geometry.poses(session.simulator.state.position))
         self._objects = self._add_objects(tips.mean(axis=0))
         self._strands = [tendon["strand"] for tendon in self.scene.tendons]
@@ -89,34 +88,28 @@ class Stage:
         ]
         self._set_camera(server)
 
-    def _add_solid(self, command: Command) -> Any:
+    def _add_solid(self, path: str, solid: Solid) -> None:
         """Add a solid of the viewer's scene."""
-        solid = command["object"]
-        shape, material, matrix = (solid["geometries"][0], solid["materials"][0], solid["object"]["matrix"])
-        pose = np.reshape(matrix, (4, 4)).T
-        rotation, colour = pose[:3, :3], material["color"]
-        options = {
-            "color": (colour >> 16, colour >> 8 & 255, colour & 255),
-            "opacity": max(material["opacity"], min(_MAX_OPACITY, 1.5 * material["opacity"])),
-            "flat_shading": material["flatShading"],
-            "position": pose[:3, 3],
-            "wxyz": _wxyz(rotation),
+        options: dict[str, Any] = {
+            "color": tuple(round(255 * component) for component in solid.colour),
+            "opacity": max(solid.opacity, min(_MAX_OPACITY, 1.5 * solid.opacity)),
+            "flat_shading": solid.kind in ("box", "mesh"),
+            "position": solid.translation,
+            "wxyz": _wxyz(solid.rotation),
             "cast_shadow": False,
             "receive_shadow": False,
         }
-        path, kind = command["path"], shape["type"]
-        if kind == "BoxGeometry":
-            sides = (shape["width"], shape["height"], shape["depth"])
-            return self._viser.add_box(path, dimensions=sides, **{**options, "flat_shading": True})
-        if kind == "SphereGeometry":
-            return self._viser.add_icosphere(path, shape["radius"], **options)
-        if kind == "CylinderGeometry":
-            # Three.js runs its cylinders along y, viser along z.
-            options["wxyz"] = _wxyz(rotation @ Rotation.from_euler("x", -90.0, degrees=True).as_matrix())
-            return self._viser.add_cylinder(path, shape["radiusTop"], shape["height"], **options)
-        data = shape["data"]
-        corners = np.reshape(data["attributes"]["position"]["array"], (-1, 3))
-        return self._viser.add_mesh_simple(path, corners, np.reshape(data["index"]["array"], (-1, 3)), **options)
+        if solid.kind == "box":
+            self._viser.add_box(path, dimensions=np.array(solid.sizes), **options)
+        elif solid.kind == "cylinder":
+            radius, height = solid.sizes
+            self._viser.add_cylinder(path, radius, height, **options)
+        elif solid.kind == "mesh":
+            self._viser.add_mesh_simple(path, solid.corners, solid.faces, **options)
+        else:
+            # The radii of an ellipsoid, or that of a sphere.
+            x, y, z = np.broadcast_to(solid.sizes, 3).tolist()
+            self._viser.add_icosphere(path, scale=(x, y, z), **options)
 
     def _add_objects(self, middle: Array) -> list[Any]:
         """Draw the objects around the finger; return the frames of the free ones."""
@@ -127,14 +120,12 @@ class Stage:
         free, contacts = tuple(scene.free), np.zeros((1, 0, 9))
         drawn = SceneObjects(by_name, free, np.zeros((1, 0, 7)), contacts, np.zeros(0), self.scene.size, middle)
         frames = {name: self._viser.add_frame(self._path(name), show_axes=False) for name in by_name}
-        for command in drawn.commands():
-            name, _, part = command["path"].removeprefix(f"{ROOT}/object_").partition("/")
-            if command["type"] == "set_object":
-                self._add_solid({**command, "path": f"{self._path(name)}/{part}"})
-                continue
-            pose = np.reshape(command["matrix"], (4, 4)).T
-            rotation = self._turn if self._is_in_world(name) else np.eye(3)
-            frames[name].position, frames[name].wxyz = rotation @ pose[:3, 3], _wxyz(rotation @ pose[:3, :3])
+        for name, frame in frames.items():
+            turn, pose = self._turn if self._is_in_world(name) else np.eye(3), by_name[name].pose
+            frame.position = turn @ pose[:3]
+            frame.wxyz = _wxyz(turn @ pin.Quaternion(pose[3:]).toRotationMatrix())
+            for solid in drawn.solids(name):
+                self._add_solid(f"{self._path(name)}/{solid.name}", solid)
         return [frames[name] for name in free]
 
     def _is_in_world(self, name: str) -> bool:

@@ -1,18 +1,27 @@
-"""A result as a page that plays it."""
+"""A result as a page that plays it: one HTML text, which loads nothing from elsewhere."""
 
 from __future__ import annotations
 
+import base64
+import html
+import importlib.util
+import json
 import os
+import zlib
 from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from pathlib import Path
+from string import Template
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.files import write_text
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.mechanism.finger import Finger
@@ -20,7 +29,6 @@ from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.simulation.frames import read_scene
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.typing import Array
-from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
 from finger_pin.views.viewer.scene_objects import SceneObjects
 
@@ -72,13 +80,15 @@ def animation_page(
     header = motion.scene.header(
         motion.title, motion.position[stride], motion.largest, forces=forces, ghost=ghost_motion, palm=palm
     )
-    chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
+    frames = motion.scene.frames(motion.time, motion.position, motion.tension, motion.palm)
     if ghost_motion is not None:
-        chunk["ghost"] = ghost_motion.chunk()
+        frames["ghost"] = ghost_motion.frames()
     if motion.objects is not None:
-        header |= motion.objects.header(motion.scene.view())
-        chunk |= motion.objects.chunk()
-    return render({**header, "chunks": [chunk]})
+        header["objects"] = motion.objects.header()
+        header["commands"] += motion.objects.commands()
+        header["inView"] += np.round(motion.objects.points_in_view() @ motion.scene.view().T, 5).tolist()
+        frames |= motion.objects.frames()
+    return _render(header, frames)
 
 
 def posture_page(finger: FingerLike, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
@@ -95,7 +105,41 @@ def posture_page(finger: FingerLike, forces: ForcePolytope, strands: ArrayLike |
     position = forces.position[None]
     title = description.title or description.name
     header = scene.header(title, position, float(tension.max()), forces=forces)
-    return render({**header, "chunks": [scene.chunk([0.0], position, tension)]})
+    return _render(header, scene.frames([0.0], position, tension))
+
+
+def _render(header: dict[str, Any], frames: dict[str, Array]) -> str:
+    """Return the page for the header of a `Scene` and its frames: meshcat's viewer, the player, and the data."""
+    columns = [[name, values.dtype.str, values[0].size] for name, values in frames.items()]
+    # Points of tendons hardly move from frame to frame: their small differences, point by point, compress well.
+    path = frames["path"].reshape(len(frames["path"]), -1)
+    frames = frames | {"path": np.diff(path, axis=0, prepend=np.zeros_like(path[:1])).T}
+    scene = json.dumps({**header, "columns": columns}, separators=(",", ":"), allow_nan=False)
+    return Template(_text("page.html")).substitute(
+        title=html.escape(header["title"]),
+        style=_text("style.css"),
+        script="\n".join(_text(name) for name in ("data.js", "scene.js", "controls.js")),
+        meshcat=_meshcat(),
+        scene=_packed(scene.encode()),
+        frames=_packed(b"".join(values.tobytes() for values in frames.values())),
+    )
+
+
+def _packed(content: bytes) -> str:
+    return base64.b64encode(zlib.compress(content)).decode("ascii")
+
+
+def _text(name: str) -> str:
+    return resources.files("finger_pin.views.viewer").joinpath("web", name).read_text(encoding="utf-8")
+
+
+@cache
+def _meshcat() -> str:
+    # Found without importing meshcat, which would import IPython and take half a second.
+    spec = importlib.util.find_spec("meshcat")
+    if spec is None or spec.origin is None:
+        raise FingerPinError("the viewer needs the package meshcat, which is not installed")
+    return _packed(Path(spec.origin).parent.joinpath("viewer", "dist", "main.min.js").read_bytes())
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,8 +219,7 @@ def _palm(result: xr.Dataset, frames: Indices) -> LinkPoses | None:
     if "palm_position" not in result:
         return None
     quaternions = _read_variable(result, "palm_orientation")[frames]
-    rotations = np.array([pin.Quaternion(quaternion).toRotationMatrix() for quaternion in quaternions])
-    return LinkPoses(rotations, _read_variable(result, "palm_position")[frames])
+    return LinkPoses(Rotation.from_quat(quaternions).as_matrix(), _read_variable(result, "palm_position")[frames])
 
 
 def _frame_indices(time: Array, rate: float) -> Indices:

@@ -13,19 +13,15 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.viewer.animation import Playback
-from finger_pin.views.viewer.meshcat_solids import ROOT, Command, link_names, pose_matrix, set_object, solid_commands
-from finger_pin.views.viewer.scene import SLACK_TENSION, Scene, tension_scale
+from finger_pin.views.viewer.colours import FORCE_COLOUR, strand_colours, tension_scale
+from finger_pin.views.viewer.scene import Scene
+from finger_pin.views.viewer.solids import ROOT, Command, link_names, link_solids, pose_matrix, set_object
 
 if TYPE_CHECKING:
     import meshcat
 
 # Sides of the tube of a tendon.
 _SIDES = 8
-_SLACK_COLOUR = (0.62, 0.64, 0.67)
-# Of a cord without a known tension, which no tension has.
-_CORD_COLOUR = (0.93, 0.9, 0.82)
-#: Of the arrow of a contact's force, at both ends: that of the page, which no tension has.
-FORCE_COLOUR = np.tile(np.array([0xFF, 0x5A, 0x5A]) / 255.0, (2, 1))
 
 
 def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1.0, rate: float = 30.0) -> None:
@@ -48,7 +44,8 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
     root = visualizer.path.lower()
     scene, radius, scale = motion.scene, motion.scene.tube_radius, tension_scale(motion.largest)
     objects = motion.objects
-    for command in (*solid_commands(scene.geometry, radius), *(objects.commands() if objects else ())):
+    solids = [solid.command() for solid in link_solids(scene.geometry, radius)]
+    for command in (*solids, *(objects.commands() if objects else ())):
         _send(visualizer, {**command, "path": root + command["path"]})
     start_time, last = time.monotonic(), len(motion.time) - 1
     for index, frame_time in enumerate((motion.time - motion.time[0]) / speed):
@@ -67,25 +64,6 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
             ]
         for command in commands:
             _send(visualizer, {**command, "path": root + command["path"]})
-
-
-def tension_colours(tension: Array, scale: float) -> Array:
-    """Return the colour of tensions, shape (..., 3): the upper part of viridis up to a scale, N; grey when loose."""
-    from matplotlib import colormaps
-
-    taut = colormaps["viridis"](0.25 + 0.75 * np.clip(tension / scale, 0.0, 1.0))[..., :3]
-    looseness = np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)[..., None]
-    return np.asarray(taut + looseness * (np.array(_SLACK_COLOUR) - taut))
-
-
-def strand_colours(tension: Array, scale: float) -> Array:
-    """Return the colours of strands, shape (s + 1, 3), the last of which is that of cords without a known tension.
-
-    Args:
-        tension: Shape (s,), N.
-        scale: As for `tension_colours`.
-    """
-    return np.concatenate([tension_colours(tension, scale), [_CORD_COLOUR]])
 
 
 def _frame(scene: Scene, position: Array, tension: Array, scale: float, palm: LinkPoses | None) -> list[Command]:

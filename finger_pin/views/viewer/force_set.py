@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.analysis import ForcePolytope
 from finger_pin.typing import Array
-from finger_pin.views.viewer.meshcat_solids import ROOT, Command, newton_length, set_object
+from finger_pin.views.viewer.solids import ROOT, Command, newton_length, set_object
 
 _PATH = f"{ROOT}/forces"
 _COLOUR, _RIM_COLOUR, _OPACITY = 0xFFB347, 0xFFD9A0, 0.22

@@ -22,36 +22,39 @@ from finger_pin.views.viewer.animation import animation_page, posture_page
 _PAGE_HEIGHT = 620
 
 
-class PageServer:
-    """A server of one page.
+class PageHandle:
+    """A page that is being served; a context manager that ends it.
 
     Attributes:
-        url: Address of the page.
+        url: Its address, on the loopback interface.
     """
 
     def __init__(self, page: str) -> None:
         """Serve a page, HTML text, from a thread."""
-        self._page = page.encode()
+        self._page = page
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
         self._hosts = {f"{host}:{self._server.server_port}" for host in ("127.0.0.1", "localhost")}
         self.url = f"http://127.0.0.1:{self._server.server_port}/"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True)
         self._thread.start()
 
-    def join(self) -> None:
-        """Wait until the server is closed from elsewhere."""
-        while self._thread.is_alive():
-            self._thread.join(0.2)
+    def wait(self) -> None:
+        """Serve until the user interrupts (Ctrl-C), or the page is closed from elsewhere."""
+        try:
+            while self._thread.is_alive():
+                self._thread.join(0.2)
+        except KeyboardInterrupt:
+            self.close()
 
     def close(self) -> None:
-        """Stop. Closing twice is allowed."""
+        """Stop serving; open pages keep their frames. Closing twice is allowed."""
         if self._thread.is_alive():
             self._server.shutdown()
             self._thread.join()
             self._server.server_close()
 
     def _handler(self) -> type[BaseHTTPRequestHandler]:
-        server = self
+        server, content = self, self._page.encode()
 
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
@@ -64,38 +67,14 @@ class PageServer:
                     self.send_response(200)
                     self.send_header("Content-Type", "text/html; charset=utf-8")
                     self.send_header("Cache-Control", "no-store")
-                    self.send_header("Content-Length", str(len(server._page)))
+                    self.send_header("Content-Length", str(len(content)))
                     self.end_headers()
-                    self.wfile.write(server._page)
+                    self.wfile.write(content)
 
             def log_message(self, format: str, *args: object) -> None:
                 pass
 
         return Handler
-
-
-class PageHandle:
-    """A page that is being served; a context manager that ends it.
-
-    Attributes:
-        url: Its address, on the loopback interface.
-    """
-
-    def __init__(self, page: str) -> None:
-        """Serve a page, HTML text."""
-        self._server, self._page = PageServer(page), page
-        self.url = self._server.url
-
-    def wait(self) -> None:
-        """Serve until the user interrupts (Ctrl-C)."""
-        try:
-            self._server.join()
-        except KeyboardInterrupt:
-            self.close()
-
-    def close(self) -> None:
-        """Stop serving; open pages keep their frames."""
-        self._server.close()
 
     def __repr__(self) -> str:
         """Return the address."""

@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from finger_pin.analysis import ForcePolytope
 from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, Visual, joint_axes
 from finger_pin.typing import Array
+from finger_pin.views.viewer.colours import PAGE_COLOURS, SLACK_TENSION, looseness, tension_scale
 from finger_pin.views.viewer.force_set import ForceSet
-from finger_pin.views.viewer.meshcat_solids import ROOT, encode, link_names, root_command, solid_commands
+from finger_pin.views.viewer.solids import ROOT, Command, link_names, link_solids, root_command
 
-#: Below this tension a tendon is drawn loose, wholly at none, N.
-SLACK_TENSION = 0.05
 #: Radius of the tube that is drawn for a tendon: most, in parts of the distance between neighbouring tendons and of
 #: the width of the narrowest link.
 _TUBE_IN_LANE, _TUBE_IN_LINK = 0.34, 0.032
@@ -49,14 +49,16 @@ class Ghost:
 
     def header(self) -> dict[str, Any]:
         """Return its part of the page's header."""
-        scene = self.scene
-        solids = solid_commands(scene.geometry, scene.tube_radius, _GHOST_PATH, _GHOST_COLOUR)
-        commands = [command for command in solids if not command["path"].startswith(f"{_GHOST_PATH}/base/")]
-        return {"title": self.title, "links": link_names(scene.geometry)[1:], "commands": commands}
+        return {"title": self.title, "links": link_names(self.scene.geometry)[1:]}
 
-    def chunk(self) -> str:
-        """Return the frames for the page."""
-        return _encode_poses(LinkPoses(self.poses.rotation[:, 1:], self.poses.translation[:, 1:]))
+    def commands(self) -> list[Command]:
+        """Return meshcat's commands for the solids of its links."""
+        solids = link_solids(self.scene.geometry, self.scene.tube_radius)
+        return [solid.command(_GHOST_PATH, _GHOST_COLOUR) for solid in solids if solid.frame != "base"]
+
+    def frames(self) -> Array:
+        """Return the frames for the page, shape (m, k, 7), float32."""
+        return _pose_numbers(LinkPoses(self.poses.rotation[:, 1:], self.poses.translation[:, 1:]))
 
     def points_in_view(self) -> Array:
         """Return points that the camera must have in view, shape (m, 3), m."""
@@ -136,10 +138,12 @@ class Scene:
         force_set = ForceSet.from_polytope(forces, self.size) if forces is not None else None
         extra = ([] if force_set is None else [force_set.corners]) + ([] if ghost is None else [ghost.points_in_view()])
         corners = self._in_view(joint_positions, palm, extra)
-        force_commands = list(force_set.commands()) if force_set is not None else []
+        commands = [root_command(rotation), *(solid.command() for solid in link_solids(geometry, tube))]
+        for drawn in (force_set, ghost):
+            commands += () if drawn is None else drawn.commands()
         return {
             "title": title,
-            "commands": [root_command(rotation), *solid_commands(geometry, tube), *force_commands],
+            "commands": commands,
             "ghost": ghost.header() if ghost is not None else None,
             "forces": force_set.note if force_set is not None else "",
             "cords": self._note_on_cords(),
@@ -156,7 +160,7 @@ class Scene:
             "margin": 0.55 * max(self._widths),
             "tensionScale": tension_scale(largest_tension),
             "slackTension": SLACK_TENSION,
-            "chunks": [],
+            "colours": PAGE_COLOURS,
         }
 
     def _in_view(self, joint_positions: ArrayLike, palm: LinkPoses | None, extra_points: list[Array]) -> Array:
@@ -176,10 +180,10 @@ class Scene:
         near_points: Array = corners[np.linalg.norm(corners - middle, axis=1) <= _MAX_REACH * radius]
         return near_points
 
-    def chunk(
+    def frames(
         self, time: ArrayLike, joint_position: ArrayLike, tension: ArrayLike, palm: LinkPoses | None = None
-    ) -> dict[str, str]:
-        """Return frames for the page.
+    ) -> dict[str, Array]:
+        """Return frames for the page, arrays whose first axis is time.
 
         Args:
             time: Shape (m,), s.
@@ -193,12 +197,12 @@ class Scene:
         points = [empty, *(path.points for path in self.geometry.paths(q, self.looseness(f), poses))]
         paths = np.concatenate(points, axis=-2)
         return {
-            "time": encode(time, "<f8"),
-            "pose": _encode_poses(poses),
-            "path": encode(np.clip(np.rint(paths / self._point_unit), -_MAX_INTEGER, _MAX_INTEGER), "<i2"),
-            "tension": encode(f, "<f4"),
-            "tip": encode(self.tips(poses), "<f4"),
-            "joint": encode(q, "<f4"),
+            "time": np.asarray(time, dtype="<f8"),
+            "pose": _pose_numbers(poses),
+            "path": np.clip(np.rint(paths / self._point_unit), -_MAX_INTEGER, _MAX_INTEGER).astype("<i2"),
+            "tension": f.astype("<f4"),
+            "tip": self.tips(poses).astype("<f4"),
+            "joint": q.astype("<f4"),
         }
 
     def tips(self, poses: LinkPoses) -> Array:
@@ -216,7 +220,7 @@ class Scene:
         tensions = np.concatenate([strand_tension, np.full((*shape, 1), SLACK_TENSION)], axis=-1)
         tendon_tensions = [tensions[..., strands].max(axis=-1) for strands in self._strands]
         tension = np.stack(tendon_tensions, axis=-1) if tendon_tensions else np.zeros((*shape, 0))
-        return np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)
+        return looseness(tension)
 
     def _tendon(self, name: str, distal: Sequence[bool]) -> dict[str, Any]:
         first, *others = self._strands_of(name)
@@ -275,16 +279,8 @@ def _outermost(points: Array) -> Array:
     return np.asarray(points[np.unique(np.argmax(directions.T @ points.T, axis=1))])
 
 
-def tension_scale(tension: float) -> float:
-    """Return the upper end of a legend of tensions, N: its quarters are short numbers."""
-    # The page uses the same steps.
-    if not tension > 0.0:
-        return 1.0
-    decade = 10.0 ** math.floor(math.log10(tension))
-    return float(next(step * decade for step in (1, 2, 4, 6, 8, 10) if step * decade >= tension * (1.0 - 1e-9)))
-
-
-def _encode_poses(poses: LinkPoses) -> str:
-    quaternions = np.array([pin.Quaternion(rotation).coeffs() for rotation in poses.rotation.reshape(-1, 3, 3)])
+def _pose_numbers(poses: LinkPoses) -> Array:
+    """Return x, y, z and quaternion x, y, z, w of poses, shape (..., 7), float32."""
+    quaternions = Rotation.from_matrix(poses.rotation.reshape(-1, 3, 3)).as_quat()
     orientations = quaternions.reshape(*poses.translation.shape[:-1], 4)
-    return encode(np.concatenate([poses.translation, orientations], axis=-1), "<f4")
+    return np.concatenate([poses.translation, orientations], axis=-1).astype("<f4")

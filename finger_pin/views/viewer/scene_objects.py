@@ -10,23 +10,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import xarray as xr
+from scipy.spatial.transform import Rotation
 
 from finger_pin.description.objects import Object
-from finger_pin.description.primitives import KINDS
+from finger_pin.description.primitives import KINDS, Part
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
-from finger_pin.views.viewer.meshcat_solids import (
-    ROOT,
-    SOLID_OPACITY,
-    Command,
-    box,
-    drawn,
-    encode,
-    mesh,
-    newton_length,
-    pose_matrix,
-)
+from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Command, Solid, newton_length, pose_matrix
 
 _FIXED_COLOUR, _FREE_COLOUR = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
 #: Thickness of the plate that is drawn for a half-space, and how far it reaches, in parts of the finger's length.
@@ -91,40 +82,32 @@ class SceneObjects:
         poses = np.stack(list(poses_by_name.values()), axis=1) if poses_by_name else np.zeros((len(time), 0, 7))
         if palm is not None:
             rotated = [np.einsum("mij,mcj->mci", palm.rotation, item) for item in (*vectors, poses[..., :3])]
-            is_closed = ~np.any(vectors[1], axis=-1, keepdims=True)
-            vectors = [rotated[0] + palm.translation[:, None] * ~is_closed, *rotated[1:3]]
-            palm_rotations = [pin.Quaternion(item) for item in palm.rotation]
-            orientations = np.array(
-                [
-                    [(palm_rotation * pin.Quaternion(item)).coeffs() for item in orientations_row]
-                    for palm_rotation, orientations_row in zip(palm_rotations, poses[..., 3:], strict=True)
-                ]
-            ).reshape(*poses.shape[:2], 4)
-            poses = np.concatenate([rotated[3] + palm.translation[:, None], orientations], axis=-1)
+            is_closed = np.any(vectors[1], axis=-1, keepdims=True)
+            vectors = [rotated[0] + palm.translation[:, None] * is_closed, *rotated[1:3]]
+            turns = np.repeat(palm.rotation, poses.shape[1], axis=0)
+            orientations = (Rotation.from_matrix(turns) * Rotation.from_quat(poses[..., 3:].reshape(-1, 4))).as_quat()
+            positions = rotated[3] + palm.translation[:, None]
+            poses = np.concatenate([positions, orientations.reshape(*poses.shape[:2], 4)], axis=-1)
             for index, name in enumerate(poses_by_name):
                 if objects[name].frame == "world":
                     poses[:, index] = objects[name].pose
         contacts = np.concatenate(vectors, axis=-1)
         return cls(objects, tuple(poses_by_name), poses, contacts, steepness[steepness > 0.0], size, middle)
 
-    def header(self, turn: Array) -> dict[str, Any]:
-        """Return their part of the page's header; ``turn`` is the rotation of the scene."""
+    def header(self) -> dict[str, Any]:
+        """Return their part of the page's header."""
         length = self._force_scale()
         return {
-            "objects": {
-                "commands": list(self.commands()),
-                "free": [f"object_{name}" for name in self.moving],
-                "steepness": np.round(self.steepness, 4).tolist(),
-                "length": length,
-                "cone": _CONE_SLANT * self.size,
-                "note": f"contact forces, {1e3 * length:.4g} mm per N, in their friction cones",
-            },
-            "alsoInView": np.round(self.points_in_view() @ turn.T, 5).tolist(),
+            "free": [f"object_{name}" for name in self.moving],
+            "steepness": np.round(self.steepness, 4).tolist(),
+            "length": length,
+            "cone": _CONE_SLANT * self.size,
+            "note": f"contact forces, {1e3 * length:.4g} mm per N, in their friction cones",
         }
 
-    def chunk(self) -> dict[str, str]:
+    def frames(self) -> dict[str, Array]:
         """Return the frames for the page."""
-        return {name: encode(values, "<f4") for name, values in (("object", self.poses), ("contact", self.contacts))}
+        return {"object": self.poses.astype("<f4"), "contact": self.contacts.astype("<f4")}
 
     def points_in_view(self) -> Array:
         """Return places of free objects and contacts, and corners of fixed ones, near the finger, shape (m, 3)."""
@@ -138,9 +121,7 @@ class SceneObjects:
     def commands(self) -> Iterator[Command]:
         """Yield meshcat's commands for all objects, each at its start."""
         for name, scene_object in self.by_name.items():
-            path = f"{ROOT}/object_{name}"
-            for index, (shape, rotation, offset, colour) in enumerate(self.parts(name)):
-                yield mesh(f"{path}/part{index}", shape, rotation, offset, colour, 1.6 * SOLID_OPACITY)
+            yield from (solid.command() for solid in self.solids(name))
             yield self._placement(name, scene_object.pose)
 
     def frame(self, index: int) -> Iterator[Command]:
@@ -170,20 +151,22 @@ class SceneObjects:
         rotation = pin.Quaternion(pose[3:]).toRotationMatrix()
         return {"type": "set_transform", "path": f"{ROOT}/object_{name}", "matrix": pose_matrix(rotation, pose[:3])}
 
-    def parts(self, name: str) -> Iterator[tuple[Command, Array, Array, tuple[float, float, float]]]:
-        """Yield the solids of an object: meshcat's geometry, its rotation or stretch, its place there, its colour."""
+    def solids(self, name: str) -> Iterator[Solid]:
+        """Yield the solids of an object, whose frame is ``object_<name>``."""
         scene_object = self.by_name[name]
         colour = _FIXED_COLOUR if scene_object.mass is None else _FREE_COLOUR
-        rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
-        position = np.array(scene_object.position)
+        parts = scene_object.parts
         if scene_object.shape == "half_space":
-            # The part of the plane nearest to the finger.
             side, thickness = 2.0 * _PLATE_RADIUS * self.size, _PLATE_THICKNESS * self.size
-            centre = rotation.T @ (self.middle - position) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thickness]
-            parts = [(box(side, side, thickness), np.eye(3), centre)]
-        else:
-            parts = [(*drawn(part.kind, part.sizes), np.array([0.0, 0.0, part.height])) for part in scene_object.parts]
-        yield from ((*part, colour) for part in parts)
+            parts = (Part("box", (side, side, thickness), -0.5 * thickness),)
+        for index, part in enumerate(parts):
+            centre = np.array([0.0, 0.0, part.height])
+            if scene_object.shape == "half_space":
+                # The part of the plane nearest to the finger.
+                rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
+                centre[:2] = (rotation.T @ (self.middle - scene_object.position))[:2]
+            pose = np.eye(3), centre
+            yield Solid(f"object_{name}", f"part{index}", part.kind, part.sizes, *pose, colour, 1.6 * SOLID_OPACITY)
 
 
 def _box_corners(scene_object: Object) -> Array:

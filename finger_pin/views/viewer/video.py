@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -29,10 +28,8 @@ from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Playback
-from finger_pin.views.viewer.drawing import FORCE_COLOUR, strand_colours, tension_colours
-from finger_pin.views.viewer.meshcat_solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, primitive
-from finger_pin.views.viewer.scene import Scene, tension_scale
-from finger_pin.views.viewer.scene_objects import SceneObjects
+from finger_pin.views.viewer.colours import FORCE_COLOUR, strand_colours, tension_colours, tension_scale
+from finger_pin.views.viewer.solids import Solid, link_names, link_solids
 
 _BACKGROUND, _INK, _DIM_INK, _TRACE_COLOUR = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
@@ -127,12 +124,18 @@ def find_ffmpeg() -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class _Solid:
+class _Body:
     """A convex solid: points whose hull it is, in the frame of its link, shape (p, 3), m, and its colour."""
 
     link: int
     corners: Array
     colour: tuple[float, float, float, float]
+
+    @classmethod
+    def from_solid(cls, solid: Solid, links: list[str]) -> _Body:
+        """Return the body of a solid, whose frame is one of the links."""
+        corners = _hull_points(solid) @ solid.rotation.T + solid.translation
+        return cls(links.index(solid.frame), corners, (*solid.colour, solid.opacity))
 
 
 class _Film:
@@ -143,11 +146,14 @@ class _Film:
         scene = motion.scene
         self.motion = motion
         self.poses = self.links = scene.geometry.poses(motion.position, motion.palm)
-        self.solids, objects = tuple(_solids(scene)), motion.objects
+        links, objects = link_names(scene.geometry), motion.objects
+        self.solids = [_Body.from_solid(each, links) for each in link_solids(scene.geometry, scene.tube_radius)]
         # Objects are added as links, but do not widen the view.
         finger_solids = self.solids
         if objects is not None and objects.by_name:
-            self.solids += tuple(_objects(objects, self.poses.translation.shape[1]))
+            links += [f"object_{name}" for name in objects.by_name]
+            solids = [solid for name in objects.by_name for solid in objects.solids(name)]
+            self.solids = [*self.solids, *(_Body.from_solid(solid, links) for solid in solids)]
             poses = np.stack([objects.object_poses(name) for name in objects.by_name], axis=1)
             rotations = Rotation.from_quat(poses[..., 3:].reshape(-1, 4)).as_matrix().reshape(*poses.shape[:2], 3, 3)
             self.poses = LinkPoses(
@@ -226,11 +232,11 @@ class _Film:
         paths = scene.geometry.paths(motion.position[frame], scene.looseness(motion.tension[frame]), poses)
         return [path.points @ self.camera[:2].T for path in paths]
 
-    def _corner_positions(self, solid: _Solid, frame: int) -> Array:
+    def _corner_positions(self, solid: _Body, frame: int) -> Array:
         rotation, translation = self.poses.rotation[frame, solid.link], self.poses.translation[frame, solid.link]
         return np.asarray(solid.corners @ rotation.T + translation)
 
-    def _outline(self, solid: _Solid, frame: int) -> Array:
+    def _outline(self, solid: _Body, frame: int) -> Array:
         points = self._corner_positions(solid, frame) @ self.camera[:2].T
         return np.asarray(points[scipy.spatial.ConvexHull(points).vertices])
 
@@ -244,43 +250,23 @@ class _Film:
         bar.outline.set_visible(False)
 
 
-def _solids(scene: Scene) -> Iterator[_Solid]:
-    geometry = scene.geometry
-    for visual in geometry.visuals:
-        shape, rotation = primitive(visual.name, visual.shape)
-        corners = _hull_points(shape) @ (visual.placement.rotation @ rotation).T + visual.placement.translation
-        yield _Solid(visual.link, corners, (*visual.colour[:3], SOLID_OPACITY * visual.colour[3]))
-    for pulley in geometry.pulleys:
-        rim = _rims(max(abs(pulley.radius) - scene.tube_radius, 0.5 * scene.tube_radius), 0.8 * geometry.lanes.spacing)
-        yield _Solid(
-            pulley.joint, rim @ pulley.frame.T + pulley.offset * pulley.frame[:, 2], (*GROOVE_COLOUR, SOLID_OPACITY)
-        )
+def _hull_points(solid: Solid) -> Array:
+    """Return points whose hull is, or looks like, a solid at the origin, shape (p, 3), m."""
+    if solid.kind == "mesh":
+        return solid.corners
+    if solid.kind == "box":
+        return np.array(list(product(*((-0.5 * side, 0.5 * side) for side in solid.sizes))))
+    if solid.kind == "cylinder":
+        return _rims(*solid.sizes)
+    # The radii of an ellipsoid, or that of a sphere.
+    return np.asarray(_sphere_points() * solid.sizes)
 
 
-def _objects(objects: SceneObjects, first: int) -> Iterator[_Solid]:
-    for index, name in enumerate(objects.by_name):
-        for shape, rotation, offset, colour in objects.parts(name):
-            corners = _hull_points(shape) @ rotation.T + offset
-            yield _Solid(first + index, corners, (*colour, SOLID_OPACITY))
-
-
-def _hull_points(shape: Command) -> Array:
-    """Return points whose hull is, or looks like, a geometry of meshcat."""
-    if shape["type"] == "BoxGeometry":
-        sides = [0.5 * shape[side] for side in ("width", "height", "depth")]
-        return np.array(list(product(*((-half, half) for half in sides))))
-    if shape["type"] == "CylinderGeometry":
-        return np.asarray(_rims(shape["radiusTop"], shape["height"]) @ Y_TO_Z)
-    if shape["type"] == "BufferGeometry":
-        return np.reshape(shape["data"]["attributes"]["position"]["array"], (-1, 3))
-    return _sphere_points(shape["radius"])
-
-
-def _sphere_points(radius: float) -> Array:
-    """Return points of a sphere, shape (p, 3)."""
+def _sphere_points() -> Array:
+    """Return points of the unit sphere, shape (p, 3)."""
     polar_angles = np.linspace(0.0, np.pi, 13)
     points = np.array([_rims(np.sin(angle), 2.0 * np.cos(angle))[: len(_CIRCLE_ANGLES)] for angle in polar_angles])
-    return np.asarray(radius * points.reshape(-1, 3))
+    return points.reshape(-1, 3)
 
 
 def _rims(radius: float, height: float) -> Array:

@@ -22,6 +22,7 @@ def opened(browser, url):
     browser.get("about:blank")
     browser.get_log("browser"), browser.get_log("performance")
     browser.get(url)
+    until(lambda: browser.execute_script("return Boolean(window.fingerPlayer)"))
     browser.execute_script("fingerPlayer.pause()")
     return browser
 

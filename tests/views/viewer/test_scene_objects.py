@@ -1,7 +1,5 @@
 """Objects and contacts on the page, read back from what it plays."""
 
-import base64
-import json
 import re
 from importlib import resources
 from typing import ClassVar
@@ -9,24 +7,14 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from pages import opened, seek
+from unpacked_page import unpacked
 
 import finger_pin as fp
 from finger_pin.views import draw, write_animation
 from finger_pin.views.plots.style import new_figure
 from finger_pin.views.viewer.animation import Playback, animation_page
-from finger_pin.views.viewer.drawing import FORCE_COLOUR
+from finger_pin.views.viewer.colours import FORCE_COLOUR
 from finger_pin.views.viewer.video import _Film
-
-
-def played(result):
-    """Return the data of the page of a result, and a function that decodes a column of its frames."""
-    text = animation_page(result)
-    found = json.loads(re.search(r'<script type="application/json" id="animation">\n(.*?)\n</script>', text, re.S)[1])
-
-    def column(name, kind="<f4"):
-        return np.frombuffer(base64.b64decode(found["chunks"][0][name]), dtype=kind)
-
-    return found, column
 
 
 @pytest.fixture(scope="module")
@@ -35,13 +23,13 @@ def pinched():
 
 
 def test_every_object_stands_where_it_is_and_moves_as_in_the_result(pinched):
-    found, column = played(pinched)
+    found, columns = unpacked(animation_page(pinched))
     objects = found["objects"]
     # On a palm that moves, what is fixed moves along.
     assert objects["free"] == ["object_ball", "object_tray"]
-    drawn = {each["path"] for each in objects["commands"]}
+    drawn = {each["path"] for each in found["commands"]}
     assert {"/finger_pin/object_ball/part0", "/finger_pin/object_tray/part0"} <= drawn
-    time, poses = column("time", "<f8"), column("object").reshape(-1, 2, 7)
+    time, poses = columns["time"], columns["object"].reshape(-1, 2, 7)
     at = pinched.sel(time=time)
     # The palm moves without turning.
     assert np.ptp(at.palm_position.values, axis=0).max() > 0.01
@@ -51,10 +39,10 @@ def test_every_object_stands_where_it_is_and_moves_as_in_the_result(pinched):
 
 
 def test_arrows_are_the_forces_of_the_contacts_that_close_and_cones_as_steep_as_friction(pinched):
-    found, column = played(pinched)
+    found, columns = unpacked(animation_page(pinched))
     assert found["objects"]["steepness"] == [0.7, 0.7]
-    numbers = column("contact").reshape(-1, 2, 9)
-    at = pinched.sel(time=column("time", "<f8"), contact=["left.distal-ball", "right.distal-ball"])
+    numbers = columns["contact"].reshape(-1, 2, 9)
+    at = pinched.sel(time=columns["time"], contact=["left.distal-ball", "right.distal-ball"])
     points = at.contact_point.values + at.palm_position.values[:, None]
     for first, expected in ((0, points), (3, at.contact_force.values), (6, at.contact_normal.values)):
         assert numbers[..., first : first + 3] == pytest.approx(expected, abs=1e-5)
@@ -76,9 +64,29 @@ def test_no_cone_is_larger_than_a_finger_is_wide(browser, pinched, tmp_path, fri
     assert len(slants) == 2 and 0.002 < min(slants) and max(slants) < 0.018
 
 
+def test_an_arrow_ends_where_bodies_touch_and_is_as_long_as_the_force_at_the_scale_of_the_panel(
+    browser, pinched, tmp_path
+):
+    page = opened(browser, write_animation(pinched, tmp_path / "pinch.html").as_uri())
+    seek(page, 0.5)
+    ends = page.execute_script("""
+    const { root, contacts } = fingerPlayer.scene; fingerPlayer.viewer.scene.updateMatrixWorld(true);
+    return contacts.map(({ head, shaft }) => [[head, "max"], [shaft, "min"]].map(([mesh, end]) => {
+      mesh.geometry.computeBoundingBox();
+      const y = mesh.geometry.boundingBox[end].y;
+      return root.worldToLocal(mesh.localToWorld(new MeshCat.THREE.Vector3(0, y, 0))).toArray();
+    }));""")
+    last = pinched.sel(contact=["left.distal-ball", "right.distal-ball"]).isel(time=-1)
+    (scale,) = re.findall(r"([0-9.]+) mm per N", page.find_element("id", "objects").text)
+    points = last.contact_point.values + last.palm_position.values
+    np.testing.assert_allclose(
+        ends, np.stack([points, points - 1e-3 * float(scale) * last.contact_force], 1), atol=1e-6
+    )
+
+
 def test_a_result_without_objects_has_none_on_its_page():
-    found, _ = played(fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.1})))
-    assert "objects" not in found and set(found["chunks"][0]) == {"time", "pose", "path", "tension", "tip", "joint"}
+    found, columns = unpacked(animation_page(fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.1}))))
+    assert "objects" not in found and set(columns) == {"time", "pose", "path", "tension", "tip", "joint"}
 
 
 class Window:
@@ -120,7 +128,7 @@ def test_a_film_shows_the_ball_round_and_where_it_is(pinched):
 
 def test_forces_have_one_colour_on_the_page_in_a_window_and_in_films():
     script = resources.files("finger_pin.views.viewer").joinpath("web/scene.js").read_text("utf-8")
-    colour = re.search(r"new ArrowHelper\(.*, 0x(\w{6})\)", script)[1]
+    colour = re.search(r"FORCE_COLOUR = 0x(\w{6});", script)[1]
     assert [round(255 * each) for each in FORCE_COLOUR[0]] == list(bytes.fromhex(colour))
 
 

@@ -4,14 +4,15 @@ import re
 
 import numpy as np
 import pytest
+from pages import until
 
 import finger_pin as fp
 from finger_pin.views.viewer import write_animation
 
 
-def test_eight_seconds_make_a_file_of_a_few_megabytes(result, tmp_path):
+def test_eight_seconds_of_a_finger_make_a_file_below_a_megabyte(result, tmp_path):
     longer = result.isel(time=np.arange(8001) % len(result.time)).assign_coords(time=np.arange(8001) * 1e-3)
-    assert write_animation(longer, tmp_path / "animation.html").stat().st_size < 4e6
+    assert write_animation(longer, tmp_path / "animation.html").stat().st_size < 1e6
 
 
 def test_the_file_names_no_address_to_load_from(result, tmp_path):
@@ -43,3 +44,22 @@ def test_a_tension_that_is_not_a_number_is_refused(result, tmp_path):
     broken["tendon_tension"][:, 2] = np.nan
     with pytest.raises(fp.InputError, match="tendon_tension"):
         write_animation(broken, tmp_path / "animation.html")
+
+
+@pytest.mark.parametrize(
+    ("without", "missing"),
+    [
+        ("delete window.DecompressionStream", "DecompressionStream"),
+        ("HTMLCanvasElement.prototype.getContext = () => null", "WebGL"),
+    ],
+)
+def test_a_browser_that_cannot_play_the_page_is_told_what_it_lacks(browser, result, tmp_path, without, missing):
+    path = write_animation(result, tmp_path / "animation.html")
+    script = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": without})
+    try:
+        browser.get(path.as_uri())
+        until(lambda: browser.find_element("id", "title").text)
+        told = browser.find_element("id", "title").text
+    finally:
+        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", script)
+    assert told.startswith("This browser cannot play the page:") and missing in told

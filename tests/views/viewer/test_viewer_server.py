@@ -68,7 +68,7 @@ def test_view_opens_the_browser_at_its_own_address_also_where_ipykernel_was_impo
 
 
 def test_a_blocking_view_ends_with_an_interrupt(result, monkeypatch, capsys):
-    monkeypatch.setattr("finger_pin.views.viewer.page_server.PageServer.join", interrupt)
+    monkeypatch.setattr("threading.Thread.join", interrupted_join)
     viewing = view(result, open_browser=False, block=True)
     assert viewing.url in capsys.readouterr().out
     with pytest.raises(OSError, match="refused"):
@@ -77,7 +77,7 @@ def test_a_blocking_view_ends_with_an_interrupt(result, monkeypatch, capsys):
 
 def test_without_a_browser_a_view_waits_only_if_it_was_asked_to(result, monkeypatch, capsys):
     monkeypatch.setattr("webbrowser.open", lambda url, new: False)
-    monkeypatch.setattr("finger_pin.views.viewer.page_server.PageServer.join", interrupt)
+    monkeypatch.setattr("threading.Thread.join", interrupted_join)
     with view(result) as viewing:
         assert viewing.url.encode() and fetch(viewing.url)
         told = capsys.readouterr()
@@ -86,8 +86,11 @@ def test_without_a_browser_a_view_waits_only_if_it_was_asked_to(result, monkeypa
     assert "Ctrl-C ends this" in capsys.readouterr().out
 
 
-def interrupt(_):
-    raise KeyboardInterrupt
+def interrupted_join(thread, timeout=None, join=threading.Thread.join):
+    """Wait for a thread; Ctrl-C comes while somebody waits only for a while."""
+    if timeout is not None:
+        raise KeyboardInterrupt
+    join(thread)
 
 
 def test_a_notebook_shows_the_page_in_its_cell_and_opens_no_window(result, kernel, monkeypatch):

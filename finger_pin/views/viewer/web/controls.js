@@ -2,11 +2,11 @@
 
 // Time, buttons and read-outs. Also the page's interface to scripts: `fingerPlayer`.
 class Player {
-  constructor(config) {
+  constructor(config, frames) {
     this.config = config;
-    this.frames = new Frames(config);
+    this.frames = frames;
     this.viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-    this.scene = new FingerScene(this.viewer, config, this.frames);
+    this.scene = new FingerScene(this.viewer, config, frames);
     this.scale = config.tensionScale;
     this.time = 0;
     this.speed = 1;
@@ -14,25 +14,10 @@ class Player {
     this.sharpness = 1;
     this.due = this.started = 0;
     this.build();
-    for (const chunk of config.chunks) this.append(chunk);
     this.scene.frame("oblique");
-    this.seek(this.frames.start);
+    this.seek(frames.start);
     this.play();
     requestAnimationFrame((now) => this.tick(now));
-  }
-
-  append(chunk) {
-    const tensions = this.frames.columns.tension;
-    const known = tensions.count;
-    this.frames.append(chunk);
-    for (const tension of tensions.data.subarray(known * tensions.width, tensions.count * tensions.width)) {
-      while (tension > this.scale) this.scale = nextScale(this.scale);
-      if (tension > 0) this.element.scale.hidden = false;
-    }
-    if (this.drawnScale !== this.scale) this.drawLegend();
-    for (const trace of this.scene.traces) trace.rebuild();
-    this.element.scrub.min = this.frames.start;
-    this.element.scrub.max = this.frames.end;
   }
 
   tick(now) {
@@ -81,15 +66,13 @@ class Player {
   }
 
   seek(time) {
-    if (!this.frames.count) return;
     this.time = Math.min(Math.max(time, this.frames.start), this.frames.end);
     const place = this.frames.locate(this.time);
     const tensions = this.frames.mix("tension", place);
-    const colours = Array.from(tensions, (tension) => {
-      const loose = looseness(tension, this.config.slackTension);
-      return tensionColour(tension, this.scale).map((value, i) => value + loose * (LOOSE[i] - value));
-    });
-    this.scene.show(place, [...colours, CORD]);
+    const { slackTension, colours: palette } = this.config;
+    const colours = Array.from(tensions, (tension) =>
+      mixed(tensionColour(tension, this.scale, palette.tension), palette.slack, looseness(tension, slackTension)));
+    this.scene.show(place, [...colours, palette.cord]);
     this.readOut(tensions, colours, this.frames.mix("joint", place));
     this.refresh();
   }
@@ -131,7 +114,9 @@ class Player {
     const tendons = this.config.strands.length > 0;
     for (const section of document.querySelectorAll(".tendons")) section.hidden = !tendons;
     // Without any tension its colours say nothing.
-    this.element.scale.hidden = true;
+    this.element.scale.hidden = !this.frames.columns.tension.data.some((tension) => tension > 0);
+    this.drawLegend();
+    Object.assign(this.element.scrub, { min: this.frames.start, max: this.frames.end });
     // The tables of a hand would cover half of a phone.
     const narrow = window.matchMedia("(max-width: 600px), (max-height: 500px)");
     const fold = () => { this.element.readings.open = !(this.hand && narrow.matches); };
@@ -184,7 +169,7 @@ class Player {
     const { legend, ticks } = this.element;
     const pen = legend.getContext("2d");
     for (let x = 0; x < legend.width; x++) {
-      pen.fillStyle = css(tensionColour((x / (legend.width - 1)) * this.scale, this.scale));
+      pen.fillStyle = css(tensionColour(x / (legend.width - 1), 1, this.config.colours.tension));
       pen.fillRect(x, 0, 1, 1);
     }
     ticks.replaceChildren(...[0, 0.5, 1].map((part) => {
@@ -193,7 +178,6 @@ class Player {
       tick.textContent = `${Number((part * this.scale).toPrecision(3))}${part === 1 ? " N" : ""}`;
       return tick;
     }));
-    this.drawnScale = this.scale;
   }
 }
 
@@ -222,10 +206,15 @@ const degrees = (angle, digits) => `${((180 / Math.PI) * angle).toFixed(digits).
 
 const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(",")})`;
 
-// The upper end of the legend goes in steps whose quarters are short numbers.
-function nextScale(scale) {
-  const decade = 10 ** Math.floor(Math.log10(scale * 1.0001));
-  return decade * [2, 4, 6, 8, 10].find((step) => step * decade > scale * 1.0001);
+async function start() {
+  const [meshcat, scene, frames] = await Promise.all(["meshcat", "scene", "frames"].map(unpack));
+  const text = (bytes) => new TextDecoder().decode(bytes);
+  document.head.append(Object.assign(document.createElement("script"), { textContent: text(meshcat) }));
+  const config = JSON.parse(text(scene));
+  window.fingerPlayer = new Player(config, new Frames(config.columns, frames));
 }
 
-window.fingerPlayer = new Player(JSON.parse(document.getElementById("animation").textContent));
+start().catch((error) => {
+  document.getElementById("title").textContent = `This browser cannot play the page: ${error.message}`;
+  throw error;
+});

@@ -88,19 +88,15 @@ class TendonView {
 class Trace {
   constructor(viewer, config, frames, finger) {
     this.frames = frames;
-    this.first = 3 * finger;
     const look = { color: 0x000000, emissive: 0xff86b4 };
     this.past = new Tube(TRACE_POINTS, 0.6 * config.tubeRadius, look);
     this.rest = new Tube(TRACE_POINTS, 0.3 * config.tubeRadius, { ...look, transparent: true, opacity: 0.35 });
     viewer.set_object([ROOT, "fingertip_trace", String(finger), "past"], this.past.mesh);
     viewer.set_object([ROOT, "fingertip_trace", String(finger), "rest"], this.rest.mesh);
-  }
-
-  rebuild() {
     const tips = new Float32Array(3 * TRACE_POINTS);
     for (let i = 0; i < TRACE_POINTS; i++) {
-      const frame = Math.round((i * (this.frames.count - 1)) / (TRACE_POINTS - 1));
-      tips.set(this.frames.columns.tip.row(frame).subarray(this.first, this.first + 3), 3 * i);
+      const frame = Math.round((i * (frames.count - 1)) / (TRACE_POINTS - 1));
+      tips.set(frames.row("tip", frame).subarray(3 * finger, 3 * finger + 3), 3 * i);
     }
     this.past.shape(tips);
     this.rest.shape(tips);
@@ -117,12 +113,17 @@ class Trace {
 // long as the arrow's part along the normal, but no larger than a finger is wide.
 class ContactView {
   constructor(viewer, config, steepness, index) {
-    const { ArrowHelper, ConeGeometry, DoubleSide, Group, Mesh, MeshPhongMaterial, Vector3 } = MeshCat.THREE;
+    const { ConeGeometry, CylinderGeometry, DoubleSide, Group, Mesh, MeshPhongMaterial } = MeshCat.THREE;
     this.length = config.objects.length;
     this.tallest = config.objects.cone / Math.hypot(1, steepness);
     this.group = new Group();
-    this.arrow = new ArrowHelper(new Vector3(0, 0, 1), new Vector3(), 1, 0xff5a5a);
-    // Its apex at the origin, open along -y.
+    // All of them have their end at the origin and are open along -y.
+    const [radius, paint] = [0.6 * config.tubeRadius, new MeshPhongMaterial({ color: FORCE_COLOUR })];
+    this.headLength = 6 * radius;
+    this.head = new Mesh(new ConeGeometry(2.5 * radius, 1, 20).translate(0, -0.5, 0), paint);
+    this.shaft = new Mesh(new CylinderGeometry(radius, radius, 1, 12).translate(0, -0.5, 0), paint);
+    this.arrow = new Group();
+    this.arrow.add(this.head, this.shaft);
     const cone = new ConeGeometry(steepness, 1, 40, 1, true).translate(0, -0.5, 0);
     const look = { color: 0x9ad0ff, transparent: true, opacity: 0.25, side: DoubleSide, depthWrite: false };
     this.cone = new Mesh(cone, new MeshPhongMaterial(look));
@@ -137,9 +138,11 @@ class ContactView {
     this.group.visible = size > 1e-6 && normal.lengthSq() > 0.5;
     if (!this.group.visible) return;
     const along = force.clone().normalize();
-    this.arrow.position.copy(point).addScaledVector(along, -size);
-    this.arrow.setDirection(along);
-    this.arrow.setLength(size, Math.min(0.3 * size, 0.008), Math.min(0.15 * size, 0.004));
+    this.arrow.position.copy(point);
+    this.arrow.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), along);
+    this.head.scale.y = Math.min(this.headLength, 0.6 * size);
+    this.shaft.position.y = -0.9 * this.head.scale.y;
+    this.shaft.scale.y = size - 0.9 * this.head.scale.y;
     this.cone.position.copy(point);
     this.cone.quaternion.setFromUnitVectors(new Vector3(0, -1, 0), normal.normalize());
     this.cone.scale.setScalar(Math.min(Math.max(-this.length * force.dot(normal), 1e-6), this.tallest));
@@ -148,6 +151,8 @@ class ContactView {
 
 const ROOT = "finger_pin";
 const TRACE_POINTS = 800;
+// Of contact forces, which no tension has.
+const FORCE_COLOUR = 0xff5a5a;
 
 class FingerScene {
   constructor(viewer, config, frames) {
@@ -156,12 +161,9 @@ class FingerScene {
     this.frames = frames;
     for (const command of config.commands) viewer.handle_command(command);
     this.links = config.links.map((name) => viewer.scene_tree.find([ROOT, name]).object);
-    for (const command of config.ghost?.commands ?? []) viewer.handle_command(command);
     this.ghostLinks = (config.ghost?.links ?? []).map((name) => viewer.scene_tree.find([ROOT, "ghost", name]).object);
-    for (const command of config.objects?.commands ?? []) viewer.handle_command(command);
     this.free = (config.objects?.free ?? []).map((name) => viewer.scene_tree.find([ROOT, name]).object);
     this.contacts = (config.objects?.steepness ?? []).map((each, i) => new ContactView(viewer, config, each, i));
-    config.inView.push(...(config.alsoInView ?? []));
     this.tendons = config.tendons.map((tendon) => new TendonView(viewer, config, tendon));
     this.traces = Array.from({ length: config.tips }, (_, i) => new Trace(viewer, config, frames, i));
     this.root = viewer.scene_tree.find([ROOT]).object;
@@ -189,7 +191,6 @@ class FingerScene {
     viewer.set_property(["Background"], "top_color", [0.17, 0.21, 0.28]);
     viewer.set_property(["Background"], "bottom_color", [0.06, 0.08, 0.11]);
     viewer.set_property(["Axes"], "visible", false);
-    viewer.set_transform(["Axes"], [0.05, 0, 0, 0, 0, 0.05, 0, 0, 0, 0, 0.05, 0, 0, 0, 0, 1]);
     const intensity = { AmbientLight: 0.62, FillLight: 0.18, PointLightNegativeX: 0.42, PointLightPositiveX: 0.22 };
     for (const [name, value] of Object.entries(intensity)) {
       viewer.set_property(["Lights", name, "<object>"], "intensity", value);
