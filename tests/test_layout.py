@@ -84,7 +84,7 @@ def test_no_import_changes_the_process():
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_public_modules_stand_on_the_page_and_those_of_the_contract_are_among_them():
+def test_upper_rooms_import_public_modules_alone_and_these_stand_on_the_page():
     page = (PACKAGE / "README.md").read_text(encoding="utf-8")
     section = page.partition("## What others may build on\n")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| .* \| (`.*`) \|$", section, re.MULTILINE)
@@ -92,8 +92,9 @@ def test_public_modules_stand_on_the_page_and_those_of_the_contract_are_among_th
     assert public <= set(MODULES) | {name.removesuffix(".__init__") for name in MODULES}
     linter = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     (contract,) = (each for each in linter["contracts"] if each["name"] == "Upper rooms build on public modules")
-    imports = (each.split(" -> ") for each in contract["ignore_imports"])
-    ignored = {module for importer, module in imports if importer == "finger_pin.**"}
+    imports = [each.split(" -> ") for each in contract["ignore_imports"]]
+    assert {importer for importer, _ in imports} == {"finger_pin.**"}
+    ignored = {module for _, module in imports}
     assert {name for name in ignored if not name.startswith("finger_pin.analysis.")} <= public
     # What the package itself exports of its lower rooms is public.
     upper = {name.split(".")[1] for name in contract["source_modules"]}
@@ -101,6 +102,25 @@ def test_public_modules_stand_on_the_page_and_those_of_the_contract_are_among_th
     exported = {name for name in re.findall(r"^from \.(\w+\.[\w.]+) import", stub, re.MULTILINE)}
     lower = {f"finger_pin.{name}" for name in exported if name.split(".")[0] not in upper}
     assert {name for name in lower if not name.startswith("finger_pin.analysis.")} <= public
+
+
+def length_of(function):
+    """Return the number of lines of a function without its docstring."""
+    first, lines = function.body[0], function.end_lineno - function.lineno + 1
+    return lines - (first.end_lineno - first.lineno + 1 if ast.get_docstring(function) else 0)
+
+
+def test_files_have_at_most_300_lines_and_functions_of_the_package_60_beside_their_docstrings():
+    long_files, long_functions = [], []
+    for path in (each for room in ("finger_pin", "scripts", "tests") for each in (PACKAGE.parent / room).rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        long_files += [path] if len(text.splitlines()) > 300 else []
+        if PACKAGE not in path.parents:
+            continue
+        functions = (each for each in ast.walk(ast.parse(text)) if isinstance(each, ast.FunctionDef))
+        long_functions += [(path.name, each.name) for each in functions if length_of(each) > 60]
+    # One sum over rows, which compiled code makes in one function.
+    assert (long_files, long_functions) == ([], [("condensation.py", "_gains")])
 
 
 def names_of(path):

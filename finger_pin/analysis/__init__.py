@@ -12,9 +12,8 @@ from finger_pin.analysis.locking_margin import SelfLockingMargin, locking_advice
 from finger_pin.analysis.path_jumps import PathJump, path_jumps
 from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
-from finger_pin.analysis.settled_postures import settled_posture
 from finger_pin.analysis.spring_return import SpringReturn, spring_return
-from finger_pin.analysis.steady import SteadyState, rubbing_cords, steady_state
+from finger_pin.analysis.steady import SteadyState, rubbing_cords, settled_posture, steady_state
 from finger_pin.analysis.tip_force import RequiredTension, largest_force, tension_for_force
 from finger_pin.analysis.tip_statics import Friction
 

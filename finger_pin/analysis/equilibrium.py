@@ -16,8 +16,7 @@ from finger_pin.laws.muscle import active_work
 from finger_pin.mechanism.coerce import FingerLike, as_finger, as_inputs
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.tendons import SOURCES_WITH_END, WINCHES
-from finger_pin.mechanism.tree_mechanism import MUSCLES, STATEFUL, STATELESS
+from finger_pin.mechanism.groups import MUSCLES, SOURCES_WITH_END, STATEFUL, STATELESS, WINCHES
 from finger_pin.typing import Array
 
 # Change of an angle for differences, rad.

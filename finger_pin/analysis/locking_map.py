@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.analysis.directions import directions_of_motion
+from finger_pin.analysis.locking import directions_of_motion
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.analysis.directions import sliding_velocity
+from finger_pin.analysis.locking import sliding_velocity
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits

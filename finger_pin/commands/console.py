@@ -23,7 +23,7 @@ def bar(visible: bool, unit: str, total: float | None = None) -> Iterator[Callab
     if not visible:
         yield lambda *numbers, **texts: None
         return
-    from finger_pin.simulation.progress import ProgressBar
+    from finger_pin.progress import ProgressBar
 
     with closing(ProgressBar(unit, total)) as update:
         yield update

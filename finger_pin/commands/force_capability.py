@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from finger_pin.commands.console import print_text, shows_progress
 from finger_pin.commands.options import Format, Output, number, numbers
+from finger_pin.exceptions import InputError
+
+if TYPE_CHECKING:
+    from finger_pin.mechanism.finger import Finger
+    from finger_pin.typing import Array
 
 # Of degrees, rad.
 _ROUNDING = 1e-9
@@ -50,16 +55,8 @@ def force_capability(
     if limit == "servos":
         limits = tension_limits(model)
         if not np.isfinite(limits).all():
-            raise fp.InputError("--limit", "every tendon needs an actuator, or give a number", limit)
-    limiter, joints = model.stroke_limiter, model.routing.joints
-    angles = limiter.lower + (limiter.upper - limiter.lower) / 3.0 if degrees is None else np.deg2rad(degrees)
-    if len(angles) != len(joints):
-        allowed = f"must be {len(joints)} angles with commas between, one per joint ({', '.join(joints)})"
-        raise fp.InputError("--posture", allowed, degrees)
-    for joint, angle, low, high in zip(joints, angles, limiter.lower, limiter.upper, strict=True):
-        if not low - _ROUNDING <= angle <= high + _ROUNDING:
-            allowed = f"{joint} must be from {np.rad2deg(low):.4g} to {np.rad2deg(high):.4g} deg, the joint's range"
-            raise fp.InputError("--posture", allowed, degrees)
+            raise InputError("--limit", "every tendon needs an actuator, or give a number", limit)
+    angles = _posture(model, degrees)
     tensions = {friction: tension_for_force(model, angles, target_force, friction=friction) for friction in Friction}
     polytope = force_polytope(model, angles, limits)
     figures = {
@@ -81,3 +78,21 @@ def force_capability(
         from finger_pin.views.viewer import view_forces
 
         view_forces(model.description, polytope, tension=tensions[Friction.NONE].strands, block=True)
+
+
+def _posture(finger: Finger, degrees: list[float] | None) -> Array:
+    """Return the angles of the joints, shape (n,), rad, by default a third of their ranges; refuse any beyond these."""
+    import numpy as np
+
+    limiter, joints = finger.stroke_limiter, finger.routing.joints
+    if degrees is None:
+        return limiter.lower + (limiter.upper - limiter.lower) / 3.0
+    if len(degrees) != len(joints):
+        allowed = f"must be {len(joints)} angles with commas between, one per joint ({', '.join(joints)})"
+        raise InputError("--posture", allowed, degrees)
+    angles = np.deg2rad(degrees)
+    for joint, angle, low, high in zip(joints, angles, limiter.lower, limiter.upper, strict=True):
+        if not low - _ROUNDING <= angle <= high + _ROUNDING:
+            allowed = f"{joint} must be from {np.rad2deg(low):.4g} to {np.rad2deg(high):.4g} deg, the joint's range"
+            raise InputError("--posture", allowed, degrees)
+    return angles

@@ -22,8 +22,8 @@ from finger_pin.commands.options import (
     open_pool,
     overrides,
     refuse_format,
+    run_study,
 )
-from finger_pin.commands.study import run_study
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,4 +1,4 @@
-"""Arguments and options of several commands, and parsers of their texts."""
+"""Arguments and options of several commands, parsers of their texts, and how commands run a study."""
 
 from __future__ import annotations
 
@@ -6,16 +6,23 @@ import hashlib
 import logging
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from finger_pin.cancellation import CancelToken, Stop
+from finger_pin.commands.console import error_note, print_text, runs_bar, shows_progress
 from finger_pin.version import installing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from finger_pin.studies.records import Progress
 
 # A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
 _BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
@@ -39,6 +46,50 @@ Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster of a scheduler, such as tcp://host:8786.")
 ]
 Restart = Annotated[bool, typer.Option("--restart", help="Drop the records of a study in the folder, and begin anew.")]
+
+
+def run_study(
+    label: str,
+    run: Callable[[Progress | None, Stop], xr.Dataset],
+    summary: Callable[[xr.Dataset], str],
+    figure: str,
+    output: Path,
+    *,
+    figures: bool,
+    format: str | None,
+    quiet: bool,
+    unfinished: Callable[[xr.Dataset], bool] = lambda result: True,
+) -> xr.Dataset:
+    """Run a study, draw it and print its summary; return its result.
+
+    Args:
+        label: Word before the progress bar.
+        run: Function of the progress callback and the stop check that returns the result of the study.
+        summary: Function that returns the summary of the result.
+        figure: Name of the file, and after ``plot_`` of the function that draws it.
+        output: Folder of the study.
+        figures: Whether to draw.
+        format: Of the figure.
+        quiet: Whether to print nothing.
+        unfinished: Function that returns whether an interrupted result lacks runs.
+
+    Raises:
+        KeyboardInterrupt: After all that, if it was interrupted.
+    """
+    visible = shows_progress(quiet)
+    token = CancelToken()
+    with error_note("the same command continues from what is recorded"):
+        with runs_bar(visible, label) as progress, token:
+            result = run(progress, token)
+        if figures and not token.cancelled:
+            from finger_pin.views import plots
+
+            plots.save_figure(getattr(plots, f"plot_{figure}")(result), output / "figures" / figure, format)
+        if not quiet:
+            print_text(f"{summary(result)}\n\nResults are in {output}")
+        if token.cancelled and unfinished(result):
+            raise KeyboardInterrupt
+    return result
 
 
 def invalid(option: str, allowed: str) -> typer.TyperException:
@@ -94,7 +145,7 @@ def open_pool(workers: int | None, scheduler: str | None) -> AbstractContextMana
         if workers is not None:
             raise invalid("--workers", "are local; those of a scheduler are its own")
         return _dask(scheduler)
-    from finger_pin.core.threads import usable_cores
+    from finger_pin.threads import usable_cores
 
     if workers is not None and workers < 1:
         raise invalid("--workers", f"must be at least 1, not {workers}")

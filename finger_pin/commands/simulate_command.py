@@ -61,8 +61,6 @@ def simulate(
         return
     from finger_pin.description.loading import load_scenario
     from finger_pin.simulation.convergence import scenario_to_repeat
-    from finger_pin.simulation.recording import select
-    from finger_pin.simulation.result_folder import ResultFolder
 
     loaded = (
         load_scenario("fig6" if scenario is None else scenario, changes)
@@ -73,20 +71,7 @@ def simulate(
     if check:
         scenario_to_repeat(loaded)
     names = None if variables is None else _read_variables(variables, loaded)
-    with ResultFolder(output) as folder:
-        token = CancelToken()
-        result, problem = compute(loaded, token, quiet, check)
-        if result is None:
-            assert problem is not None
-            problem.add_note("nothing was computed")
-            raise problem
-        with error_note("earlier results are as they were"):
-            with token:
-                folder.write(result if names is None else select(result, [*names, "convergence_difference"]))
-            drawing_problem = draw(result, folder, token, figures, format)
-            problem = (problem or drawing_problem) if token.cancelled else (drawing_problem or problem)
-            with token:
-                folder.publish()
+    result, problem = _publish(loaded, output, names, quiet, check, figures, format)
     if not quiet:
         from finger_pin.views.summary import summarize
 
@@ -98,6 +83,39 @@ def simulate(
         from finger_pin.views.viewer import view as show_view
 
         show_view(result, block=True)
+
+
+def _publish(
+    scenario: Scenario,
+    output: Path,
+    names: list[str] | None,
+    quiet: bool,
+    check: bool,
+    figures: bool,
+    format: str | None,
+) -> tuple[xr.Dataset, BaseException | None]:
+    """Simulate, and write the result with its pictures into its folder, all or nothing.
+
+    Returns:
+        The whole result, and the exception that stopped the run or the drawing, or None.
+    """
+    from finger_pin.simulation.recording import select
+    from finger_pin.simulation.result_folder import ResultFolder
+
+    with ResultFolder(output) as folder:
+        token = CancelToken()
+        result, problem = compute(scenario, token, quiet, check)
+        if result is None:
+            assert problem is not None
+            problem.add_note("nothing was computed")
+            raise problem
+        with error_note("earlier results are as they were"):
+            with token:
+                folder.write(result if names is None else select(result, [*names, "convergence_difference"]))
+            drawing_problem = draw(result, folder, token, figures, format)
+            with token:
+                folder.publish()
+    return result, (problem or drawing_problem) if token.cancelled else (drawing_problem or problem)
 
 
 def _read_variables(text: str, scenario: Scenario) -> list[str]:
@@ -141,7 +159,7 @@ def compute(
 ) -> tuple[xr.Dataset | None, BaseException | None]:
     """Return the result as far as it goes, its convergence if asked, and the exception that stopped it, or None."""
     from finger_pin.simulation.convergence import check_convergence
-    from finger_pin.simulation.run import run
+    from finger_pin.simulation.simulate import run
 
     bar = progress_bar(shows_progress(quiet), scenario.simulation.duration)
     with bar as progress, token, warnings.catch_warnings():

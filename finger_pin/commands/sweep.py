@@ -22,8 +22,8 @@ from finger_pin.commands.options import (
     open_pool,
     overrides,
     refuse_format,
+    run_study,
 )
-from finger_pin.commands.study import run_study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -135,7 +135,7 @@ def build_design(kind: str, over: list[str], samples: int | None, seed: int) -> 
     """Return the design that the options describe."""
     from finger_pin.exceptions import InputError
     from finger_pin.studies import Grid, LatinHypercube, PointList
-    from finger_pin.studies.parsers import parse_range, parse_values
+    from finger_pin.studies.designs import parse_range, parse_values
 
     parse: Any = parse_range if kind == "latin" else parse_values
     axes: dict[str, Any] = {}

@@ -9,14 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from finger_pin.analysis import closure_over_range, critical_friction
-from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.compensated import CompensatedController, PassiveTensionLoop
 from finger_pin.control.distribution import PseudoInverse, TensionDistribution
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.passive_loop import PassiveTensionLoop
-from finger_pin.control.proportional import ProportionalController, RoutedController
+from finger_pin.control.proportional import FingertipForce, ProportionalController, RoutedController, TorqueLaw
 from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward
-from finger_pin.control.torque import FingertipForce, TorqueLaw
 from finger_pin.description.caching import memoised
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Routing, routing_parts

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.control.input_queue import input_delays
+from finger_pin.control.inputs import input_delays
 from finger_pin.control.interface import ControlSignals, LoopController
 from finger_pin.core.tables.inputs import InputTable, core_signal, scheduled_control
 from finger_pin.description.effects import wound_tendons

@@ -13,16 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
-from finger_pin.control.input_queue import input_delays
+from finger_pin.control.inputs import input_delays, inputs_by_name
 from finger_pin.control.interface import Controller, ControlSignals, LoopController
-from finger_pin.control.named_inputs import inputs_by_name
 from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.description.commands import command_place
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import Series
 from finger_pin.description.validation import choices
-from finger_pin.description.winding import command_place
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals, SignalReference

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, field_serializer, field_validator
 
+from finger_pin.description.commands import BY_NAME
 from finger_pin.description.fields import flatten, unflatten
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.signals import ForceSignal, InputSignal, SpoolAngle, VoltageSignal, WoundLength, check_axes
@@ -24,7 +25,7 @@ from finger_pin.description.validation import (
     reals,
     suggestion,
 )
-from finger_pin.description.winding import BY_NAME, check_supplies, check_winding
+from finger_pin.description.winding import check_supplies, check_winding
 
 Share = Annotated[float, real(0.0, 2.0)]
 

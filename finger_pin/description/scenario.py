@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
 
+from finger_pin.description.commands import BY_NAME, BY_SOURCE
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.effects import CLOSED_LOOP, OF_SCENARIO, idle, shown
@@ -21,7 +22,7 @@ from finger_pin.description.tables import error_of_hand, settings_of_finger
 from finger_pin.description.tautness import Tautness, check_currents
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.description.validation import Description, Name, expand, problem, suggestion
-from finger_pin.description.winding import BY_NAME, BY_SOURCE, check_sources, hand_with_winches, with_winches
+from finger_pin.description.winding import check_sources, hand_with_winches, with_winches
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
@@ -203,8 +204,7 @@ class Scenario(Description):
     def _check_names(self) -> None:
         """Refuse a table for a joint or a finger that is not there."""
         initial = self.simulation.initial or InitialSettings()
-        keyframes = tuple(self.finger.tree.keyframes)
-        joints = tuple(self.finger.joints)
+        keyframes, joints = tuple(self.finger.tree.keyframes), tuple(self.finger.joints)
         fingers = tuple(self.hand.fingers) if self.hand else self.finger.tree.tip_names
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
             "reference.joints": (self.reference.joints, "joint", joints),

@@ -210,8 +210,7 @@ def _broyden_update(
     problem: Problem, slopes: Sequence[Array], step: Array, before: Sequence[Array], after: Sequence[Array]
 ) -> list[Array]:
     """Return slopes that agree with a step and change the least: Broyden's update."""
-    low, high = problem.box
-    direction = step / (high - low) ** 2
+    direction = step / np.subtract(*problem.box) ** 2
     direction /= step @ direction
     return [j + np.outer(b - a - j @ step, direction) for j, a, b in zip(slopes, before, after, strict=True)]
 
@@ -274,9 +273,8 @@ def best_of(problem: Problem, fits: Sequence[Fit]) -> Fit:
 
 def information(problem: Problem, minimum: Fit) -> Array:
     """Return the Fisher information of z at a minimum, shape (p, p)."""
-    slopes = problem.slopes(minimum.z)
     factors = minimum.weights / minimum.noise**2
-    total: Array = sum(f * j.T @ j for f, j in zip(factors, slopes, strict=True))
+    total: Array = sum(f * j.T @ j for f, j in zip(factors, problem.slopes(minimum.z), strict=True))
     return total
 
 

@@ -15,10 +15,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, PPoly, make_interp_spline, make_splrep
 
-from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control import ClosedLoop
+from finger_pin.description.commands import WINDINGS
 from finger_pin.description.recordings.bench import IMPOSED
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.winding import WINDINGS
 from finger_pin.exceptions import InputError
 from finger_pin.identification.motions import RecordedMotion
 from finger_pin.identification.recorded_inputs import without_commands

@@ -10,23 +10,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control import ClosedLoop
 from finger_pin.core.steps.trajectory import Trajectory
-from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.identification.recorded_inputs import check_references, put_inputs, with_corrected_inputs
+from finger_pin.identification.recorded_inputs import (
+    check_reachable,
+    check_references,
+    far_start_warning,
+    put_inputs,
+    recorded_starts,
+    start_parameters,
+    with_corrected_inputs,
+)
 from finger_pin.identification.recordings import Recording, ScenarioMap, wraparound_warning
 from finger_pin.identification.scenario_parameters import Corrections, NuisanceParameter, corrections
-from finger_pin.identification.starts import check_reachable, far_start_warning, recorded_starts, start_parameters
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.recording import RunArrays, record_arrays
-from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.recording import RunArrays
 from finger_pin.simulation.sensitivity import make_variations, repeat_steps, with_exact_encoders
 from finger_pin.simulation.setup import Setup
-from finger_pin.simulation.variables import coordinates
+from finger_pin.threads import in_threads
 from finger_pin.typing import Array
 
 # Tolerances of runs for slopes over the scenario's: slopes err by about 1e-2, and a search needs no more, as residuals
@@ -230,9 +235,7 @@ class RecordedMotion:
         """Return the variables of the outputs with a delay, at the instants before it."""
         names = dict.fromkeys(key.partition(".")[0] for key, lag in delays.items() if lag == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
-        motions = SampledTrajectory(setup.loop, trajectory, times, tuple(names))
-        arrays = record_arrays(motions, tuple(names), f"{self._entry}.outputs")
-        return RunArrays(arrays, coordinates(setup.scenario, setup.loop, times), {})
+        return setup.record(trajectory, times, tuple(names), f"{self._entry}.outputs")
 
     def _column(self, arrays: RunArrays, name: str) -> Array:
         """Return a column of a variable by its labels, or the difference of two, as in ``spool_tension.A-B``."""

@@ -11,7 +11,6 @@ from typing import TypeVar
 import numpy as np
 from scipy.stats import qmc
 
-from finger_pin.core.threads import in_threads
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.exceptions import InputError
 from finger_pin.identification.checkpoint import Checkpoint
@@ -21,10 +20,10 @@ from finger_pin.identification.estimate import Fit, best_of, fit, fit_with_resta
 from finger_pin.identification.intervals import CHI2_95, ProfileBound, SmallSample, covariance, profile
 from finger_pin.identification.likelihood import minus_twice_likelihood
 from finger_pin.identification.misfit import sandwich_covariance
-from finger_pin.identification.neighbours import lowest_minima, neighbour_lines
-from finger_pin.identification.open_directions import OpenDirection, open_directions
+from finger_pin.identification.open_directions import OpenDirection, lowest_minima, neighbour_lines, open_directions
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.scenario_parameters import entry_of
+from finger_pin.threads import in_threads
 from finger_pin.typing import Array
 
 #: Called with the name of the task, the number of finished parts, and the number of all.

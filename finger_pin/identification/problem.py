@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.threads import in_threads
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.identification.likelihood import (
@@ -33,6 +32,7 @@ from finger_pin.identification.scenario_parameters import (
     recording_pattern,
     scenario_parts,
 )
+from finger_pin.threads import in_threads
 from finger_pin.typing import Array
 
 # Tolerances of fine and rough runs over the scenario's, and the least number of block means of every output in rough

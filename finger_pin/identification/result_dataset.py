@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from finger_pin.identification.cross_validation import CrossValidation, shift_de
 from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import CHI2_95, NORMAL_95, ProfileBound, SmallSample, covariance
 from finger_pin.identification.likelihood import minus_twice_likelihood
-from finger_pin.identification.misfit import outliers, repeats
+from finger_pin.identification.misfit import SIGNIFICANCE, outliers, repeats
 from finger_pin.identification.pipeline import FitPipeline
 from finger_pin.identification.problem import Problem
 from finger_pin.identification.scenario_parameters import (
@@ -180,22 +180,7 @@ def _signals(
     # Windows of an output share its values: the first one has them.
     first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
     repeated = {first.index(k): each for each in repeats(problem, best.residuals) for k in each.signals if k in first}
-    sample_columns = {
-        "signal_index": np.repeat(groups, [len(s.measured) for s in signals]),
-        "instant": np.concatenate([s.instant for s in signals]),
-        "applied": np.concatenate([s.load for s in signals]),
-        "measured": np.concatenate([s.measured for s in signals]),
-        "residual": np.concatenate(errors),
-        "outlier": np.concatenate(outliers(problem, best.residuals)),
-    }
-    long_names = {
-        "signal_index": "which signal",
-        "instant": "time, s; number of a steady reading",
-        "applied": "what pulls, N",
-        "measured": "measured, in the unit of the signal",
-        "residual": "measured less computed, in the unit of the signal",
-        "outlier": "residual over the deviation that the median of all tells; zero of those that are no outliers",
-    }
+    samples = _samples(problem, best, errors)
     return {
         "signal_units": ("signal", [signals[k].unit for k in first]),
         "signal_steady": ("signal", [not signals[k].ordered for k in first]),
@@ -223,13 +208,34 @@ def _signals(
         "lack_of_fit": (
             "signal",
             [repeated[k].p_value if k in repeated else math.nan for k in range(len(first))],
-            {"units": "1", "long_name": "probability that a model that misses nothing misses as much (F test)"},
+            {
+                "units": "1",
+                "long_name": "probability that a model that misses nothing misses as much (F test)",
+                "significance": SIGNIFICANCE,
+            },
         ),
-        "signal_samples": ("signal", np.bincount(sample_columns["signal_index"], minlength=len(first))),
+        "signal_samples": ("signal", np.bincount(samples["signal_index"][1], minlength=len(first))),
         "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
-        **{name: ("sample", values, {"long_name": long_names[name]}) for name, values in sample_columns.items()},
+        **samples,
     }
+
+
+def _samples(problem: Problem, best: Fit, errors: Sequence[Array]) -> dict[str, Any]:
+    """Return the columns of all samples, over the dimension ``sample``."""
+    signals = problem.signals
+    columns = {
+        "signal_index": (np.repeat(problem.groups, [len(s.measured) for s in signals]), "which signal"),
+        "instant": (np.concatenate([s.instant for s in signals]), "time, s; number of a steady reading"),
+        "applied": (np.concatenate([s.load for s in signals]), "what pulls, N"),
+        "measured": (np.concatenate([s.measured for s in signals]), "measured, in the unit of the signal"),
+        "residual": (np.concatenate(errors), "measured less computed, in the unit of the signal"),
+        "outlier": (
+            np.concatenate(outliers(problem, best.residuals)),
+            "residual over the deviation that the median of all tells; zero of those that are no outliers",
+        ),
+    }
+    return {name: ("sample", values, {"long_name": text}) for name, (values, text) in columns.items()}
 
 
 def _pooled_noise(problem: Problem, noise: Array) -> Array:

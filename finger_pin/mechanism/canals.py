@@ -18,20 +18,13 @@ import numpy as np
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
+from finger_pin.mechanism.groups import BRANCHES, CANALS, CORDS, ELASTIC, TENDON_LOSSES, WRAPS
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
 from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
-from finger_pin.mechanism.tendons import BRISTLES, LOSSES, SLACK, SOURCES, Tendons
-from finger_pin.mechanism.tree_mechanism import ELASTIC, actuator_table
+from finger_pin.mechanism.tendons import BRISTLES, SLACK, SOURCES, Tendons
+from finger_pin.mechanism.tree_mechanism import actuator_table
 from finger_pin.typing import Array
-
-#: The tables, in the order of evaluation; those of further wraps have a number, from 2, at the end.
-CORDS, WRAPS, CANALS, BRANCHES = "tendon_cords", "tendon_wraps", "tendon_canals", "tendon_branches"
-
-
-def is_canal(group: str) -> bool:
-    """Return whether a table of rows is friction of canals or wraps."""
-    return group.startswith((WRAPS, CANALS, BRANCHES))
 
 
 @dataclass
@@ -263,7 +256,7 @@ class Canals:
             curvature_offset=np.array([canal.offset for canal in canals]),
             paths=tuple(route.legs for route in routes),
             stored=BRISTLES,
-            powers=(*LOSSES, SLACK),
+            powers=(*TENDON_LOSSES, SLACK),
         )
 
     def _record_joint_loads(self, wrap_group: str, canals: Sequence[_Canal], *, whole: bool) -> None:

@@ -15,10 +15,10 @@ from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.assembly import ConstructorArgs, Parts, assemble, check_joints
-from finger_pin.mechanism.canals import CANALS
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
+from finger_pin.mechanism.groups import CANALS
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from finger_pin.description.caching import cached_property
 from finger_pin.laws.capstan import capstan_coefficient
-from finger_pin.mechanism.canals import CANALS
 from finger_pin.mechanism.evaluation import Evaluation
+from finger_pin.mechanism.groups import CANALS
 from finger_pin.mechanism.rows import RowSignals, weighted_sum
 from finger_pin.mechanism.state import State
 from finger_pin.typing import Array

@@ -16,6 +16,7 @@ from finger_pin.laws.bristle import directed_drag
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.spring import BRISTLE_RATIO, HYSTERESIS, JOINT_SPRING, spring_torque
+from finger_pin.mechanism.groups import JOINT_LOSSES
 from finger_pin.mechanism.joint_laws import joint_law
 from finger_pin.mechanism.rows import Energy, Rows, energy
 from finger_pin.typing import Array
@@ -29,13 +30,7 @@ _LIMITERS = Energy("limiter", "stroke limiters")
 # Farther than any joint gets, rad or m.
 _BEYOND_ANY_JOINT = 1e9
 
-#: What friction in the joints takes, in the order of its law.
-LOSSES = (
-    Energy("joint_coulomb", "joints sliding"),
-    Energy("joint_viscous", "joints viscous"),
-    Energy("joint_micro_damping", "joints' micro-damping"),
-)
-_POWERS = {each.name.removeprefix("joint_"): each for each in LOSSES}
+_POWERS = {each.name.removeprefix("joint_"): each for each in JOINT_LOSSES}
 
 
 @dataclass(frozen=True, eq=False)

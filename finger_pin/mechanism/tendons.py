@@ -14,6 +14,7 @@ from finger_pin.description.routing import Routing
 from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coefficient
 from finger_pin.laws.spring import TENDON_HALF
+from finger_pin.mechanism.groups import SOURCES_WITH_END, TENDON_LOSSES, WINCHES
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
@@ -22,16 +23,8 @@ from finger_pin.typing import Array, Number
 
 #: What ideal sources of force supply.
 SOURCES = Energy("actuators", "actuators")
-#: What friction in the canals takes, in the order of its law.
-LOSSES = (
-    Energy("tendon_coulomb", "tendons sliding"),
-    Energy("tendon_viscous", "tendons viscous"),
-    Energy("tendon_micro_damping", "tendons' micro-damping"),
-)
 SLACK = Energy("slack", "tensions cut at zero")
 BRISTLES = Energy("tendon_bristles", "tendon bristles")
-#: Tables of sources of tension that are rows: those with an end, and ideal winches.
-SOURCES_WITH_END, WINCHES = "tension_sources", "winches"
 _WINCH_ENERGY = Energy("winches", "winches, through their cords")
 _HALVES = ("proximal", "distal")
 _ENTRY_OF_PARAMETER, _HYSTERESIS_ENERGY = (
@@ -248,7 +241,7 @@ class Tendons:
                 bends=bends[:actuated],
                 curvature_offset=offset[:actuated],
                 stored=BRISTLES,
-                powers=(SOURCES, *LOSSES, SLACK),
+                powers=(SOURCES, *TENDON_LOSSES, SLACK),
             ),
             Rows(
                 group="passive_tendons",
@@ -260,7 +253,7 @@ class Tendons:
                 bends=bends[actuated:],
                 curvature_offset=offset[actuated:],
                 stored=BRISTLES,
-                powers=LOSSES,
+                powers=TENDON_LOSSES,
             ),
         ]
 

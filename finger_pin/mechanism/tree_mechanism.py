@@ -25,6 +25,7 @@ from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.muscle import MUSCLE
 from finger_pin.laws.spring import CONSTANT_FORCE, DEAD_BAND_SPRING, ELASTIC_TENDON, JOINT_SPRING
 from finger_pin.mechanism.bodies import place_bodies
+from finger_pin.mechanism.groups import ELASTIC, MUSCLES, STATEFUL, STATELESS
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
@@ -34,10 +35,6 @@ from finger_pin.mechanism.tendon_wraps import find_wraps
 from finger_pin.mechanism.tendons import SOURCES
 from finger_pin.typing import Array
 
-#: The tables of actuators without and with a state.
-STATELESS, STATEFUL, MUSCLES = "actuator", "actuator_with_state", "muscle"
-#: The table of tendons that stretch and only pull.
-ELASTIC = "elastic_cords"
 # Dry friction of a tendon holds until it has slid so far, m.
 _DRY_STICTION = 1e-4
 # How soon an actuator of limited rate follows its input, s.

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.addresses.law_code import inlined
-from finger_pin.core.jit import Pointer, njit_inline
+from finger_pin.core.jit import Pointer, inlined, njit_inline
 from finger_pin.exchange.mujoco_friction import BRANCH, ELEMENT, HEAD, LINK
 from finger_pin.mujoco.friction_step import delivered
 from finger_pin.mujoco.layout import Data, Kinds, Model

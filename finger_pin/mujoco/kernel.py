@@ -11,8 +11,7 @@ this speed and level.
 
 from __future__ import annotations
 
-from finger_pin.core.addresses.law_code import inlined
-from finger_pin.core.jit import Pointer, njit_inline, scratch
+from finger_pin.core.jit import Pointer, inlined, njit_inline, scratch
 from finger_pin.exchange.mujoco_friction import BRANCH, ELEMENT, MASS, PIN, SIGNAL, SIGNALS
 from finger_pin.mujoco.constraint_rows import TERM, TERMS, row_forces, write_rows
 from finger_pin.mujoco.elements import LawInputs, mass_inputs, pin_inputs, tendon_inputs

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.input_queue import InputQueue, input_delays
-from finger_pin.control.named_inputs import Inputs, inputs_by_name
-from finger_pin.control.position_drive import SteppedGoals
+from finger_pin.control.inputs import InputQueue, Inputs, input_delays, inputs_by_name
+from finger_pin.control.stepped_drives import SteppedGoals
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.initial_state import as_finite_array

@@ -13,7 +13,6 @@ from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.core.steps.trajectory import Trajectory
-from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
@@ -21,12 +20,13 @@ from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger,
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import with_tighter_tolerances
 from finger_pin.simulation.initial_state import custom_parts, with_initial_state
-from finger_pin.simulation.recording import RunArrays, check_variables, record, record_arrays, run_attributes
-from finger_pin.simulation.run import interruptible, run
+from finger_pin.simulation.recording import RunArrays, check_variables, record
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.sensitivity import add_slopes, make_variations, repeat_steps, with_exact_encoders
 from finger_pin.simulation.setup import Setup
-from finger_pin.simulation.variables import coordinates, variables
+from finger_pin.simulation.simulate import interruptible, run
+from finger_pin.simulation.variables import variables
+from finger_pin.threads import in_threads
 from finger_pin.typing import Array
 
 #: What a run records unless it is told otherwise.
@@ -164,10 +164,7 @@ class Prepared:
         return Setup.from_scenario(scenario, self._loop(scenario, initial))
 
     def _record(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
-        samples = SampledTrajectory(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
-        labels = coordinates(setup.scenario, setup.loop, samples.times)
-        attributes = run_attributes(setup.scenario, trajectory, setup.method)
-        return RunArrays(record_arrays(samples, self.record), labels, attributes)
+        return setup.record(trajectory, setup.scenario.sample_times(), self.record)
 
     def _integrate(
         self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, stop: Stop | None

@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.core.steps.trajectory import Trajectory
-from finger_pin.core.threads import physical_memory
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.simulation_settings import SimulationSettings
@@ -22,6 +21,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.frames import scene_metadata
 from finger_pin.simulation.sampled_trajectory import BASE_FRAME, SampledTrajectory
 from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
+from finger_pin.threads import physical_memory
 from finger_pin.typing import Array
 
 _PACKAGES = ("finger-pin", "pin", "numba", "numpy", "scipy", "xarray")

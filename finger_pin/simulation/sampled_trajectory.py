@@ -16,8 +16,7 @@ from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import Energy
 from finger_pin.mechanism.state import BLOCKS, Motion, State
 from finger_pin.references.reference import ReferenceSignals
-from finger_pin.simulation.account import Account, account
-from finger_pin.simulation.energy import Flows, energies, powers
+from finger_pin.simulation.energy import Account, Flows, account, energies, powers
 from finger_pin.typing import Array
 
 #: Frames of variables with components; the base's, a palm's if there is one, is that of all but the palm's own.

@@ -14,11 +14,11 @@ from typing import TypeVar
 import numpy as np
 
 from finger_pin.core.steps.trajectory import Trajectory
-from finger_pin.core.threads import in_threads
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.recording import RunArrays
 from finger_pin.simulation.setup import Setup
+from finger_pin.threads import in_threads
 from finger_pin.typing import Array
 
 #: Change of a number, of its size: far above rounding, far below where anything bends.

@@ -10,8 +10,7 @@ import numpy as np
 from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled_control
 from finger_pin.control.interface import LoopController
-from finger_pin.control.motor_signals import spool_windings, voltage_signals
-from finger_pin.control.position_drive import PositionDrives
+from finger_pin.control.position_drive import PositionDrives, spool_windings, voltage_signals
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.solve_ivp import integrate
@@ -24,6 +23,10 @@ from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, Simulat
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.accuracy import CHUNK_STEPS, ringing_warning
 from finger_pin.simulation.initial_state import beyond_ranges, check_motors, failure_advice, warn_beyond_ranges
+from finger_pin.simulation.recording import RunArrays, record_arrays, run_attributes
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
+from finger_pin.simulation.variables import coordinates
+from finger_pin.typing import Array
 
 #: What to try where an integrator cannot go on.
 ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
@@ -177,6 +180,20 @@ class Setup:
             together=chunk == OBSERVED_CHUNK,
             stop=stop,
         )
+
+    def record(self, trajectory: Trajectory, times: Array, names: Sequence[str], entry: str = "record") -> RunArrays:
+        """Return variables of a trajectory of this setup, at times as far as it goes.
+
+        Args:
+            trajectory: The solution.
+            times: Shape (m,), in order, s.
+            names: Of the variables.
+            entry: Argument that named them, for messages.
+        """
+        samples = SampledTrajectory(self.loop, trajectory, times, names)
+        arrays = record_arrays(samples, names, entry)
+        labels = coordinates(self.scenario, self.loop, samples.times)
+        return RunArrays(arrays, labels, run_attributes(self.scenario, trajectory, self.method))
 
     def stepper(self, settings: SimulationSettings | None = None) -> Stepper:
         """Return the compiled stepper, at the start, by default at the scenario's tolerances."""

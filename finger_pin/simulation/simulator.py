@@ -10,9 +10,9 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop, sampled_control
-from finger_pin.control.named_inputs import Inputs
+from finger_pin.control.inputs import Inputs
 from finger_pin.control.palm import start_state
-from finger_pin.control.position_drive import SteppedGoals
+from finger_pin.control.stepped_drives import SteppedGoals
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.demo_motion import start_position

@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.control.inputs import Inputs
 from finger_pin.control.interface import ControlSignals
-from finger_pin.control.named_inputs import Inputs
 from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.signals.compiled_fingers import CompiledFingers
 from finger_pin.core.stepping.batch_stepper import advance_many
@@ -22,9 +22,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.state import Motion, State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
-from finger_pin.simulation.motor_variables import LOOP_VARIABLES
 from finger_pin.simulation.recording import check_variables, record
-from finger_pin.simulation.row_variables import RESIDUAL
+from finger_pin.simulation.row_variables import LOOP_VARIABLES, RESIDUAL
 from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.simulation.variables import variables

@@ -12,7 +12,8 @@ import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.position_drive import DriveSignals, PrescribedVoltages, SteppedGoals
+from finger_pin.control.position_drive import DriveSignals, PrescribedVoltages
+from finger_pin.control.stepped_drives import SteppedGoals
 from finger_pin.control.user_controllers import Samples, choose_reference
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper

@@ -14,8 +14,7 @@ from finger_pin.control.palm import PrescribedJoints
 from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.rows import RowSignals
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
-from finger_pin.simulation.motor_variables import motor_variables
-from finger_pin.simulation.row_variables import account_variables, cord_variables, extra_row_variables
+from finger_pin.simulation.row_variables import account_variables, cord_variables, extra_row_variables, motor_variables
 from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory, state_block
 from finger_pin.typing import Array
 

@@ -13,16 +13,15 @@ import xarray as xr
 
 from finger_pin.analysis import locking_advice
 from finger_pin.cancellation import CancelToken, Stop
-from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control import ClosedLoop
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.mechanism.finger import Finger
+from finger_pin.progress import notebook_bar
 from finger_pin.simulation.prepared import Prepared
-from finger_pin.simulation.progress import notebook_bar
 from finger_pin.simulation.recording import check_variables
-from finger_pin.simulation.sampled_trajectory import Quantity
 from finger_pin.simulation.simulate import simulate
 from finger_pin.simulation.variables import variables as result_variables
 from finger_pin.studies.executor import compile_for, error_line, open_executor, run_tasks
@@ -155,11 +154,11 @@ def _check_same_axes(runs: Sequence[Scenario]) -> None:
 
 def _check_variables(runs: Sequence[Scenario], names: Sequence[str], finger: Finger | None) -> None:
     """Raise unless each variable exists in at least one run."""
-    available: dict[str, Quantity] = {}
+    available: dict[str, None] = {}
     for run in runs:
         if set(names) <= set(available):
             return
-        available |= result_variables(ClosedLoop.from_scenario(run, finger=finger))
+        available |= dict.fromkeys(result_variables(ClosedLoop.from_scenario(run, finger=finger)))
     check_variables("variables", names, available)
 
 

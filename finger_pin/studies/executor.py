@@ -25,10 +25,10 @@ from typing import Any, TypeVar
 import cloudpickle
 
 from finger_pin.cancellation import CancelToken, Stop
-from finger_pin.core.threads import usable_cores
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError, ScenarioWarning
 from finger_pin.simulation.simulate import simulate
+from finger_pin.threads import usable_cores
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")

@@ -17,8 +17,8 @@ from finger_pin.analysis import force_polytope, self_locking_margin, spring_retu
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism import joints, tendons
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.groups import JOINT_LOSSES, TENDON_LOSSES
 from finger_pin.mechanism.rows import LOST
 from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.energy import account_entries
@@ -132,12 +132,12 @@ def losses(run: Run) -> float:
 
 def losses_tendons(run: Run) -> float:
     """Return the energy lost to the friction of the tendons, J."""
-    return sum(_final_value(run.result, each.name) for each in tendons.LOSSES)
+    return sum(_final_value(run.result, each.name) for each in TENDON_LOSSES)
 
 
 def losses_joints(run: Run) -> float:
     """Return the energy lost to the friction of the joints, J."""
-    return sum(_final_value(run.result, each.name) for each in joints.LOSSES)
+    return sum(_final_value(run.result, each.name) for each in JOINT_LOSSES)
 
 
 def slack_time(run: Run) -> float:

@@ -16,24 +16,26 @@ from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.exceptions import InputError
 from finger_pin.files import write_table, write_text
 from finger_pin.mechanism.coerce import FingerLike
+from finger_pin.progress import notebook_bar
 from finger_pin.simulation.netcdf import save
-from finger_pin.simulation.progress import notebook_bar
-from finger_pin.studies.dataset import assemble, require_complete
 from finger_pin.studies.designs import PointList
 from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric, scenario_metrics
 from finger_pin.studies.records import DONE, Progress, RunRecord, Study, open_study
-from finger_pin.studies.search import FAILED_EXCESS, Search, nondominated
-from finger_pin.studies.search_problem import (
+from finger_pin.studies.search import (
+    FAILED_EXCESS,
     Constraint,
     Goals,
+    Search,
     Variable,
     check_variables,
+    nondominated,
     parse_variable,
     point_at,
     radii,
     start_values,
 )
+from finger_pin.studies.sweeps import assemble, require_complete
 from finger_pin.typing import Array
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]

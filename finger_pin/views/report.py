@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.files import write_text
-from finger_pin.identification.misfit import SIGNIFICANCE
 from finger_pin.views.document import document, image
 from finger_pin.views.plots.identification import (
     plot_identification,
@@ -200,6 +199,7 @@ def _remarks(result: xr.Dataset) -> list[str]:
 def _misfit_remarks(result: xr.Dataset) -> tuple[list[str], bool]:
     """Return sentences on the model's misfit, by repeats and correlation of residuals, and whether none shows."""
     sentences, correlated, law_holds = [], list[str](), True
+    significance = result["lack_of_fit"].attrs.get("significance", 0.01)  # results before 0.7 do not say it
     columns = ("signal", "replicate_noise", "noise", "lack_of_fit", "signal_correlation", "signal_samples")
     for name, repeats, noise, chance, correlation, count, steady in zip(
         *(result[column].values for column in (*columns, "signal_steady")), strict=True
@@ -207,7 +207,7 @@ def _misfit_remarks(result: xr.Dataset) -> tuple[list[str], bool]:
         if math.isfinite(repeats):
             kind = "Equal readings" if steady else "Repeated runs"
             sentences.append(f"{kind} of {name} differ by {repeats:.3g} rms, all from the law by {noise:.3g}.")
-        if chance < SIGNIFICANCE:
+        if chance < significance:
             law_holds = False
             sentences.append(
                 f"The model misses something of {name}: by chance alone it would miss as much with a probability of "

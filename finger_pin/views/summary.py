@@ -8,9 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from finger_pin.mechanism.canals import WRAPS, is_canal
+from finger_pin.mechanism.groups import MUSCLES, STATEFUL, STATELESS, WRAPS, is_canal
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
-from finger_pin.mechanism.tree_mechanism import MUSCLES, STATEFUL, STATELESS
 from finger_pin.simulation.energy import account_entries
 from finger_pin.simulation.frames import read_scene
 from finger_pin.simulation.netcdf import require_samples

@@ -9,7 +9,7 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked
-from finger_pin.core.threads import usable_cores
+from finger_pin.threads import usable_cores
 
 WORKERS = (1, 2)
 # Many enough that what is loaded first no longer counts.

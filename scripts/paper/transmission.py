@@ -20,7 +20,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from finger_pin.analysis.directions import sliding_velocity
+from finger_pin.analysis.locking import sliding_velocity
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.laws import bristle as friction

@@ -137,7 +137,7 @@ def test_motors_pull_tendons_along_paths_through_spools_and_stretch():
     np.testing.assert_allclose(CompiledFinger(hand).evaluate(x, np.array([3.0, 2.0])).rate, found.rate, atol=1e-6)
 
 
-def test_what_needs_a_posture_says_so():
+def test_an_analysis_that_needs_a_posture_asks_for_one():
     with pytest.raises(fp.InputError, match=r"depends on the posture \(fp\.analysis\.posed"):
         fp.analysis.critical_friction(finger())
 

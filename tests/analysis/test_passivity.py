@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.analysis.passivity import micro_damping_advice
+from finger_pin.analysis.advice import micro_damping_advice
 from finger_pin.exceptions import MicroDampingWarning
 from finger_pin.laws.bristle import (
     friction_coefficient,

@@ -84,7 +84,7 @@ def test_a_joint_whose_friction_grows_with_the_cord_locks_at_its_radius():
 
 
 @pytest.mark.parametrize(("finger", "says"), [("ub_stand_in", "must all be actuated"), ("planar", "must be one of")])
-def test_what_no_spring_returns_is_told(finger, says):
+def test_a_joint_that_no_spring_returns_is_named(finger, says):
     with pytest.raises(fp.InputError, match=says):
         fp.analysis.spring_return(finger)
 

@@ -47,7 +47,7 @@ def test_an_option_without_its_value_and_a_second_name_are_refused(run, tmp_path
 @pytest.mark.parametrize(
     ("name", "given"), [("conclusions", "fig7"), ("self_locking", "fig7"), ("force_capability", "up")]
 )
-def test_an_unknown_name_is_told_in_one_line(run, tmp_path, name, given):
+def test_an_unknown_name_is_refused_in_one_line(run, tmp_path, name, given):
     refused(run(name, given), tmp_path, f"{name}.py: ", given)
 
 
@@ -68,7 +68,7 @@ def test_wrong_numbers_of_the_force_script_are_named(run, tmp_path, arguments, s
     refused(run("force_capability", *arguments), tmp_path, "force_capability.py: ", says)
 
 
-def test_an_unknown_conclusion_is_told_which_there_are(run, tmp_path):
+def test_an_unknown_conclusion_is_refused_with_the_list_of_conclusions(run, tmp_path):
     refused(run("conclusions", "--only", "d"), tmp_path, "--only", "'a', 'b', 'c'")
 
 
@@ -110,7 +110,7 @@ def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_fi
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "arguments"), [("conclusions", ("--only", "a", "--quiet")), ("force_capability", ())])
-def test_a_folder_that_cannot_be_made_is_told_in_one_line(run, tmp_path, name, arguments):
+def test_a_folder_that_cannot_be_made_is_refused_in_one_line(run, tmp_path, name, arguments):
     (tmp_path / "file").write_text("")
     scenario = tmp_path / "short.toml"
     scenario.write_text('extends = "reversals"\n[simulation]\nduration = 0.1\n')

@@ -33,7 +33,7 @@ def told(function, capsys):
         (OSError(28, "No space left on device", "a.nc"), 1, "the results cannot be written: a.nc: No space left on"),
     ],
 )
-def test_what_is_raised_on_purpose_becomes_one_line_with_its_notes_and_an_exit_code(error, code, says, capsys):
+def test_an_error_of_the_package_becomes_one_line_with_its_notes_and_an_exit_code(error, code, says, capsys):
     error.add_note("a note\nof two lines")
 
     def broken():
@@ -140,7 +140,7 @@ def test_a_folder_is_named_so_that_it_can_be_read(variants, name):
     assert folder_name("reversals", *variants) == name
 
 
-def test_what_a_path_cannot_hold_is_told_apart_by_a_digest_and_no_name_is_too_long():
+def test_names_that_a_path_cannot_hold_differ_by_a_digest_and_none_is_too_long():
     names = [
         folder_name("reversals", each) for each in ("finger=a/b", "finger=a\\b", "title=é", "x=" + "1" * 400, "x\udcff")
     ]
@@ -155,7 +155,7 @@ def test_the_version_is_told_and_options_of_all_commands_are_listed(capsys):
     assert capsys.readouterr().err.endswith("--show-completion, --version, --help; did you mean --version?\n")
 
 
-def test_a_bench_that_is_not_there_is_told_with_the_benches_that_ship(capsys):
+def test_an_unknown_bench_is_refused_with_the_list_of_benches_that_ship(capsys):
     assert application.run("identify", ["transmision"]) == 2
     said = capsys.readouterr().err
     assert (
@@ -200,7 +200,7 @@ def test_an_option_that_another_one_makes_idle_is_refused_by_every_command_that_
         ("force_capability", ["hand"], "is a hand; take one of its fingers"),
     ],
 )
-def test_what_would_be_ignored_is_told_in_one_line(name, arguments, says, capsys, tmp_path, monkeypatch):
+def test_an_argument_that_would_be_ignored_is_refused_in_one_line(name, arguments, says, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert application.run(name, arguments) == 2
     (line,) = capsys.readouterr().err.splitlines()

@@ -79,7 +79,7 @@ def test_a_part_is_measured_once_until_the_code_changes(load, tmp_path, monkeypa
     assert store.Store(tmp_path, quick=False).part("part", measure) == {"value": [4, None]}
 
 
-def test_what_was_measured_while_the_code_changed_is_not_kept(load, tmp_path, monkeypatch):
+def test_measurements_made_while_the_code_changed_are_not_kept(load, tmp_path, monkeypatch):
     store = load("benchmarks.store")
     opened = store.Store(tmp_path, quick=False)
     monkeypatch.setattr(store, "digest", lambda: "other")

@@ -59,7 +59,7 @@ def test_the_signals_of_a_result_are_written_as_columns_with_their_units_to_the_
         (["fig7", "fig6.xml"], "reversals"),
     ],
 )
-def test_what_cannot_be_written_is_told_in_one_line_and_nothing_is(here, capsys, arguments, says):
+def test_an_export_that_cannot_be_written_is_refused_in_one_line_and_leaves_no_file(here, capsys, arguments, says):
     assert run("export", arguments) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert says in line and not any(here.iterdir())
@@ -81,7 +81,7 @@ def test_results_that_cannot_be_read_are_a_wrong_input_and_not_one_that_cannot_b
         (["results/none", "x.csv"], "SOURCE: results/none: there is no such file or folder"),
     ],
 )
-def test_a_source_that_is_not_there_is_said_with_what_there_is(arguments, says, here, capsys):
+def test_an_unknown_source_is_refused_with_the_list_of_sources(arguments, says, here, capsys):
     assert run("export", arguments) == 2
     assert says in capsys.readouterr().err
     assert not list(here.iterdir())

@@ -146,7 +146,7 @@ def run_scenario(text, name):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop is deprecated:DeprecationWarning")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, capsys):
+def test_commands_and_code_of_a_page_run_from_top_to_bottom(page, shown, monkeypatch, capsys):
     if page.parent.name == "warp":
         pytest.importorskip("mujoco_warp")
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", not_moved)

@@ -114,7 +114,7 @@ def test_published_parameters_are_read_by_their_symbols(tmp_path):
     ("arguments", "words"),
     [(["--step", "1"], "--step"), (["--published", "nowhere"], "m1.json"), (["--current-limit", "0"], "current")],
 )
-def test_what_is_wrong_is_refused_in_a_line(arguments, words, capsys):
+def test_a_wrong_argument_is_refused_in_one_line(arguments, words, capsys):
     assert servo_models.main(["--only", "M1", "--generations", "0", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line

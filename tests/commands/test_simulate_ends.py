@@ -17,13 +17,13 @@ from finger_pin.description.loading import load_scenario
 from finger_pin.exceptions import IntegrationError
 
 
-def test_of_a_failed_integration_what_was_computed_is_saved(run, here, quick, monkeypatch):
+def test_a_failed_integration_saves_its_computed_part(run, here, quick, monkeypatch):
     partial = fp.simulate(load_scenario("s.toml", {"simulation.duration": 0.002}))
 
     def fail(scenario, **options):
         raise IntegrationError(0.002, "the step size became too small", "a smaller simulation.rtol", partial)
 
-    monkeypatch.setattr("finger_pin.simulation.run.run", fail)
+    monkeypatch.setattr("finger_pin.simulation.simulate.run", fail)
     code, out, lines = run("s.toml", "--output", "out")
     assert code == 3
     assert len(lines) == 1
@@ -70,14 +70,14 @@ def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_t
     assert run("out/scenario.toml", "--output", "out", *loose)[::2] == (0, [])
 
 
-def test_where_nothing_was_computed_earlier_results_stay(run, here, quick, monkeypatch):
+def test_a_run_that_computes_nothing_keeps_earlier_results(run, here, quick, monkeypatch):
     assert run("s.toml", "--output", "out")[0] == 0
     before = contents(here)
 
     def fail(scenario, **options):
         raise IntegrationError(0.0, "not finite", "another method", None)
 
-    monkeypatch.setattr("finger_pin.simulation.run.run", fail)
+    monkeypatch.setattr("finger_pin.simulation.simulate.run", fail)
     code, out, lines = run("s.toml", "--output", "out")
     assert (code, out, len(lines)) == (3, "", 1)
     assert "nothing was computed" in lines[0]
@@ -115,7 +115,7 @@ def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, mon
 
         return simulate(scenario, stop=counted, **options)
 
-    monkeypatch.setattr("finger_pin.simulation.run.run", interrupted)
+    monkeypatch.setattr("finger_pin.simulation.simulate.run", interrupted)
     handler = signal.getsignal(number)
     code, out, lines = run("s.toml", "--output", "out", "--duration", "5")
     assert signal.getsignal(number) is handler
@@ -138,7 +138,7 @@ def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quic
         time.sleep(1.0)
         pytest.fail("went on")
 
-    monkeypatch.setattr("finger_pin.simulation.run.run", stubborn)
+    monkeypatch.setattr("finger_pin.simulation.simulate.run", stubborn)
     code, out, lines = run("s.toml", "--output", "out")
     assert (code, out, lines) == (130, "", ["simulate.py: interrupted"])
     assert contents(here) == before
@@ -184,7 +184,7 @@ def test_a_reader_that_has_gone_is_no_error(here):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
-def test_output_that_cannot_be_printed_is_told_in_one_line_and_results_are_kept(run, here, quick, monkeypatch):
+def test_output_that_cannot_be_printed_costs_one_line_and_results_are_kept(run, here, quick, monkeypatch):
     with open("/dev/full", "w") as full:
         monkeypatch.setattr(sys, "stdout", full)
         code, _, lines = run("s.toml", "--output", "out")
@@ -194,7 +194,7 @@ def test_output_that_cannot_be_printed_is_told_in_one_line_and_results_are_kept(
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
-def test_a_disk_that_fills_up_in_a_real_run_is_told_in_one_line(here):
+def test_a_disk_that_fills_up_in_a_real_run_ends_it_with_one_line(here):
     import resource
 
     def limit():

@@ -96,7 +96,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_anything_is_simulate
         mkdir(path, *arguments)
 
     monkeypatch.setattr(os, "mkdir", refuse)
-    monkeypatch.setattr("finger_pin.simulation.run.run", lambda *a, **o: pytest.fail("simulated"))
+    monkeypatch.setattr("finger_pin.simulation.simulate.run", lambda *a, **o: pytest.fail("simulated"))
     for output, says in (("a/b", "Permission denied"), ("s.toml/c", "Not a directory"), ("o" * 300, "too long")):
         code, out, lines = run("s.toml", "--output", output)
         assert (code, out, len(lines)) == (1, "", 1)

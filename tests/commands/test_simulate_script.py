@@ -156,7 +156,7 @@ def test_view_is_shown_after_the_results_are_written_and_only_if_asked(run, here
     assert seen == [ALL]
 
 
-def test_spaces_and_letters_beyond_ascii_in_paths(run, here, quick):
+def test_paths_may_have_spaces_and_letters_beyond_ascii(run, here, quick):
     folder = here / "mes résultats ∂"
     folder.mkdir()
     (folder / "mon scénario.toml").write_text(PLANAR, encoding="utf-8")

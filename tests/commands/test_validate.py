@@ -179,7 +179,7 @@ def test_an_interrupted_validation_writes_nothing(run, tmp_path, monkeypatch):
     assert not list((tmp_path / "out").iterdir())
 
 
-def test_an_output_that_cannot_be_written_is_told_before_anything_is_measured(run, tmp_path, monkeypatch):
+def test_an_output_that_cannot_be_written_is_refused_before_anything_is_measured(run, tmp_path, monkeypatch):
     (tmp_path / "out").write_text("a file")
     monkeypatch.setattr(symmetry, "measure", lambda: pytest.fail("measured"))
     code, out, err = run("--only", "symmetry")

@@ -102,7 +102,7 @@ def test_damping_is_a_torque_against_the_error_of_velocity():
     np.testing.assert_allclose(signals.torque, [0.2 + 0.05, -0.1, -0.2, -0.4], rtol=1e-12)
 
 
-def test_without_any_addition_it_is_the_paper_s_controller_and_with_all_shares_zero_it_says_the_same():
+def test_a_controller_without_additions_or_with_all_shares_zero_is_the_paper_s():
     scenario = reversals()
     paper = fp.control.build_controller(scenario)
     assert type(paper) is ProportionalController

@@ -59,7 +59,7 @@ def test_an_empty_table_asks_for_a_part_with_its_defaults():
     assert controller.tendons is not None and controller.tendons.share == 1.0 and controller.joints is None
 
 
-def test_what_is_not_asked_for_is_not_in_the_controller_nor_in_the_written_scenario():
+def test_an_addition_that_is_not_asked_for_is_neither_in_the_controller_nor_in_the_written_scenario():
     scenario = fp.load_scenario("reversals")
     written = tomllib.loads(fp.to_toml(scenario))["controller"]
     assert not [key for key in written if isinstance(written[key], dict)]

@@ -23,7 +23,7 @@ def loop(*overrides):
     return ClosedLoop.from_scenario(fp.load_scenario("reversals", merged))
 
 
-def test_what_pushes_back_as_hard_as_wanted_leaves_the_joints_of_a_frictionless_finger_alone(tmp_path):
+def test_a_reaction_as_large_as_the_wanted_force_leaves_the_joints_of_a_frictionless_finger_alone(tmp_path):
     """The torques cancel: J^T F is the work of F on the fingertip by the angle. No tendon of this finger is passive."""
     file = tmp_path / "planar.toml"
     file.write_text(

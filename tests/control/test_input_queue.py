@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.input_queue import InputQueue
+from finger_pin.control.inputs import InputQueue
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
 from finger_pin.simulation.simulators import step_many

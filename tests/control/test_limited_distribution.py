@@ -20,7 +20,7 @@ def torques(count, size, scale, seed):
     return np.random.default_rng(seed).normal(0.0, scale, (count, size))
 
 
-def test_with_one_internal_direction_and_no_limit_in_the_way_it_is_the_closed_form(routing):
+def test_the_distribution_over_one_internal_direction_is_the_closed_form_within_the_limits(routing):
     wanted, minimum = torques(200, 4, 0.05, 1), np.array([1.0, 0.5, 1.0, 2.0, 1.0])
     limited = LimitedDistribution(routing, np.full(5, 1e4)).plan(wanted, minimum)
     paper = fp.control.PseudoInverse.from_routing(routing).plan(wanted, minimum)
@@ -28,7 +28,7 @@ def test_with_one_internal_direction_and_no_limit_in_the_way_it_is_the_closed_fo
     np.testing.assert_array_equal(limited.torque_deficit, 0.0)
 
 
-def test_with_several_internal_directions_it_needs_the_least_tension_of_all(redundant):
+def test_the_distribution_over_several_internal_directions_needs_the_least_tension_of_all(redundant):
     """SLSQP on the same programme finds the same tensions; one internal direction alone needs more."""
     minimum, maximum = np.full(5, 0.5), np.full(5, 12.0)
     wanted = torques(25, 2, 0.02, 2)
@@ -57,7 +57,7 @@ def test_with_several_internal_directions_it_needs_the_least_tension_of_all(redu
 
 
 @pytest.mark.slow
-def test_it_falls_short_exactly_where_no_tensions_within_the_limits_exert_the_torque(redundant):
+def test_the_distribution_falls_short_exactly_where_no_tensions_within_the_limits_exert_the_torque(redundant):
     """Whether there are any is asked of a linear programme."""
     minimum, maximum = np.full(5, 1.0), np.full(5, 6.0)
     wanted = torques(150, 2, 0.03, 3)
@@ -74,7 +74,7 @@ def test_it_falls_short_exactly_where_no_tensions_within_the_limits_exert_the_to
     assert min(counts) > 20
 
 
-def test_where_it_falls_short_it_exerts_the_nearest_torque(redundant):
+def test_a_distribution_that_falls_short_exerts_the_nearest_torque(redundant):
     """Conditions of optimality: no tension that may still change would bring the torque nearer."""
     minimum, maximum = np.full(5, 1.0), np.array([6.0, 5.0, 4.0, 7.0, 6.0])
     plan = LimitedDistribution(redundant, maximum).plan(torques(100, 2, 0.2, 4), minimum)

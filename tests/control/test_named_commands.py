@@ -64,7 +64,7 @@ def test_files_and_arrays_have_the_names_of_tables(names, expected, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("names", [NAMES, ("tensions.cord", "inputs.servo"), ()])
-def test_custom_controllers_return_them(names, expected):
+def test_custom_controllers_may_return_tensions_by_name(names, expected):
     sampled = fp.simulate(scenario(), controller=ByName(names), control_period=1e-3)
     np.testing.assert_allclose(motion(sampled), expected, atol=3e-3)
     np.testing.assert_allclose(sampled.actuator_input[:, 0], GOAL, atol=5e-3)
@@ -75,7 +75,7 @@ def test_custom_controllers_return_them(names, expected):
     np.testing.assert_allclose(motion(continuous), expected, atol=1e-3)
 
 
-def test_steps_take_them():
+def test_a_simulator_steps_with_inputs_by_name():
     finger = fp.Finger(scenario().finger)
     states = []
     for inputs in ([4.0, 0.3], {"servo": 0.3, "cord": 4.0}, {"inputs.servo": 0.3, "tensions.cord": 4.0}):
@@ -96,7 +96,7 @@ def test_steps_take_them():
         ({"cord": -1.0, "servo": 0.1}, "must be finite and not negative, that of cord is not"),
     ],
 )
-def test_what_is_missing_or_has_no_place_is_named(commands, says):
+def test_an_input_that_is_missing_or_unknown_is_named(commands, says):
     class Wrong:
         def command(self, time, reference, position, velocity):
             return commands

@@ -84,7 +84,7 @@ def test_a_wrong_first_command_is_refused_in_one_line_before_anything_is_compute
     assert len(calls) == 1
 
 
-def test_what_is_no_controller_at_all_is_refused_in_one_line():
+def test_an_object_without_a_command_method_is_refused_as_a_controller_in_one_line():
     with pytest.raises(InputError, match=r"must have command\(time, reference, position, velocity\)"):
         fp.simulate(scenario(), controller=lambda *given: PULL)
 
@@ -116,7 +116,7 @@ def undisturbed(method, period):
         ("sampled", loses, "nan: tensions must be finite"),
     ],
 )
-def test_what_goes_wrong_later_ends_the_run_there_says_so_and_keeps_what_was_computed(method, answer, said):
+def test_a_controller_that_fails_later_ends_the_run_there_and_keeps_the_computed_part(method, answer, said):
     settings = {"simulation.method": "Rodas5P" if method == "sampled" else method}
     period = 1e-3 if method == "sampled" else None
     with pytest.raises(IntegrationError) as caught:

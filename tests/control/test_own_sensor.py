@@ -70,7 +70,7 @@ def test_the_result_holds_what_the_controller_was_told_until_the_next_sample(hea
     np.testing.assert_array_equal(result.measured_clock, np.arange(12)[last] * PERIOD)
 
 
-def test_it_reads_what_the_finger_does_at_the_sample_under_the_tensions_that_act_until_then(heard):
+def test_a_sensor_reads_the_finger_at_the_sample_under_the_tensions_that_act_until_then(heard):
     """Just before a sample the recorded torque is what it reads, but for what 0.25 ms change; the noise is its own."""
     gauge, result = heard[0].sensors[0], heard[1]
     exact, before = np.array(gauge.exact[2:12]), result.joint_torque[7:47:4, 1:3].values

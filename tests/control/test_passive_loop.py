@@ -72,7 +72,7 @@ def test_the_minimum_of_the_other_tendons_is_kept_where_the_wish_is_less():
 
 
 @pytest.mark.slow
-def test_it_brings_the_delivered_tension_to_the_wish_where_friction_and_other_minima_do_not():
+def test_the_passive_loop_brings_the_delivered_tension_to_the_wish_despite_friction_and_other_minima():
     """The finger is held still against gravity: T5 comes to carry 5 N within 1 %; without the loop it does not."""
     motion = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}
     common = motion | {"controller.passive_tension": 5.0, "simulation.duration": 1.5, "simulation.sample_rate": 100.0}
@@ -85,7 +85,7 @@ def test_it_brings_the_delivered_tension_to_the_wish_where_friction_and_other_mi
 
 
 @pytest.mark.slow
-def test_it_serves_a_loop_of_one_s_own():
+def test_the_passive_loop_serves_a_custom_controller():
     """The example of the README, as it is told there: the simulator's tensions go in, the controller's come out."""
     scenario = fp.load_scenario("reversals", LOOP | {"controller.passive_tension": 4.0})
     finger = fp.Finger(scenario.finger)
@@ -102,7 +102,7 @@ def test_it_serves_a_loop_of_one_s_own():
     assert tension[4] == pytest.approx(4.0, rel=0.02)
 
 
-def test_it_needs_samples():
+def test_the_passive_loop_needs_a_sampled_controller():
     with pytest.raises(InputError) as caught:
         fp.load_scenario("reversals", {"controller.passive_tension_loop.integral": 1.0})
     assert caught.value.entry == "controller.passive_tension_loop" and "sampling.period" in str(caught.value)

@@ -8,7 +8,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.interface import ControlSignals
-from finger_pin.control.measurement import JointEncoder, JointSpeed, TensionSensor
+from finger_pin.control.sampling import JointEncoder, JointSpeed, TensionSensor
 from finger_pin.exceptions import InputError
 
 

@@ -119,7 +119,7 @@ def test_forces_that_read_each_other_in_a_circle_are_refused_and_the_circle_name
 
 
 @pytest.mark.parametrize("wiring", ["inputs", "loads", "readings"])
-def test_what_reads_rows_that_are_not_there_or_with_weights_of_another_shape_is_refused(wiring):
+def test_a_reading_of_unknown_rows_or_with_weights_of_another_shape_is_refused(wiring):
     mechanism = random_mechanism(np.random.default_rng(2))
     tables = {table.group: table for table in mechanism.rows}
     body, before = mechanism.body, tables["other"]
@@ -152,7 +152,7 @@ def test_rows_that_move_nothing_are_stepped_with_the_rest_and_change_none_of_it(
     assert ends[1][-1] == pytest.approx(1.5 * np.exp(-0.1) - 1.0, abs=1e-8)
 
 
-def test_what_was_stepped_before_does_not_change_what_is_stepped_now():
+def test_an_earlier_run_does_not_change_a_later_one():
     """Nothing of a motion is left in what islands of the same wiring share."""
     rng = np.random.default_rng(206)
     mechanism = random_mechanism(rng, free=True)

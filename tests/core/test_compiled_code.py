@@ -154,7 +154,7 @@ def test_the_first_compilation_is_announced_once(folder, said):
     assert said() == ["Compiling the model, once for this version: about a minute ..."]
 
 
-def test_where_nothing_can_be_kept_code_runs_all_the_same_and_it_is_said_once(tmp_path, monkeypatch, said):
+def test_code_runs_without_a_cache_folder_and_warns_once(tmp_path, monkeypatch, said):
     """Not even a person who may do anything can make a folder inside a file."""
     file = tmp_path / "file"
     file.write_text("not a folder")
@@ -239,7 +239,7 @@ def test_a_process_that_is_killed_as_it_puts_code_in_place_leaves_none_that_is_b
 
 
 @pytest.mark.slow
-def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
+def test_code_compiled_by_one_process_runs_in_a_later_one_without_a_warning():
     """With servos, whose laws read loads as NumPy's `load` is called, with objects, and several fingers."""
     code = (
         "import finger_pin as fp\n"

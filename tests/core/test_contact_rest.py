@@ -111,7 +111,7 @@ LAID = {
 
 
 @pytest.mark.parametrize("case", LAID)
-def test_what_is_laid_on_something_smaller_stays_there(case):
+def test_a_body_laid_on_a_smaller_one_stays_there(case):
     below, above = LAID[case]
     mechanism, start = scene((0.0, 0.0, -G), below=below, above=above)
     x = motion(mechanism, start, [0.0, 1.0, 2.0], tolerance=1e-6)

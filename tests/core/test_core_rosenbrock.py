@@ -165,7 +165,7 @@ def test_steps_do_not_depend_on_the_size_of_the_record_nor_on_the_run(cases, met
             np.testing.assert_array_equal(ours, first)
 
 
-def test_an_advance_ends_exactly_where_it_is_told(cases, method):
+def test_an_advance_ends_exactly_at_the_given_time(cases, method):
     part = cases["reversals"].part(method)
     for end in (1e-9, 1e-3, 1e-3 + 1e-15, 0.1, 1.0 / 3.0):
         part.advance(end)

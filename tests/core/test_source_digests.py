@@ -85,7 +85,7 @@ THINGS = {"object": object(), "list": [1.0], "ufunc": np.frompyfunc(abs, 1, 1), 
 
 
 @pytest.mark.parametrize("thing", THINGS.values(), ids=THINGS)
-def test_what_a_later_process_could_not_recognise_has_no_digest(thing):
+def test_a_value_that_a_later_process_could_not_recognise_has_no_digest(thing):
     with pytest.raises(Undigestible):
         spring("def force(x):\n    return THING", THING=thing)
 

@@ -75,6 +75,6 @@ def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
     ],
     ids=["strided", "single precision", "fewer dimensions", "integer"],
 )
-def test_what_would_be_misread_is_not_bound(outer, change):
+def test_tables_that_would_be_misread_are_refused_when_packed(outer, change):
     with pytest.raises(TypeError, match="cannot be packed"):
         pack(outer._replace(**change), KIND)

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from finger_pin.core import threads
+from finger_pin import threads
 from finger_pin.description.caching import cached_property
 
 

@@ -255,9 +255,7 @@ def test_the_law_of_every_shipped_finger_switches_and_what_the_new_one_does_not_
         ("servo_position", "finger.actuators.M1", "drive", "tension", {"position_loop": {"proportional": 3.0}}),
     ],
 )
-def test_what_is_stated_beside_a_choice_that_does_not_read_it_is_refused(
-    tmp_path, order, scenario, place, choice, value, idle
-):
+def test_an_entry_that_the_chosen_kind_does_not_read_is_refused(tmp_path, order, scenario, place, choice, value, idle):
     (entry, number), file = *idle.items(), tmp_path / "s.toml"
     given = {f"{place}.{choice}": value, f"{place}.{entry}": number}
     assert load_scenario(scenario, {f"{place}.{choice}": value})

@@ -68,7 +68,7 @@ def test_the_kind_may_be_overridden_before_or_after_what_belongs_to_it():
     assert (medial.kind, medial.amplitude, medial.offset, medial.height) == ("step", 0.0, 0.1, 0.2)
 
 
-def test_what_is_not_asked_for_is_not_written():
+def test_entries_that_are_not_set_are_not_written():
     written = tomllib.loads(fp.to_toml(fp.load_scenario("reversals")))
     assert "tensions" not in written["controller"] and set(written["environment"]) == {"fingertip_force"}
     assert set(written["reference"]["joints"]["medial"]) == {"kind", "offset", "amplitude", "frequency", "phase"}
@@ -140,7 +140,7 @@ COLUMNS = [
 
 
 @pytest.mark.parametrize(("text", "said"), COLUMNS)
-def test_what_is_wrong_in_a_file_of_columns_is_named_in_one_line(tmp_path, text, said):
+def test_an_error_in_a_file_of_columns_is_named_in_one_line(tmp_path, text, said):
     path = write(tmp_path, "motion.csv", text)
     with pytest.raises(InputError) as caught:
         fp.load_scenario("reversals", {"reference.file": str(path)})

@@ -105,7 +105,7 @@ def test_directions_that_are_rounded_have_length_1():
         ("tree", None, "no such tendon of the tree; there are none"),
     ],
 )
-def test_what_does_not_fit_is_refused_by_its_name(entry, value, says):
+def test_an_entry_that_does_not_fit_is_refused_by_its_name(entry, value, says):
     with pytest.raises(fp.InputError) as refused:
         changed(**{entry: value})
     assert says in str(refused.value) and str(refused.value).startswith("finger.t")

@@ -81,7 +81,7 @@ def test_a_choice_tells_the_names_and_the_nearest():
     assert complaint(kind=[]).allowed == "must be one of left, right"
 
 
-def test_an_unknown_key_is_told_before_any_other_error():
+def test_an_unknown_key_is_reported_before_any_other_error():
     error = complaint(number="x", nubmer=1.0)
     assert error.entry == "sample.nubmer"
     assert error.allowed.endswith("did you mean sample.number?")

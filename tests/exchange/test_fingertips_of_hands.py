@@ -164,7 +164,7 @@ def test_every_fingertip_is_written_for_other_programs(hand):
         (lambda hand: _scenario(hand, **{"finger.tree.tip.body": "nail"}), "leave it out beside tips"),
     ],
 )
-def test_what_is_of_no_fingertip_is_refused_by_name(hand, call, words):
+def test_a_call_for_no_fingertip_is_refused_by_name(hand, call, words):
     with pytest.raises(fp.InputError, match=words):
         call(hand[0])
 

@@ -87,7 +87,7 @@ def flagged(model, *bits):
 @pytest.mark.parametrize(
     "flag", ["spring", "damper", "gravity", "actuation", "clampctrl", "limit", "equality", "constraint"]
 )
-def test_what_a_flag_switches_off_in_mujoco_is_off_here(flag):
+def test_a_part_that_a_flag_of_mujoco_disables_is_off_here(flag):
     """Accelerations at one state: a control beyond its range, a slider too where no limit is left to stop it."""
     coupled = flag in ("equality", "constraint")
     model = mujoco.MjModel.from_xml_string(ROUTED.replace("</mujoco>", COUPLED) if coupled else ROUTED)

@@ -123,7 +123,7 @@ def test_keyframes_place_leaders_and_what_is_written_is_led_alike():
     assert again.keyframes["away"].position == pytest.approx(away, abs=1e-9)
 
 
-def test_what_cannot_be_led_is_named():
+def test_mocap_bodies_that_cannot_move_along_a_path_are_named():
     model = mujoco.MjModel.from_xml_string(LED)
     with pytest.warns(fp.exceptions.LeftOutWarning):
         # The stand's place in the second keyframe is that of the first.

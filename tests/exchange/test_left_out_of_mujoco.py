@@ -15,7 +15,7 @@ from finger_pin.exceptions import ScenarioWarning
 pytestmark = pytest.mark.filterwarnings("ignore:hand. not carried over")
 
 
-def test_what_is_not_carried_over_is_listed():
+def test_elements_that_are_not_carried_over_are_listed():
     straight = '<spatial name="straight"><site site="s"/><site site="base"/></spatial></tendon>'
     rest = f"""{FIXED.replace("</tendon>", straight)}<equality><tendon name="both" tendon1="t" tendon2="straight"/>
     <connect name="led" body1="w" body2="hand" anchor="0 0 0"/></equality>

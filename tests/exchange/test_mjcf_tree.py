@@ -201,7 +201,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("tree", "message"), REFUSED)
-def test_what_mujoco_has_not_is_refused_by_name(tree, message):
+def test_a_part_that_mujoco_lacks_is_refused_by_name(tree, message):
     with pytest.raises(fp.InputError, match=message):
         fp.to_mjcf(arm(**tree))
 

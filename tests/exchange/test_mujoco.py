@@ -244,7 +244,7 @@ def test_a_joint_without_a_link_is_an_error_that_names_it():
 
 
 @pytest.mark.parametrize("export", [to_mjcf, to_urdf])
-def test_what_is_no_finger_is_refused_by_name(export):
+def test_an_argument_that_is_no_finger_is_refused_by_name(export):
     with pytest.raises(InputError) as caught:
         export(5)
     assert (caught.value.entry, caught.value.value) == ("description", "int") and "\n" not in str(caught.value)

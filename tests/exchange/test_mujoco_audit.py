@@ -167,7 +167,7 @@ SMOOTH = {"finger.joint_friction.coulomb": 0.0, "finger.joint_friction.stiction"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
-def test_what_is_carried_moves_as_in_mujoco(name):
+def test_elements_that_are_carried_over_move_as_in_mujoco(name):
     given = {"VELOCITY": "0"} | MOTIONS[name]
     text = re.sub(r"\b(LIMIT|TENDON|EQUALITY|MOTOR|CTRL|VELOCITY)\b", lambda place: given.get(place[0], ""), ARM)
     model = mujoco.MjModel.from_xml_string(text)

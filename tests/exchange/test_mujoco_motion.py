@@ -53,7 +53,7 @@ def test_stops_throw_back_as_much_of_any_speed_as_in_mujoco(place, soft, speed):
     assert -float(result.joint_velocity[-1, 0]) / speed == pytest.approx(share, rel=0.02)
 
 
-def test_what_is_stiffer_than_descriptions_have_is_listed_with_its_size():
+def test_a_constraint_stiffer_than_descriptions_allow_is_listed_with_its_size():
     """The stiffness k d / R of a time constant of 4e-5 s, at J = 1 / dof_invweight0 and d = 0.95."""
     limited = 'limited="true" range="-1 .1" solreflimit="-1e12 -100"'
     model = mujoco.MjModel.from_xml_string(SWING.replace("JOINT", limited).replace("SPEED", "0").replace("TENDON", ""))

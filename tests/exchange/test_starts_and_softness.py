@@ -31,7 +31,7 @@ def test_a_keyframe_beyond_a_range_less_its_margin_starts_at_the_edge_of_that():
     assert hand.tree.keyframes["open"].position["f"] == pytest.approx(1.3, rel=1e-15)
 
 
-def test_a_start_beyond_a_range_is_told_with_its_depth_and_energy():
+def test_a_start_beyond_a_range_is_warned_of_with_its_depth_and_energy():
     # Where an equality may want it there the posture stays.
     hand = hinge(OUTSIDE, '<equality><joint joint1="f" polycoef="0 0 0 0 0"/></equality>')
     assert hand.tree.keyframes["reference"].position == {"f": 0.0}
@@ -41,7 +41,7 @@ def test_a_start_beyond_a_range_is_told_with_its_depth_and_energy():
     fp.Simulator(hand, [0.2])
 
 
-def test_a_cord_that_starts_beyond_its_range_is_told():
+def test_a_cord_that_starts_beyond_its_range_is_warned_of():
     rest = '<tendon><fixed name="c" range="-0.01 0.01" limited="true"><joint joint="f" coef="0.1"/></fixed></tendon>'
     hand = hinge('ref="0.3" range="0 1"', rest)
     energy = 0.5 * hand.tree.tendons["c"].limit_stiffness * 0.02**2

@@ -94,7 +94,7 @@ def test_95_percent_intervals_hold_the_truth_that_often():
     assert 68 <= np.sum(held) <= 79
 
 
-def test_what_cannot_be_told_apart_is_said_and_left_open():
+def test_parameters_that_data_cannot_separate_are_named_and_left_open():
     turn = "finger.tendons.T1.curvature_offset"
     data = readings(np.random.default_rng(5), drag=0.0)
     result = found(data, {COULOMB: (0.02, 1.0), turn: (0.5, 10.0)})

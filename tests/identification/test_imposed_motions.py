@@ -280,28 +280,6 @@ def test_only_commands_that_a_recording_gives_pull_where_efforts_are_compared(va
     assert len(said) == (0 if values else 1) and all("log: tendon_command.T1 of" in each for each in said)
 
 
-@pytest.mark.parametrize("jitter", [0.0, 2e-3])
-def test_a_spline_that_follows_the_noise_is_told_with_the_smoothing_that_does_not(jitter):
-    """The angle's noise is that of its encoder, and speed times the error of its times; uneven times alone are none."""
-    rng, data = np.random.default_rng(4), drum_log()
-    late = rng.normal(0.0, jitter, data["t"].size)
-    even = np.sort(data["t"] + rng.uniform(-2e-3, 2e-3, data["t"].size))
-    data |= {"t": even, "q": np.sin(2.0 * (even + late)) + rng.normal(0.0, 3e-4, even.size)}
-    noise = np.hypot(3e-4, jitter * 2.0 / np.sqrt(2.0))
-
-    def said(smoothing):
-        column = {"column": "q", "smoothing": smoothing}
-        settings = validate(RecordingSettings, DRUM | {"inputs": {"joint_position.drum": column}}, ())
-        models, _ = recording_models(
-            fp.load_scenario("canal"), [read_recording("log", settings, data)], None, [np.ones(even.size, dtype=bool)]
-        )
-        return [each for each in models[0].warnings([STIFFNESS]) if "follows the noise" in each]
-
-    (told,) = said(1e-4)
-    assert float(told.split("readings scatter by ")[1].split()[0]) == pytest.approx(noise, rel=0.15)
-    assert said(0.0) and not said(noise)
-
-
 def test_a_goal_that_a_position_drive_has_from_the_scenario_alone_is_asked_for():
     time = np.arange(0.0, 1.0, 0.01)
     settings = {"time": "t", "inputs": {"joint_position.drum": {"column": "q", "smoothing": 0.0}}}

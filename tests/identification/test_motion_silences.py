@@ -1,4 +1,4 @@
-"""Motions that were wrong in silence: starts beside the recording, steps that fail, inputs that nothing reads."""
+"""Motions that were wrong in silence: starts beside the recording, failing steps, inputs that nothing reads, noise."""
 
 import warnings
 from dataclasses import replace
@@ -9,9 +9,11 @@ from intervals import COULOMB, DRAG, MOTION, TURN, motion
 
 import finger_pin as fp
 from finger_pin.description.loading import load_bench
+from finger_pin.description.recordings.bench import RecordingSettings
+from finger_pin.description.validation import validate
 from finger_pin.exceptions import ScenarioWarning
 from finger_pin.identification import motions
-from finger_pin.identification.models import build_problem
+from finger_pin.identification.models import build_problem, recording_models
 from finger_pin.identification.recordings import read_recording
 
 BENT = {"finger.tendons.T1.curvature_offset": TURN, DRAG: 0.4}
@@ -66,7 +68,7 @@ def test_a_recorded_start_is_that_of_a_joint_whose_column_has_a_wrong_zero(late)
 
 
 @pytest.mark.slow
-def test_a_start_far_from_the_first_row_of_a_recording_is_told():
+def test_a_start_far_from_the_first_row_of_a_recording_is_warned_of():
     data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
     table = {name: values[:60] for name, values in data.items()}
     given = {
@@ -119,3 +121,27 @@ def test_degrees_that_nothing_says_are_degrees_are_asked_about(column, said):
         problem(data, outputs={"joint_position.drum": column})
     asked = problem(data, outputs={"joint_position.drum": {"column": column, "unit": "deg"}})
     assert np.max(asked.signals[0].measured) == pytest.approx(np.deg2rad(9.6))
+
+
+@pytest.mark.parametrize("jitter", [0.0, 2e-3])
+def test_a_spline_that_follows_the_noise_is_warned_of_with_the_smoothing_that_avoids_it(jitter):
+    """The angle's noise is that of its encoder, and speed times the error of its times; uneven times alone are none."""
+    rng, time = np.random.default_rng(4), np.arange(0.0, 5.0, 0.01)
+    late = rng.normal(0.0, jitter, time.size)
+    even = np.sort(time + rng.uniform(-2e-3, 2e-3, time.size))
+    angle = np.sin(2.0 * (even + late)) + rng.normal(0.0, 3e-4, even.size)
+    data = {"t": even, "q": angle, "tau": np.zeros(even.size)}
+    noise = np.hypot(3e-4, jitter * 2.0 / np.sqrt(2.0))
+
+    def said(smoothing):
+        entries = {"time": "t", "settle": 0.1, "outputs": {"joint_effort.drum": "tau"}}
+        entries["inputs"] = {"joint_position.drum": {"column": "q", "smoothing": smoothing}}
+        settings = validate(RecordingSettings, entries, ())
+        models, _ = recording_models(
+            fp.load_scenario("canal"), [read_recording("log", settings, data)], None, [np.ones(even.size, dtype=bool)]
+        )
+        return [each for each in models[0].warnings([]) if "follows the noise" in each]
+
+    (told,) = said(1e-4)
+    assert float(told.split("readings scatter by ")[1].split()[0]) == pytest.approx(noise, rel=0.15)
+    assert said(0.0) and not said(noise)

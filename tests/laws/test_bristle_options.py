@@ -106,7 +106,7 @@ def test_the_options_change_the_motion_and_their_defaults_are_the_papers():
         ("micro_damping", [0.0, 1.0], "list of"),
     ],
 )
-def test_an_option_out_of_its_range_is_told_by_name(kind, name, value, says):
+def test_an_option_out_of_its_range_is_refused_by_name(kind, name, value, says):
     entry_name = f"finger.{kind}_friction.{name}"
     with pytest.raises(fp.InputError, match=says) as caught:
         fp.load_finger("ub_stand_in", {entry_name: value})

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from law_cases import for_complex
 
-from finger_pin.core.addresses.law_code import inlined
+from finger_pin.core.jit import inlined
 from finger_pin.laws.contact_law import CONTACT
 from finger_pin.laws.law import Touch
 

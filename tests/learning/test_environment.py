@@ -79,7 +79,7 @@ def test_seeds_alone_decide_what_happens(monkeypatch):
     )
     found = []
     for threads in (1, 2):
-        monkeypatch.setattr("finger_pin.core.threads.usable_cores", lambda count=threads: count)
+        monkeypatch.setattr("finger_pin.threads.usable_cores", lambda count=threads: count)
         worlds = VectorEnvironment(3, FIG6, **task)
         seen = [worlds.reset(seed=7)[0]]
         seen += [worlds.step(np.tile(pull, (3, 1)))[0] for pull in [*PULLS, *PULLS]]
@@ -142,7 +142,7 @@ def test_all_that_worlds_tell_is_what_one_tells_and_its_result(name, action, dra
         np.testing.assert_allclose(own[each], last[each].values, atol=1e-9 * scale, err_msg=each)
 
 
-def test_what_is_drawn_acts_like_an_override():
+def test_a_randomised_number_acts_like_an_override():
     key = "finger.tendon_friction.coulomb"
     drawn = Environment(FIG6, reward=nothing, randomise={key: Uniform(0.3, 0.3)})
     given = Environment(fp.load_scenario("reversals", {**COARSE, key: 0.3}), reward=nothing)
@@ -282,7 +282,7 @@ def test_wrong_actions_and_rewards_are_refused():
 
 
 @pytest.mark.parametrize("wrong", ["a", None, [1.0], True, float("nan")])
-def test_what_is_no_number_is_refused_by_the_name_of_its_argument(wrong):
+def test_an_argument_that_is_no_number_is_refused_by_its_name(wrong):
     made = {
         **{f"Sensor.{name}": lambda name=name: Sensor(**{name: wrong}) for name in vars(Sensor())},
         **{name: lambda name=name: simple(**{name: wrong}) for name in ("delay", "period", "duration")},

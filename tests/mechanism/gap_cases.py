@@ -4,7 +4,7 @@ import coal
 import numba
 import numpy as np
 
-from finger_pin.core.addresses.law_code import inlined
+from finger_pin.core.jit import inlined
 from finger_pin.mechanism.gaps import ELLIPSOIDS, PRISM, prism_parameters
 
 #: Kinds of parts: whether they have a disc, and a length.

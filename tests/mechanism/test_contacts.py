@@ -56,7 +56,7 @@ def test_links_touch_objects_and_objects_each_other_but_neither_fixed_ones_nor_l
     assert pairs == expected | {"ball-table", "ball-box"}
 
 
-def test_what_is_out_of_reach_in_every_posture_is_left_out():
+def test_a_pair_out_of_reach_in_every_posture_is_left_out():
     """The paper's finger is 117 mm long: a wall at 75 mm is out of reach of its first link, one at 120 mm of all."""
     near = Object(shape="half_space", position=(0.075, 0.0, 0.0), orientation=(0.0, -1.0, 0.0, 1.0))
     far = Object(shape="half_space", position=(0.12, 0.0, 0.0), orientation=(0.0, -1.0, 0.0, 1.0))

@@ -74,7 +74,7 @@ def test_the_account_of_a_sprung_finger_closes_and_books_its_springs(tmp_path):
     assert float(abs(result.energy_residual).max()) < 1e-4 * change
 
 
-def test_what_holds_a_finger_at_rest_is_gravity_and_the_springs(sprung):
+def test_the_torque_that_holds_a_finger_at_rest_is_that_of_gravity_and_springs(sprung):
     theta = np.array([0.7, 0.9])
     at_rest = sprung.evaluate(sprung.rest_state(theta), np.zeros(3))
     held = sprung.rigid_body.inverse_dynamics(theta, np.zeros(2), at_rest.acceleration)

@@ -88,6 +88,6 @@ def test_pulled_by_its_tendon_it_rolls_and_its_energy_is_what_the_tendon_gave():
     ("entries", "says"),
     [({"ratio": 0.5}, "leave out ratio"), ({"rolling": [0.0, 1.0]}, "rolling"), ({"other": None}, "other")],
 )
-def test_what_contradicts_rolling_is_refused(entries, says):
+def test_an_entry_that_contradicts_rolling_is_refused(entries, says):
     with pytest.raises(fp.InputError, match=says):
         rolling_finger(**entries)

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from finger_pin.core.addresses.law_code import inlined
+from finger_pin.core.jit import inlined
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
 
 RADIUS = 0.1

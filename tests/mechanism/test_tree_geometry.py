@@ -95,7 +95,7 @@ def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:hand. not carried over")
-def test_what_falls_out_of_a_hand_leaves_the_view():
+def test_an_object_that_falls_out_of_a_hand_leaves_the_view():
     description = fp.from_mujoco(str(asset("adroit_hand/adroit_pen.xml")))
     scene, still = Scene(description), np.zeros((2, len(description.joints)))
     falling = still.copy()

@@ -46,7 +46,7 @@ def refused(text=SLIDER, rows=20, change=None, **chosen):
         ("tendons.branched", {"text": ROUTED, "tendons": {"branched": {}}}),
     ],
 )
-def test_what_cannot_work_is_named(entry, keys):
+def test_settings_that_cannot_work_are_refused_by_their_entry(entry, keys):
     assert refused(**keys).entry == entry
 
 

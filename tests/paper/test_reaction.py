@@ -156,12 +156,12 @@ def test_on_fig6_17_is_within_four_percent_of_the_full_quasi_static_reaction(alo
 
 
 @pytest.mark.parametrize("missing", ["joint_acceleration", "passive_tension_proximal"])
-def test_a_result_without_what_is_needed_is_told_so(reversals, missing):
+def test_a_result_that_lacks_needed_variables_is_refused(reversals, missing):
     with pytest.raises(fp.InputError, match=missing):
         joint_reactions(reversals.isel(time=slice(0, 2)).drop_vars(missing))
 
 
-def test_a_result_without_its_finger_is_told_so(reversals):
+def test_a_result_without_its_finger_is_refused(reversals):
     with pytest.raises(fp.InputError, match="finger"):
         joint_reactions(reversals.isel(time=slice(0, 2)).drop_attrs())
 

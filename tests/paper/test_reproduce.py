@@ -33,7 +33,7 @@ def test_all_figures_of_the_paper_land_in_one_folder(short, monkeypatch, tmp_pat
         assert str(tmp_path / "paper" / name) in output
 
 
-def test_a_folder_that_cannot_be_made_is_told_in_one_line(tmp_path, capsys):
+def test_a_folder_that_cannot_be_made_is_refused_in_one_line(tmp_path, capsys):
     blocked = tmp_path / "file"
     blocked.write_text("")
     assert run_function(reproduce, ["--output", str(blocked)]) == 1

@@ -160,7 +160,7 @@ angular_velocity = [0.001, 5, 0]
 
 
 @pytest.mark.slow
-def test_an_account_that_does_not_close_is_told():
+def test_an_account_that_does_not_close_is_warned_of():
     for law, tells in ((JOINT_SPRING, False), (replace(JOINT_SPRING, account=forgetful), True)):
         rows = Rows("band", law, ("medial",), np.array([[0.05], [0.0], [2e-3]]), np.eye(5)[2:3])
         with warnings.catch_warnings():

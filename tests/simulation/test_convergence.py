@@ -225,7 +225,7 @@ def test_a_check_that_fails_keeps_the_run(run, tmp_path, monkeypatch, error, exp
     assert "convergence_difference" not in fp.load(tmp_path / "out" / "trajectory.nc")
 
 
-def test_a_tolerance_that_cannot_be_tightened_is_told_before_anything_is_simulated(run, tmp_path):
+def test_a_tolerance_that_cannot_be_tightened_is_refused_before_anything_is_simulated(run, tmp_path):
     before = contents(tmp_path)
     code, out, lines = run("--set", "simulation.rtol=1e-12")
     assert (code, out, len(lines)) == (2, "", 1)

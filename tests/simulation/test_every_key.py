@@ -9,8 +9,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.motor_signals import spool_windings, voltage_signals
-from finger_pin.control.position_drive import PositionDrives, loop_period, spool_goals
+from finger_pin.control.position_drive import PositionDrives, loop_period, spool_goals, spool_windings, voltage_signals
 from finger_pin.description.loading import read_scenario, to_toml
 from finger_pin.description.tables import list_scenarios
 from finger_pin.exceptions import InputError
@@ -275,7 +274,7 @@ def test_every_number_acts_is_refused_or_has_a_reason_to_do_nothing(part):
         ("hand", "controller.spring_compensation", True, "without springs"),
     ],
 )
-def test_what_has_no_effect_is_refused_though_its_default_may_stand_there(name, key, value, says):
+def test_an_entry_without_effect_is_refused_though_its_written_default_is_read(name, key, value, says):
     with pytest.raises(InputError, match=says) as caught:
         fp.load_scenario(name, {key: value})
     assert caught.value.entry == key and str(caught.value).endswith("leave it out")

@@ -233,7 +233,7 @@ def test_a_hand_is_built_by_its_name_and_steps_all_its_fingers():
     assert np.all(simulator.step(np.full(20, 1.0), 1e-3).position != before)
 
 
-def test_a_finger_in_place_of_a_hand_and_a_hand_in_place_of_a_finger():
+def test_a_hand_may_replace_a_finger_and_a_finger_of_other_joints_no_hand():
     assert fp.load_scenario("reversals", {"hand": "ub_hand", "reference": {}}).hand.name == "ub_hand"
     with pytest.raises(InputError, match="no such joint"):
         fp.load_scenario("hand", {"finger": "ub_stand_in"})

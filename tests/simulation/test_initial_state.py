@@ -9,7 +9,7 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.tables import list_scenarios
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.initial_state import with_initial_state
-from finger_pin.simulation.motor_variables import LOOP_VARIABLES
+from finger_pin.simulation.row_variables import LOOP_VARIABLES
 from finger_pin.simulation.setup import Setup
 
 START = {
@@ -145,7 +145,7 @@ def test_a_saved_result_of_a_finger_without_passive_tendon_is_continued(tmp_path
         (xr.Dataset(), "its joints must be abduction, proximal, medial, distal"),
     ],
 )
-def test_what_is_no_state_of_the_finger_is_refused_in_one_line(initial, said):
+def test_an_array_that_is_no_state_of_the_finger_is_refused_in_one_line(initial, said):
     with pytest.raises(InputError, match=said) as caught:
         fp.simulate(short(), initial=initial)
     assert caught.value.entry == "initial" and "\n" not in str(caught.value)

@@ -12,7 +12,7 @@ from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.laws import capstan
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.simulation.account import account
+from finger_pin.simulation.energy import account
 
 
 def share_left_open(loop, duration=0.015):

@@ -108,7 +108,7 @@ def test_a_run_records_bit_for_bit_what_simulating_the_scenario_read_anew_does(n
 
 
 @pytest.mark.parametrize("name", ["reversals", "servo_position", "pinch", "hand"])
-def test_what_needs_no_more_than_forces_has_the_bits_of_the_whole_result(name):
+def test_variables_that_need_only_forces_have_the_bits_of_the_whole_result(name):
     scenario = fp.load_scenario(name, {"simulation.duration": 0.05})
     joints = ("position", "velocity", "reference", "torque_command", "torque")
     record = [f"joint_{each}" for each in joints]
@@ -130,7 +130,7 @@ def test_runs_in_several_threads_at_once_give_the_bits_of_one_after_the_other():
         assert np.array_equal(one["tendon_tension"], other["tendon_tension"])
 
 
-def test_what_changes_the_structure_is_built_anew():
+def test_a_value_that_changes_the_structure_rebuilds_the_finger():
     motors = fp.prepare("servo", ["finger.actuators.*.motor", "simulation.duration"], ["motor_current"])
     other = {"finger.actuators.*.motor": "XC330-M288", "simulation.duration": 0.02}
     assert np.array_equal(

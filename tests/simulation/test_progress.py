@@ -6,10 +6,10 @@ import sys
 import pytest
 
 import finger_pin as fp
+from finger_pin import progress
 from finger_pin.commands.console import count_bar, progress_bar, runs_bar
 from finger_pin.core.stepping import integrator
 from finger_pin.exceptions import SlowRunWarning
-from finger_pin.simulation import progress
 
 SHORT = {"simulation.duration": 0.01}
 

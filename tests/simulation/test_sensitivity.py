@@ -174,7 +174,7 @@ def test_each_finger_of_a_hand_feels_numbers_of_its_own_alone():
         assert np.any(slopes[:, own] != 0.0) and np.all(slopes[:, ~own] == 0.0)
 
 
-def test_what_has_no_slope_is_refused():
+def test_a_value_without_a_derivative_is_refused():
     prepared = fp.prepare(fp.load_scenario("reversals", {"simulation.duration": 0.01}), ["simulation.method"])
     with pytest.raises(fp.InputError, match="single numbers"):
         prepared.run(["Rodas4"], sensitivities=True)

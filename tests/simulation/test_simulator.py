@@ -148,7 +148,7 @@ def test_where_the_integrator_cannot_go_on_it_names_time_and_state(finger: fp.Fi
     assert any(name in caught.value.reason for name in finger.layout.names)
 
 
-def test_what_holds_addresses_refuses_to_be_copied_alone(finger: fp.Finger) -> None:
+def test_an_object_that_holds_addresses_refuses_to_be_copied_alone(finger: fp.Finger) -> None:
     part = fp.Simulator(finger)._stepper.parts[0]
     for each in (part, part.model):
         with pytest.raises(TypeError, match="holds addresses"):

@@ -130,7 +130,7 @@ def test_a_failing_run_is_nan_from_where_it_stopped_and_says_why(monkeypatch: py
         ),
     ],
 )
-def test_what_cannot_be_stacked_is_named(runs: list[fp.Scenario], options: dict, entry: str) -> None:
+def test_runs_that_cannot_be_stacked_are_named(runs: list[fp.Scenario], options: dict, entry: str) -> None:
     with pytest.raises(fp.InputError) as caught:
         fp.simulate_many(runs, **options)
     assert caught.value.entry == entry

@@ -122,7 +122,7 @@ def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, caps
 
 @pytest.mark.slow
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "not an address"])
-def test_a_scheduler_that_is_not_there_is_told_in_one_line(address, tmp_path, monkeypatch, capsys):
+def test_a_missing_scheduler_is_reported_in_one_line(address, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("finger_pin.commands.options._CONNECTION_TIMEOUT", 0.3)
     monkeypatch.syspath_prepend(str(SCRIPTS))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.parsers import parse_range, parse_values
+from finger_pin.studies.designs import parse_range, parse_values
 
 
 def test_a_grid_is_every_combination_with_the_last_key_fastest():
@@ -105,6 +105,6 @@ def test_designs_that_are_none_are_refused(make):
 
 
 @pytest.mark.parametrize("given", [3.0, "abc", None])
-def test_what_is_no_list_of_values_is_refused(given):
+def test_an_argument_that_is_no_list_of_values_is_refused(given):
     with pytest.raises(fp.InputError, match=r"controller\.gain.*: must be given a list of values"):
         fp.studies.Grid({"controller.gain": given})

@@ -145,7 +145,7 @@ class Forgetful:
 
 @pytest.mark.parametrize("study", STUDIES)
 @pytest.mark.parametrize("given", [3, "threads", ThreadPoolExecutor, Forgetful(), multiprocessing.get_context("fork")])
-def test_what_is_no_executor_is_refused_in_one_line(study, given):
+def test_an_argument_that_is_no_executor_is_refused_in_one_line(study, given):
     asked = {"many": {"workers": None, "executor": given}}.get(study, {"executor": given})
     with pytest.raises(fp.InputError, match=r"^executor[^\n]*must be a concurrent.futures.Executor[^\n]*$"):
         STUDIES[study](**asked)

@@ -101,7 +101,7 @@ MYSTERIES = [threading.Lock(), (each for each in ()), np.frompyfunc(abs, 1, 1)]
 
 
 @pytest.mark.parametrize("mystery", MYSTERIES)
-def test_what_cannot_be_compared_has_no_digest(mystery):
+def test_a_value_that_cannot_be_compared_has_no_digest(mystery):
     with pytest.raises(UnknownDependency):
         digest(defined("def f(x): return A", A=mystery))
 

@@ -63,7 +63,7 @@ def test_a_whole_number_stays_one(reversals):
         ("finger.gravity[-1]", "index"),
     ],
 )
-def test_a_key_that_holds_no_number_is_told_in_one_line(reversals, key, says):
+def test_a_key_that_holds_no_number_is_refused_in_one_line(reversals, key, says):
     with pytest.raises(fp.InputError) as caught:
         reversals.check(key, [0.5, 0.6])
     assert says in str(caught.value)
@@ -98,7 +98,7 @@ def test_a_key_may_hold_a_name_or_a_whole_table_that_a_name_stands_for(reversals
         ("finger", ["bu"], "there are dexmart_index, planar, ub"),
     ],
 )
-def test_a_name_that_a_key_cannot_hold_is_told_in_one_line(reversals, key, values, says):
+def test_a_name_that_a_key_cannot_hold_is_refused_in_one_line(reversals, key, values, says):
     with pytest.raises(fp.InputError, match=says):
         reversals.check(key, values)
 

@@ -11,8 +11,15 @@ from planted import CHEAP, DEAR, GAIN, RAISES
 import finger_pin as fp
 from finger_pin.exceptions import StudyError
 from finger_pin.studies import radii
-from finger_pin.studies.search import Search, nondominated
-from finger_pin.studies.search_problem import Constraint, Goals, parse_constraint, parse_variable, point_at
+from finger_pin.studies.search import (
+    Constraint,
+    Goals,
+    Search,
+    nondominated,
+    parse_constraint,
+    parse_variable,
+    point_at,
+)
 
 SHORT = {"simulation.duration": 0.02}
 TWO = ThreadPoolExecutor(2)

@@ -100,7 +100,7 @@ def test_files_that_no_study_of_this_kind_wrote_are_left_alone(tmp_path, name, r
     assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [(name, "mine")]
 
 
-def test_a_folder_that_cannot_be_made_or_written_is_told(tmp_path):
+def test_a_folder_that_cannot_be_made_or_written_is_refused(tmp_path):
     (tmp_path / "file").touch()
     (tmp_path / "folder" / "runs.jsonl").mkdir(parents=True)
     for folder in (tmp_path / "file" / "sub", tmp_path / "folder"):

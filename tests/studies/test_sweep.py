@@ -114,7 +114,7 @@ def test_samples_have_every_key_as_a_coordinate():
     assert result["environment.fingertip_force[2]"].dims == ("sample",)
 
 
-def test_a_run_that_raises_is_told_in_one_line_and_the_others_go_on():
+def test_a_run_that_raises_is_reported_in_one_line_and_the_others_go_on():
     result = fp.sweep(
         "reversals", {"controller.gain": [1.0, 2.0, 3.0]}, metrics=[RAISES], overrides=SHORT, executor=TWO
     )

@@ -34,7 +34,7 @@ def test_the_cone_says_what_its_edge_is():
 
 
 @pytest.mark.parametrize(("draw", "what"), [(plot_contact, "nothing around it"), (plot_servo, "without servos")])
-def test_what_a_result_cannot_show_is_said_in_one_line(draw, what):
+def test_a_figure_that_a_result_cannot_show_is_refused_in_one_line(draw, what):
     with pytest.raises(InputError, match=what):
         draw(made([1.0]).drop_dims("contact"))
 

@@ -208,7 +208,7 @@ def test_time_runs_as_fast_as_asked_or_slower_and_says_so(cost, rate):
     assert pacer.is_slow == (rate < 1.0)
 
 
-def test_what_cannot_be_played_is_refused_in_one_line():
+def test_a_scenario_that_cannot_be_played_is_refused_in_one_line():
     with pytest.raises(fp.InputError, match=r"controller\.sampling: cannot be played"):
         Session(fp.load_scenario("reversals", {"controller.sampling.period": 1e-3}))
     with pytest.raises(fp.InputError, match=r"simulation\.start_time = 1\.0: must be 0"):

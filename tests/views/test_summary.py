@@ -102,7 +102,7 @@ def test_the_summary_tells_the_cost(result):
     assert f"Wall time {attributes['solver_wall_time']:.3g} s, real-time factor {factor:.3g}" in text
 
 
-def test_the_summary_of_one_instant_and_of_a_saved_result(result, tmp_path):
+def test_one_instant_has_a_summary_and_a_saved_result_has_that_of_the_result(result, tmp_path):
     assert "abduction" in summarize(result.isel(time=[0]).assign_attrs(end_time=0.0))
     fp.save(result, tmp_path / "r.nc")
     assert summarize(fp.load(tmp_path / "r.nc")) == summarize(result)

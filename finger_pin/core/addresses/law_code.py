@@ -6,16 +6,12 @@ two, and the core stays as it is.
 
 from __future__ import annotations
 
-import ast
-import builtins
-import inspect
-import textwrap
 from collections.abc import Callable, Sequence
 from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from finger_pin.core.jit import Pointer, address_of, njit_inline
+from finger_pin.core.jit import Pointer, address_of, inlined, njit_inline
 from finger_pin.core.jit import numbers as _numbers
 from finger_pin.core.jit import put as _put
 from finger_pin.exceptions import InputError
@@ -126,37 +122,6 @@ def kink_column(law: Law | ContactLaw) -> int:
     if law.scale is None or law.arms > 1:
         raise InputError(f"law {law.name}: kink", "is 'speed', which is for laws of one arm with a state")
     return ROW.speed
-
-
-@cache
-def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a plain function compiled, with all plain functions that it calls."""
-    assert isinstance(function, FunctionType)
-    code, global_names = function.__code__, function.__globals__
-    if _may_raise(function):
-        raise InputError(
-            f"law.{function.__qualname__}", "must raise no exception, as compiled code tells it nobody; return nan"
-        )
-    called = {name: global_names[name] for name in code.co_names if isinstance(global_names.get(name), FunctionType)}
-    world = {**global_names, **{name: inlined(each) for name, each in called.items()}}
-    return njit_inline(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
-
-
-def _may_raise(function: FunctionType) -> bool:
-    """Return whether a function from outside this package has a ``raise`` or an ``assert``."""
-    if function.__module__.startswith("finger_pin."):
-        return False
-    try:
-        nodes = ast.walk(ast.parse(textwrap.dedent(inspect.getsource(function))))
-        return any(isinstance(node, ast.Raise | ast.Assert) for node in nodes)
-    except SyntaxError:
-        # The line of a lambda, which can do neither.
-        return False
-    except (OSError, TypeError):
-        # Without a text, whoever raises an exception names it.
-        global_names = vars(builtins) | function.__globals__
-        named = [global_names.get(name) for name in function.__code__.co_names]
-        return any(isinstance(each, type) and issubclass(each, BaseException) for each in named)
 
 
 def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Callable[..., Any]) -> int:

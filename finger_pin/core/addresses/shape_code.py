@@ -7,8 +7,7 @@ from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from finger_pin.core.addresses.law_code import inlined
-from finger_pin.core.jit import Pointer, address_of
+from finger_pin.core.jit import Pointer, address_of, inlined
 
 # Numbers that a shape gives, and their derivatives, at most.
 OUT, SLOPES = 16, 80

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.addresses.law_code import inlined
 from finger_pin.core.addresses.spatial import sine_cosine
-from finger_pin.core.jit import Layers, Matrix, Vector, njit_inline
+from finger_pin.core.jit import Layers, Matrix, Vector, inlined, njit_inline
 from finger_pin.laws.input_functions import quintic
 from finger_pin.references.signal import HARMONIC
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.addresses.law_code import inlined
-from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
+from finger_pin.core.jit import Matrix, Vector, inlined, njit_always_inline, njit_inline
 from finger_pin.core.tables.chains import BODY
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.structure import Structure

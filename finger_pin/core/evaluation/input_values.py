@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.addresses.law_code import inlined
 from finger_pin.core.addresses.time_functions import signal_derivative, signal_derivatives, signal_values
-from finger_pin.core.jit import Matrix, Vector, njit_always_inline, njit_inline
+from finger_pin.core.jit import Matrix, Vector, inlined, njit_always_inline, njit_inline
 from finger_pin.core.tables.inputs import HELD, SCHEDULED, InputTable
 from finger_pin.laws import input_functions as controller_laws
 

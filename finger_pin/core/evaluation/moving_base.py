@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from finger_pin.core.addresses.law_code import inlined
 from finger_pin.core.addresses.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.addresses.time_functions import SignalTable, signal_derivative
 from finger_pin.core.evaluation.rigid_body_dynamics import inverse_dynamics
-from finger_pin.core.jit import CompiledFunction, njit_inline, unpack
+from finger_pin.core.jit import CompiledFunction, inlined, njit_inline, unpack
 from finger_pin.core.tables.model import MODEL
 from finger_pin.laws import input_functions as palm_laws
 

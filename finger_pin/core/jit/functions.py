@@ -10,10 +10,14 @@ warning of the logger ``finger_pin``, which Python prints on standard error unle
 
 from __future__ import annotations
 
+import ast
+import builtins
 import ctypes
+import inspect
 import logging
 import multiprocessing
 import os
+import textwrap
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
@@ -28,6 +32,7 @@ import numba
 
 from finger_pin.core.jit.digests import Undigestible, cache_root, source_digest
 from finger_pin.description.caching import cached_property
+from finger_pin.exceptions import InputError
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _LOGGER = logging.getLogger("finger_pin")
@@ -57,6 +62,37 @@ def njit_always_inline(function: _Function) -> _Function:
 def njit_reassociate(function: _Function) -> _Function:
     """Return the function compiled as `njit_inline` does, with sums in any order, for vector instructions."""
     return numba.njit(**_INLINED | {"fastmath": {"contract", "reassoc"}})(function)  # type: ignore[no-any-return]
+
+
+@cache
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a plain function compiled, with all plain functions that it calls."""
+    assert isinstance(function, FunctionType)
+    code, global_names = function.__code__, function.__globals__
+    if _may_raise(function):
+        raise InputError(
+            f"law.{function.__qualname__}", "must raise no exception, as compiled code tells it nobody; return nan"
+        )
+    called = {name: global_names[name] for name in code.co_names if isinstance(global_names.get(name), FunctionType)}
+    world = {**global_names, **{name: inlined(each) for name, each in called.items()}}
+    return njit_inline(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
+
+
+def _may_raise(function: FunctionType) -> bool:
+    """Return whether a function from outside this package has a ``raise`` or an ``assert``."""
+    if function.__module__.startswith("finger_pin."):
+        return False
+    try:
+        nodes = ast.walk(ast.parse(textwrap.dedent(inspect.getsource(function))))
+        return any(isinstance(node, ast.Raise | ast.Assert) for node in nodes)
+    except SyntaxError:
+        # The line of a lambda, which can do neither.
+        return False
+    except (OSError, TypeError):
+        # Without a text, whoever raises an exception names it.
+        global_names = vars(builtins) | function.__globals__
+        named = [global_names.get(name) for name in function.__code__.co_names]
+        return any(isinstance(each, type) and issubclass(each, BaseException) for each in named)
 
 
 class CompiledFunction:

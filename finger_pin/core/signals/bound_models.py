@@ -23,9 +23,9 @@ from finger_pin.core.tables.linear_systems import Linear, build_linear
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.model import MODEL, Model
 from finger_pin.core.tables.structure import Structure
-from finger_pin.core.threads import in_threads, threads
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import PRESCRIBED_ACCELERATIONS
+from finger_pin.threads import in_threads, threads
 from finger_pin.typing import Array
 
 #: Fewer states than this are not worth a second thread.

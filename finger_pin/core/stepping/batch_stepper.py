@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from finger_pin.core.stepping.stepper import Stepper
-from finger_pin.core.threads import in_threads
+from finger_pin.threads import in_threads
 
 
 def advance_many(steppers: Sequence[Stepper], ends: Sequence[float]) -> list[int]:

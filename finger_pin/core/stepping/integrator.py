@@ -17,8 +17,8 @@ from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.steps import integration as core
 from finger_pin.core.steps.repetition import Steps
 from finger_pin.core.steps.trajectory import Statistics, Trajectory, Watch
-from finger_pin.core.threads import in_threads
 from finger_pin.exceptions import SlowRunWarning
+from finger_pin.threads import in_threads
 from finger_pin.typing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.

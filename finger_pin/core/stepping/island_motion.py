@@ -12,9 +12,9 @@ from finger_pin.core.signals.bound_models import MIN_STATES_PER_THREAD, BoundMod
 from finger_pin.core.signals.powers import POWERS, Powers, power_many
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, Record
 from finger_pin.core.steps.interpolation import BETWEEN, Between, interpolate_many
-from finger_pin.core.threads import in_threads, threads
 from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.threads import in_threads, threads
 from finger_pin.typing import Array
 
 

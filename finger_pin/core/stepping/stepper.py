@@ -18,9 +18,9 @@ from finger_pin.core.steps.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables.inputs import HELD, InputTable
 from finger_pin.core.tables.islands import Island, selections
 from finger_pin.core.tables.mechanism_parameters import compile_mechanism
-from finger_pin.core.threads import in_threads
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.threads import in_threads
 from finger_pin.typing import Array
 
 #: Snapshot of every island: tip-force flag, drive loops, knots, state arrays.

@@ -11,8 +11,8 @@ from finger_pin.core.jit import Indices, Matrix, Vector
 from finger_pin.core.tables.inputs import InputTable
 from finger_pin.core.tables.islands import find_islands
 from finger_pin.core.tables.structure import Structure
-from finger_pin.core.threads import physical_memory
 from finger_pin.exceptions import InputError
+from finger_pin.threads import physical_memory
 
 
 class Blocks(NamedTuple):

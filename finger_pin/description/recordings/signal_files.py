@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+from finger_pin.description.commands import COMMANDS, command_place
 from finger_pin.description.recordings.columns import read_signals
 from finger_pin.description.tables import PACKED_PREFIX
 from finger_pin.description.validation import Table, as_table
-from finger_pin.description.winding import COMMANDS, command_place
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand
 

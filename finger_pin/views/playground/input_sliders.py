@@ -8,11 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control import ClosedLoop, OpenLoopTensions, SteppedDrives, spool_goals, spool_windings, voltage_signals
 from finger_pin.control.input_ranges import input_ranges, spool_ranges
-from finger_pin.control.motor_signals import spool_windings, voltage_signals
-from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.position_drive import SteppedDrives, spool_goals
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.state import State

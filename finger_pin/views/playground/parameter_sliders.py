@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.control import OpenLoopTensions
 from finger_pin.control.interface import LoopController
-from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control import ClosedLoop
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import ContactPoints

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import viser
 
-from finger_pin.control.palm import PalmPath
+from finger_pin.control import PalmPath
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.playground.session import Reading, Session

@@ -7,7 +7,7 @@ from typing import TypeAlias
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.mechanism.tree_mechanism import MUSCLES, STATEFUL, STATELESS
+from finger_pin.mechanism.groups import MUSCLES, STATEFUL, STATELESS
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, times, trace
 from finger_pin.views.plots.panels import sheet, stack, title

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from finger_pin.analysis import ForcePolytope
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.progress import in_notebook
+from finger_pin.progress import in_notebook
 from finger_pin.views.viewer.animation import animation_page, posture_page
 
 #: Height of the page in a notebook, pixels.

@@ -38,7 +38,7 @@ def played(result, monkeypatch):
     return play
 
 
-def test_it_is_played_in_real_time_and_touches_nothing_but_the_finger(played):
+def test_playback_keeps_real_time_and_changes_nothing_but_the_finger(played):
     sent = played(speed=2.0, rate=20.0)
     times = np.unique([when for when, _ in sent]) - 1000.0
     np.testing.assert_allclose(times, np.arange(0.0, DURATION / 2.0 + 0.01, 0.05), atol=2e-3)

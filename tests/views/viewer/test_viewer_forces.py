@@ -61,7 +61,7 @@ def test_the_set_is_at_most_half_as_long_as_the_finger_and_not_tiny(forces_page,
     assert 0.02 < length < 0.08
 
 
-def test_it_stays_at_its_posture_while_the_finger_moves_and_makes_no_noise(forces_page):
+def test_the_force_set_stays_at_its_posture_while_the_finger_moves(forces_page):
     before = corners(forces_page, "body")
     seek(forces_page, 0.5 * DURATION)
     np.testing.assert_array_equal(corners(forces_page, "body"), before)

@@ -52,7 +52,7 @@ def test_an_mp4_in_slow_motion_has_frames_for_all_of_its_time(result, tmp_path):
     assert "frame=   17" in said and "1200x720" in said
 
 
-def test_what_cannot_be_filmed_is_said_before_anything_is_written(result, tmp_path, monkeypatch):
+def test_a_video_that_cannot_be_made_is_refused_before_anything_is_written(result, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", "")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(fp.exceptions.FingerPinError, match="ffmpeg"):

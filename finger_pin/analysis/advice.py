@@ -1,4 +1,4 @@
-"""Passivity of law (9): the limit of micro-damping beyond which friction can drive motion."""
+"""Advice before a run: micro-damping that lets friction (9) drive motion, and gravity that moves no joint."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ import numpy as np
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.laws.bristle import passive_micro_damping
+from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
+
+# Postures that are tried, and the arm of the weight, m, that counts as none.
+_POSTURES, _LEAST_ARM = 4, 1e-12
 
 
 # Many runs are of one finger.
@@ -36,3 +40,16 @@ def _excess(kind: str, names: Iterable[str], numbers: Mapping[str, Array], kinet
         f"finger.{kind}_friction.micro_damping = {micro[first]:g} can drive the motion of {name_list[first]}: "
         f"friction is passive up to {limits[first]:.3g} (b M^d / (M^c - M^d))"
     )
+
+
+def weight_advice(finger: Finger) -> str:
+    """Return the warning about gravity that moves no joint in any posture, in one line; empty if it moves one."""
+    body, limiter = finger.rigid_body, finger.stroke_limiter
+    gravity = np.asarray(body.model.gravity.linear)
+    shares = np.random.default_rng(0).uniform(size=(_POSTURES, len(limiter.lower)))
+    weight = body.mass * float(np.linalg.norm(gravity))
+    postures = limiter.lower + shares * (limiter.upper - limiter.lower)
+    if weight == 0.0 or any(np.any(np.abs(body.gravity_torque(each)) > _LEAST_ARM * weight) for each in postures):
+        return ""
+    entry, values = "finger" if finger.description.hand is None else "hand", ", ".join(f"{each:g}" for each in gravity)
+    return f"{entry}.gravity = [{values}] moves no joint, as all axes are along it: the links weigh nothing in this run"
