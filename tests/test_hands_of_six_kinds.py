@@ -49,6 +49,10 @@ WITHOUT_HAND = {
     "per_world",
     "predict",
     "save_figure",
+    # Parts of a loop for other rooms, which are given a loop's controller and tables.
+    "spool_goals",
+    "spool_windings",
+    "voltage_signals",
 }
 #: Classes that are given one; others are answers, descriptions or parts.
 CLASSES = {"Environment", "Finger", "Hand", "Run", "Simulator", "VectorEnvironment"}

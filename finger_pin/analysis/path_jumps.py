@@ -108,7 +108,9 @@ def path_jump_advice(finger: Finger, position: Array, near: float = math.inf) ->
     found = [
         str(jump)
         for jump in path_jumps(finger, position)
+        # The range of a joint without limits says nothing of where it goes.
         if abs(jump.position - shares[jump.joint][0]) <= near * shares[jump.joint][1]
+        and (near < math.inf or joints[jump.joint].limited)
     ]
     return f"the length of a cord jumps: {', '.join(found)}; put side points across the paths" if found else ""
 

@@ -29,13 +29,16 @@ class PassiveCoupling:
     followers: tuple[int, ...]
 
     @classmethod
-    def from_routing(cls, routing: Routing, tension: Array, stiffness: Array) -> PassiveCoupling:
+    def from_routing(
+        cls, routing: Routing, tension: Array, stiffness: Array, *, needed: bool = True
+    ) -> PassiveCoupling:
         """Solve H_c theta^d = -f^d / K_t for the follower joints.
 
         Args:
             routing: The routing.
             tension: f_5^d, shape (p,), N.
             stiffness: K_t, shape (p,), N/m.
+            needed: Whether to refuse tendons that determine a joint twice, rather than let no joint follow.
         """
         size = len(routing.joints)
         rows, followers = [], []
@@ -50,6 +53,8 @@ class PassiveCoupling:
         coupling = routing.coupling[routing.actuated + np.array(rows)]
         driven = coupling[:, followers]
         if len(set(followers)) < len(followers) or np.linalg.matrix_rank(driven) < len(followers):
+            if not needed:
+                return cls(matrix, offset, ())
             names = ", ".join(routing.passive_names[index] for index in rows)
             raise InputError("finger.tendons", f"the passive tendons {names} determine the same joint twice")
         matrix[followers] = 0.0

@@ -291,9 +291,9 @@ class Scenario(Description):
             expand(settings_of_finger(self.controller, name).passive_tension, len(finger.passive_names))
             for name, finger in fingers.items()
         ]
-        return PassiveCoupling.from_routing(
-            routing, np.concatenate(wishes), self.finger.numbers["passive_tendon"]["stiffness"]
-        )
+        # In open loop nothing follows a reference.
+        needed, stiffness = self.controller.kind != "tensions", self.finger.numbers["passive_tendon"]["stiffness"]
+        return PassiveCoupling.from_routing(routing, np.concatenate(wishes), stiffness, needed=needed)
 
     def sample_times(self) -> Array:
         """Return the times of the saved signals, s: multiples of the sampling period, and the end."""

@@ -91,8 +91,8 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
         _add_link(root, name, body, place, drawn)
     for name, end in tree.fingertips.items():
         (link, place), last = placed[end.body], f"{name}_{TIP_FRAME}" if name else TIP_FRAME
-        if not any(end.position) and end.body and not _joints_of(tree, end.body) and not tree.bodies[end.body].mass:
-            continue
+        if end.body is not None and end.body.split(".")[-1] == TIP_FRAME and not any(end.position):
+            continue  # Of a finger of links it is a body.
         while last in tree.bodies:
             last += "_"
         _add_joint(root, f"{last}_fixed", "fixed", link, last, place * pin.SE3(np.eye(3), np.array(end.position)))

@@ -21,7 +21,6 @@ from finger_pin.core.tables.islands import find_islands
 from finger_pin.core.tables.mechanism_parameters import compile_mechanism
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
-from finger_pin.exceptions import InputError
 from finger_pin.laws.spring import JOINT_SPRING
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import Rows
@@ -210,15 +209,6 @@ def test_a_failure_of_one_finger_names_its_own_state(fingers):
     trajectory = integrate_compiled(stepper, TIMES[-1], names_of(fingers.mechanism))
     place = fingers.parts[0].body.model.nv + 2
     assert trajectory.failure.endswith(f"the error is largest in x{place}")
-
-
-def test_parts_under_different_gravity_are_not_joined(scenarios):
-    parts = {
-        name: fp.Finger(fp.load_finger("planar", {"finger.gravity": [0.0, 0.0, g]})).mechanism
-        for name, g in (("index", -9.81), ("thumb", 0.0))
-    }
-    with pytest.raises(InputError, match=r"thumb\.gravity"):
-        join_mechanisms(parts)
 
 
 STILL = """<mujoco><option gravity="0 0 0"/><worldbody><site name="p" pos="-.03 0 .01"/>

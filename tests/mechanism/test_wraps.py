@@ -151,7 +151,7 @@ def test_readable_and_compiled_evaluation_agree_also_for_a_servo():
         finger, rng = fp.Finger(scenario.finger), np.random.default_rng(3)
         x = finger.rest_state(np.array([0.3, 0.4, 0.5])) + 1e-3 * rng.normal(size=finger.layout.size)
         inputs = np.full(finger.mechanism.channels, 4.0)
-        found = fp.Simulator(finger)._compiled.evaluate(x, inputs)
+        found = fp.Simulator(finger).loop.dynamics.evaluate(x, inputs)
         expected = finger.evaluate(x, inputs)
         assert np.allclose(found.rate, expected.rate, rtol=1e-9, atol=1e-9)
         for name in ("friction", "level", "curvature", "coefficient", "wrap_tension", "strands", "normal"):
