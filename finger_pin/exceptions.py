@@ -54,7 +54,7 @@ class ClosureWarning(ScenarioWarning):
 
 
 class PathJumpWarning(ScenarioWarning):
-    """The length of a cord jumps where its path changes sides: what pulls it against that place cannot go on."""
+    """A cord whose length jumps within the range of a joint: what pulls it against that place cannot go on."""
 
 
 class SelfLockingWarning(ScenarioWarning):

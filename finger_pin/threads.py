@@ -83,3 +83,12 @@ if hasattr(os, "register_at_fork"):
 def physical_memory() -> float:
     """Return the size of the machine's memory, bytes; infinite where the system does not tell."""
     return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else inf
+
+
+def wait_for(thread: threading.Thread, close: Callable[[], None]) -> None:
+    """Wait until a thread has ended; if the user interrupts (Ctrl-C), call a function that ends it."""
+    try:
+        while thread.is_alive():
+            thread.join(0.2)
+    except KeyboardInterrupt:
+        close()

@@ -13,10 +13,10 @@ from typing import Any, ClassVar
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.parameters import Joint, Link, Tendon
+from finger_pin.description.primitives import Triple
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import Body, Tip, TreeJoint, TreeSolid
-from finger_pin.description.waypoints import Triple
 from finger_pin.exceptions import InputError
 
 #: Bodies without joints at both ends of a finger of links.

@@ -10,11 +10,21 @@ import numpy as np
 from pydantic import AfterValidator, Field, field_serializer, field_validator, model_validator
 
 from finger_pin.description.placement import PathSignal
-from finger_pin.description.primitives import KINDS, MILLIMETRES
+from finger_pin.description.primitives import KINDS
 from finger_pin.description.signals import ForceSignal, check_axes
 from finger_pin.description.surface import Shaped
 from finger_pin.description.tables import dump_set_fields
-from finger_pin.description.validation import Description, FullName, Name, choice, problem, quantity, real, vector
+from finger_pin.description.validation import (
+    MILLIMETRES,
+    Description,
+    FullName,
+    Name,
+    choice,
+    problem,
+    quantity,
+    real,
+    vector,
+)
 from finger_pin.typing import Array
 
 #: The coordinates of an object's path.

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from finger_pin.description.validation import (
     IN_RADIANS,
+    MILLIMETRES,
     MOST_ANGLE,
     Description,
     Name,
@@ -27,7 +28,6 @@ from finger_pin.description.validation import (
 )
 from finger_pin.typing import Array
 
-_MILLIMETRES = " m (is it in millimetres?)"
 # Osmium, kg/m3 (CRC Handbook of Chemistry and Physics), and the least mass, kg, that is asked about: in grams a link
 # has one or more.
 _LARGEST_DENSITY, _LEAST_DENSITY = 22590.0, 1.0
@@ -53,19 +53,19 @@ def check_density(mass: float, inertia: float) -> None:
 class Link(Description):
     """A link that runs along its x axis, from its own joint to the next one (Table I)."""
 
-    length: Annotated[float, real(0.0, 2.0, above=True, hint=_MILLIMETRES)] = quantity(
+    length: Annotated[float, real(0.0, 2.0, above=True, hint=MILLIMETRES)] = quantity(
         ..., unit="m", source="Table I", doc="a, distance from this joint's axis to the next along x."
     )
     twist: Annotated[float, real(-math.pi, math.pi, hint=IN_RADIANS)] = quantity(
         0.0, unit="rad", source="Table I", doc="alpha, rotation about x from this joint's axis to the next."
     )
-    offset: Annotated[float, real(-2.0, 2.0, hint=_MILLIMETRES)] = quantity(
+    offset: Annotated[float, real(-2.0, 2.0, hint=MILLIMETRES)] = quantity(
         0.0, unit="m", source="Table I", doc="d, distance along this joint's axis at which the link runs along x."
     )
     section: Annotated[Literal["round", "square"], choice("round", "square")] = quantity(
         "round", unit="1", source="design", doc="Cross-section: a cylinder or a square box."
     )
-    width: Annotated[float, real(0.0, 1.0, above=True, hint=_MILLIMETRES)] = quantity(
+    width: Annotated[float, real(0.0, 1.0, above=True, hint=MILLIMETRES)] = quantity(
         ..., unit="m", source="design", doc="Diameter, or side of the square."
     )
     mass: Annotated[float, real(0.0, 100.0, above=True, hint=" kg (is it in grams?)")] = quantity(
@@ -157,7 +157,7 @@ def _one_if_true(value: object) -> object:
 class Crossing(Description):
     """The crossing of a tendon over a joint: winding radius (3) and the bending of its path (15)."""
 
-    radius: Annotated[float, real(-0.5, 0.5, hint=_MILLIMETRES)] = quantity(
+    radius: Annotated[float, real(-0.5, 0.5, hint=MILLIMETRES)] = quantity(
         ..., unit="m", source="(3)", doc="r, signed: positive where tension turns the joint positively."
     )
     bends: Annotated[float, real(0.0, 10.0), BeforeValidator(_one_if_true)] = quantity(

@@ -16,13 +16,22 @@ from finger_pin.description.friction import JointFrictionSettings, TendonFrictio
 from finger_pin.description.parameters import Joint, Link, PassiveTendon, StrokeLimiterSettings, Tendon
 from finger_pin.description.signals import SignalSettings
 from finger_pin.description.tables import Series, series
-from finger_pin.description.validation import Description, Name, Numbers, problem, quantity, real, suggestion, vector
+from finger_pin.description.validation import (
+    MILLIMETRES,
+    Description,
+    Name,
+    Numbers,
+    problem,
+    quantity,
+    real,
+    suggestion,
+    vector,
+)
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
-_MILLIMETRES = " m (is it in millimetres?)"
 #: A place on the palm.
-PALM_POINT = vector(3, -2.0, 2.0, _MILLIMETRES)
+PALM_POINT = vector(3, -2.0, 2.0, MILLIMETRES)
 #: The coordinates of a palm's path: place, m, and roll, pitch and yaw, rad, in the world.
 PATH = ("x", "y", "z", "roll", "pitch", "yaw")
 _COORDINATE = real(-12.5, 12.5)
@@ -196,7 +205,7 @@ _AT_REST = PathSignal()
 class Palm(Description):
     """The palm, on which fingers stand: the base frame of the hand, at rest or moved along a path."""
 
-    size: Annotated[tuple[float, float, float], vector(3, 0.0, 2.0, _MILLIMETRES)] = quantity(
+    size: Annotated[tuple[float, float, float], vector(3, 0.0, 2.0, MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Sides of the box that is drawn; zero for none."
     )
     centre: Annotated[tuple[float, float, float], PALM_POINT] = quantity(

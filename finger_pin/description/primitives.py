@@ -12,11 +12,10 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import model_validator
 
-from finger_pin.description.validation import Description, problem, quantity, real, vector
+from finger_pin.description.validation import MILLIMETRES, Description, problem, quantity, real, vector
 
 Triple = tuple[float, float, float]
 Sizes = tuple[float, ...]
-MILLIMETRES = " m (is it in millimetres?)"
 
 
 class Part(NamedTuple):

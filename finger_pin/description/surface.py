@@ -6,8 +6,17 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from finger_pin.description.primitives import KINDS, MILLIMETRES, Sized
-from finger_pin.description.validation import Description, choice, direction, problem, quantity, real, vector
+from finger_pin.description.primitives import KINDS, Sized
+from finger_pin.description.validation import (
+    MILLIMETRES,
+    Description,
+    choice,
+    direction,
+    problem,
+    quantity,
+    real,
+    vector,
+)
 
 
 class Surface(Description):

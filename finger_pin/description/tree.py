@@ -273,11 +273,15 @@ class Tree(Description):
         tables = [{key: r for key, r in each.wound.items() if r} for each in self.tendons.values()]
         return [table[joint] for table in tables if list(table) == [joint]]
 
+    def joints_of(self, body: str) -> list[str]:
+        """Return the joints of a body on its parent, in order."""
+        return [name for name, joint in self.joints.items() if joint.body == body]
+
     def _movers(self, body: str | None) -> set[str]:
         """Return the joints that move a body."""
         movers = set[str]()
         while body is not None:
-            movers |= {name for name, joint in self.joints.items() if joint.body == body}
+            movers |= {*self.joints_of(body)}
             body = self.bodies[body].parent
         return movers
 

@@ -8,9 +8,10 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.objects import ObjectState, check_moments
 from finger_pin.description.placement import PathSignal
-from finger_pin.description.primitives import Sized
+from finger_pin.description.primitives import Sized, Triple
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.validation import (
+    MILLIMETRES,
     MOST_ANGLE,
     Description,
     Name,
@@ -23,9 +24,8 @@ from finger_pin.description.validation import (
     reals,
     vector,
 )
-from finger_pin.description.waypoints import BODY_POINT, Triple, Waypoint, check_path
+from finger_pin.description.waypoints import BODY_POINT, Waypoint, check_path
 
-_MILLIMETRES = " m (is it in millimetres?)"
 _LARGE = 1e9
 #: Red, green, blue and opacity of what solids are made of, 0 to 1.
 MATERIALS: dict[str, tuple[float, float, float, float]] = {
@@ -144,7 +144,7 @@ class TreeTendon(Description):
     rest: Annotated[Pair, vector(2, -1e3, 1e3)] = quantity(
         (0.0, 0.0), unit="m", source="design", doc="Lengths between which its spring is relaxed."
     )
-    slack: Annotated[float, real(-1.0, 1.0, hint=_MILLIMETRES)] | None = quantity(
+    slack: Annotated[float, real(-1.0, 1.0, hint=MILLIMETRES)] | None = quantity(
         None,
         unit="m",
         source="design",

@@ -30,6 +30,7 @@ _UNIT = 1.001
 #: The largest angle of a joint, rad: two turns. Nearly every angle in degrees is beyond it.
 MOST_ANGLE = 12.5
 IN_RADIANS = " rad (is it in degrees?)"
+MILLIMETRES = " m (is it in millimetres?)"
 Numbers = float | tuple[float, ...]
 Table = dict[str, Any]
 _Model = TypeVar("_Model", bound="Description")

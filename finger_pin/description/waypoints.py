@@ -9,12 +9,21 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from finger_pin.description.validation import Description, Name, choice, direction, problem, quantity, real, vector
+from finger_pin.description.primitives import Triple
+from finger_pin.description.validation import (
+    MILLIMETRES,
+    Description,
+    Name,
+    choice,
+    direction,
+    problem,
+    quantity,
+    real,
+    vector,
+)
 
-_MILLIMETRES = " m (is it in millimetres?)"
 #: A place in a body's frame.
-BODY_POINT = vector(3, -10.0, 10.0, _MILLIMETRES)
-Triple = tuple[float, float, float]
+BODY_POINT = vector(3, -10.0, 10.0, MILLIMETRES)
 
 
 class SidePoint(Description):
@@ -37,7 +46,7 @@ class Waypoint(Description):
     orientation: Annotated[tuple[float, float, float, float], direction(4)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of a wrap in the body's frame; a cylinder's axis is z."
     )
-    radius: Annotated[float, real(0.0, 1.0, hint=_MILLIMETRES)] = quantity(
+    radius: Annotated[float, real(0.0, 1.0, hint=MILLIMETRES)] = quantity(
         0.0, unit="m", source="design", doc="Of a sphere or cylinder around which it wraps."
     )
     side: Annotated[Triple, BODY_POINT] | None = quantity(

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.links import TIP
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
@@ -22,7 +23,7 @@ from finger_pin.exchange.mjcf_bodies import BodyWriter
 from finger_pin.exchange.mjcf_friction import add_friction_elements
 from finger_pin.exchange.mjcf_tree import tree_to_mjcf
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.urdf import TENSION_LIMIT, TIP_FRAME
+from finger_pin.mechanism.urdf import TENSION_LIMIT
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
 from finger_pin.typing import Array
 
@@ -131,7 +132,7 @@ def to_mjcf(
 
 def _header(description: FingerDescription, tendons: Tendons, massless: bool, friction: bool, limits: bool) -> str:
     """Return the comment that says what of the description the model has and lacks."""
-    notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
+    notes = {"title": description.title or description.name, "passive": "", "tip": TIP, "limit": TENSION_LIMIT}
     notes |= {"friction": _FRICTION_PLUGIN, "rough": ""} if friction else {"friction": "", "rough": _FRICTION_LEFT_OUT}
     springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
     notes["held"] = _HYSTERESIS_LEFT_OUT if any(springs) or tendons.hysteresis.any() else ""

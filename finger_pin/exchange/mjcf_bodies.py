@@ -65,8 +65,8 @@ class BodyWriter:
 
     def _add_body(self, name: str, body: Body) -> None:
         parent = self.elements[body.parent]
-        is_fixed = body.parent is None and not any(joint.body == name for joint in self.tree.joints.values())
-        if is_fixed and name == _WORLD:
+        joints = self.tree.joints_of(name)
+        if name == _WORLD and body.parent is None and not joints:
             self.elements[name] = parent
             if self.shapes:
                 add_body_geoms(parent, body)
@@ -79,7 +79,7 @@ class BodyWriter:
         if body.mass or any(body.inertia):
             inertia = {"pos": numbers(*body.centre), "mass": numbers(body.mass), "fullinertia": numbers(*body.inertia)}
             ET.SubElement(element, "inertial", inertia)
-        elif not is_mocap and any(joint.body == name for joint in self.tree.joints.values()):
+        elif joints and not is_mocap:
             least = {"pos": "0 0 0", "mass": numbers(_NO_INERTIA), "diaginertia": numbers(*[_NO_INERTIA] * 3)}
             ET.SubElement(element, "inertial", least)
         friction = self.description.numbers["joint_friction"]
@@ -95,7 +95,7 @@ class BodyWriter:
 
     def _is_mocap(self, name: str, body: Body) -> bool:
         """Return whether a body is written as a mocap body, whose path the user gives by ``mocap_pos``."""
-        joints = [key for key, joint in self.tree.joints.items() if joint.body == name]
+        joints = self.tree.joints_of(name)
         on_paths = [key for key in joints if key in self.tree.on_paths]
         if on_paths and (body.parent is not None or on_paths != joints):
             allowed = "is not written: a mocap body of MuJoCo stands in the world, and all of its joints have paths"

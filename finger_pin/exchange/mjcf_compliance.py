@@ -102,13 +102,12 @@ class Mobility:
             if _is_slider(tree, name):
                 # MuJoCo takes these without their armatures, and alike in all directions.
                 self.bodies[name] = 1.0 / part.mass
-                moved = [joint for joint, moved in tree.joints.items() if moved.body == name]
-                self.joints |= dict.fromkeys(moved, 1.0 / part.mass)
+                self.joints |= dict.fromkeys(tree.joints_of(name), 1.0 / part.mass)
 
 
 def _is_slider(tree: Tree, name: str) -> bool:
     """Return whether a body is what MuJoCo calls simple: alone on slides along its axes, about its mass centre."""
-    joints = [joint for joint in tree.joints.values() if joint.body == name]
+    joints = [tree.joints[joint] for joint in tree.joints_of(name)]
     aligned = all(joint.kind == "slide" and np.count_nonzero(joint.axis) == 1 for joint in joints)
     on_base = tree.link_of(tree.bodies[name].parent) is None
     is_alone = on_base and not any(body.parent == name for body in tree.bodies.values())

@@ -10,13 +10,14 @@ import pinocchio as pin
 
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.links import TIP
 from finger_pin.description.objects import inertia_matrix
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import TreeJoint
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.body_places import Placed, joint_placement, rotation
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.urdf import TIP_FRAME, to_urdf
+from finger_pin.mechanism.urdf import to_urdf
 
 # Inertia of what moves along a path, which takes none, kg or kg m2.
 _ON_PATH = 1e-9
@@ -37,7 +38,7 @@ def _values(description: FingerDescription) -> tuple[object, ...]:
 def place_bodies(description: FingerDescription) -> tuple[RigidBody, Mapping[str | None, Placed]]:
     """Return a rigid body and, on its joints, the places of the bodies of its tree, by name; the base's by None."""
     tree, hand, is_tree = description.bodies, description.hand, bool(description.tree.bodies)
-    tips = {TIP_FRAME: tree.tip} if tree.tip else {f"{name}.{TIP_FRAME}": tip for name, tip in tree.tips.items()}
+    tips = {TIP: tree.tip} if tree.tip else {f"{name}.{TIP}": tip for name, tip in tree.tips.items()}
     model, placed = _joined(tree)
     if is_tree or hand is not None:
         for name, tip in tips.items():
@@ -72,11 +73,11 @@ def _joined(tree: Tree) -> tuple[pin.Model, dict[str | None, Placed]]:
     for name, body in tree.bodies.items():
         joint, place = placed[body.parent].joint, placed[body.parent].frame
         place = place * pin.SE3(rotation(body.orientation), np.array(body.position))
-        for joint_name, moved in tree.joints.items():
-            if moved.body == name:
-                joint = model.addJoint(joint, _joint_model(moved), joint_placement(place, moved), joint_name)
-                model.armature[model.joints[joint].idx_v] = moved.armature if moved.path is None else _ON_PATH
-                place = pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
+        for joint_name in tree.joints_of(name):
+            moved = tree.joints[joint_name]
+            joint = model.addJoint(joint, _joint_model(moved), joint_placement(place, moved), joint_name)
+            model.armature[model.joints[joint].idx_v] = moved.armature if moved.path is None else _ON_PATH
+            place = pin.SE3(np.eye(3), np.array(moved.anchor)).inverse()
         placed[name] = Placed(joint, place)
         if joint and (body.mass or any(body.inertia)):
             inertia = pin.Inertia(body.mass, np.array(body.centre), inertia_matrix(body.inertia))

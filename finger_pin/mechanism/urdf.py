@@ -18,8 +18,6 @@ from finger_pin.description.tree_parts import MATERIALS, Body, Coupling, TreeJoi
 from finger_pin.mechanism.body_places import joint_placement, rotation
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
 
-BASE_FRAME, TIP_FRAME = BASE, TIP
-
 #: Tension that the effort limits allow each tendon, N, and the velocity limit of each joint, rad/s.
 #: They are for readers of the URDF that want some; the simulation applies neither.
 TENSION_LIMIT = 100.0
@@ -65,7 +63,7 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
     for material, colour in MATERIALS.items():
         if material in used:
             ET.SubElement(ET.SubElement(root, "material", name=material), "color", rgba=_numbers(*colour))
-    base = BASE_FRAME
+    base = BASE
     while base in tree.bodies and not _is_base(tree, base):
         base += "_"
     if base not in tree.bodies:
@@ -75,7 +73,7 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
     for name, body in tree.bodies.items():
         link, place = placed[body.parent]
         place = place * pin.SE3(rotation(body.orientation), np.array(body.position))
-        joints = _joints_of(tree, name)
+        joints = tree.joints_of(name)
         for key in joints:
             moved, child = tree.joints[key], name if key == joints[-1] else f"{name}_{key}"
             joint = _add_joint(root, key, _kind(description, key, moved), link, child, joint_placement(place, moved))
@@ -90,8 +88,8 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
         placed[name] = name, place
         _add_link(root, name, body, place, drawn)
     for name, end in tree.fingertips.items():
-        (link, place), last = placed[end.body], f"{name}_{TIP_FRAME}" if name else TIP_FRAME
-        if end.body is not None and end.body.split(".")[-1] == TIP_FRAME and not any(end.position):
+        (link, place), last = placed[end.body], f"{name}_{TIP}" if name else TIP
+        if end.body is not None and end.body.split(".")[-1] == TIP and not any(end.position):
             continue  # Of a finger of links it is a body.
         while last in tree.bodies:
             last += "_"
@@ -121,15 +119,11 @@ def _notes(description: FingerDescription) -> str:
     return _NOTES.format(title=description.title or description.name, rest=rest).replace("--", "- -")
 
 
-def _joints_of(tree: Tree, body: str) -> list[str]:
-    return [key for key, joint in tree.joints.items() if joint.body == body]
-
-
 def _is_base(tree: Tree, name: str) -> bool:
     """Return whether a body is the base itself: fixed on it, in its place."""
     body = tree.bodies[name]
     is_placed = any(body.position) or any(body.orientation[:3])
-    return body.parent is None and not is_placed and not _joints_of(tree, name)
+    return body.parent is None and not is_placed and not tree.joints_of(name)
 
 
 def _kind(description: FingerDescription, joint: str, moved: TreeJoint) -> str:

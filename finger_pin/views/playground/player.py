@@ -14,6 +14,7 @@ import viser
 
 from finger_pin.exceptions import FingerPinError
 from finger_pin.simulation.simulator import Simulator
+from finger_pin.threads import wait_for
 from finger_pin.views.playground.access import own_page_only
 from finger_pin.views.playground.pacer import Pacer
 from finger_pin.views.playground.panel import PAUSE, PLAY, RESET, STEP, Panel
@@ -155,11 +156,7 @@ class Playground:
 
     def wait(self) -> None:
         """Play until the user interrupts (Ctrl-C)."""
-        try:
-            while self._thread.is_alive():
-                self._thread.join(0.2)
-        except KeyboardInterrupt:
-            self.close()
+        wait_for(self._thread, self.close)
 
     def close(self) -> None:
         """End the playing; closing twice is allowed."""

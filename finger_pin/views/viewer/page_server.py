@@ -16,6 +16,7 @@ from finger_pin.analysis import ForcePolytope
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.mechanism.finger import Finger
 from finger_pin.progress import in_notebook
+from finger_pin.threads import wait_for
 from finger_pin.views.viewer.animation import animation_page, posture_page
 
 #: Height of the page in a notebook, pixels.
@@ -40,11 +41,7 @@ class PageHandle:
 
     def wait(self) -> None:
         """Serve until the user interrupts (Ctrl-C), or the page is closed from elsewhere."""
-        try:
-            while self._thread.is_alive():
-                self._thread.join(0.2)
-        except KeyboardInterrupt:
-            self.close()
+        wait_for(self._thread, self.close)
 
     def close(self) -> None:
         """Stop serving; open pages keep their frames. Closing twice is allowed."""
