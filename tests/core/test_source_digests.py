@@ -1,18 +1,27 @@
 """Digests of code: others whenever something that it reaches has changed, so that compiled code is found again."""
 
+import ast
+import gc
+import importlib
 import math
+import pkgutil
 import re
-import tomllib
+import sys
 from functools import cache
+from inspect import isfunction
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+from numba.extending import is_jitted
 
 import finger_pin as fp
+import finger_pin.core
 from finger_pin.core.jit import digests
 from finger_pin.core.jit.digests import Undigestible, source_digest
+from finger_pin.core.jit.functions import CompiledFunction
+from finger_pin.mujoco import kernel
 
 # Parsing all files takes a second.
 syntax = cache(digests._syntax)
@@ -113,8 +122,8 @@ def digest_with(monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-def test_changed_code_of_the_core_or_below_is_compiled_anew_and_of_a_room_above_is_not(digest_with):
-    rooms = ("nowhere", "core/jit/calls.py", "laws/bristle.py", "mujoco/registration.py", "files.py", "views")
+def test_changed_code_that_is_compiled_is_compiled_anew_and_other_code_is_not(digest_with):
+    rooms = ("nowhere", "core/jit/calls.py", "laws/bristle.py", "mujoco/registration.py", "mechanism/gaps/prism.py", "views")
     found = {room: digest_with(room, lambda text: text + b"x = 1\n") for room in rooms}
     assert len(set(found.values())) == 5 and found["nowhere"] == found["views"]
     assert digest_with("laws/bristle.py", lambda text: text.replace(b"scale=1e-2", b"scale=2e-2")) not in found.values()
@@ -133,11 +142,29 @@ def test_a_changed_comment_or_docstring_of_the_core_compiles_nothing(digest_with
     assert spring(law.format("a", "b")) == spring(law.format("c", "b")) != spring(law.format("a", "c"))
 
 
-def test_every_room_that_the_core_may_import_is_part_of_the_digest():
-    """By the import contract: the layers from that of the core on."""
-    contract, *_ = tomllib.loads(Path("pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
-    layers = contract["layers"]
-    (core,) = [place for place, layer in enumerate(layers) if "core" in layer.split(" : ")]
-    below = {room for layer in layers[core:] for room in re.split(r"\W+", layer)}
-    root = Path(fp.__file__).parent
-    assert {room for room in below if (root / room).is_dir()} <= set(digests.CORE_ROOMS)
+def test_all_that_compiled_functions_name_is_part_of_the_digest():
+    """By a walk over the compiled functions, and over the import statements of the names in their code."""
+    for module in pkgutil.walk_packages(fp.core.__path__, "finger_pin.core."):
+        importlib.import_module(module.name)
+    unread = [each for each in gc.get_objects() if isinstance(each, CompiledFunction)]
+    pending = [each._function for each in unread] + [kernel.advance.py_func, kernel.compute.py_func]
+    assert len(pending) > 20
+    functions = set()
+    while pending:
+        function = pending.pop()
+        if function in functions or not function.__module__.startswith("finger_pin."):
+            continue
+        functions.add(function)
+        values = [function.__globals__.get(name) for name in digests._names(function.__code__)]
+        values += [cell.cell_contents for cell in function.__closure__ or ()]
+        pending += [each.py_func if is_jitted(each) else each for each in values if is_jitted(each) or isfunction(each)]
+    assert len(functions) > 150
+    origins = {function.__module__ for function in functions}
+    for function in functions:
+        for statement in ast.walk(ast.parse(Path(sys.modules[function.__module__].__file__).read_text())):
+            if isinstance(statement, ast.ImportFrom) and statement.module.startswith("finger_pin."):
+                imported = {each.asname or each.name for each in statement.names}
+                if imported & {*digests._names(function.__code__)}:
+                    origins.add(statement.module)
+    assert "finger_pin.references.signal" in origins
+    assert {each for each in origins if not each.startswith(digests.COMPILED_MODULES)} == set()

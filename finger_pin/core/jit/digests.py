@@ -1,6 +1,7 @@
 """Digest of all that a compiled function depends on: compiled code is kept on disk as long as it is the same.
 
-Of this package it is the code of all files that the core may import, without comments and docstrings. Of a function
+Of this package it is the code of all files that hold compiled functions or what these name, without comments and
+docstrings; how a description is read, and which rows a finger has, is of no matter to compiled code. Of a function
 from elsewhere, such as a law in a user's script, it is the code object that numba compiles, and the values that the
 function takes for constants: those of its closure, its defaults and its globals, and all functions among them. Unlike
 the text of the file, the code object is what was imported, and tells two lambdas of a line apart.
@@ -28,9 +29,16 @@ from numba.extending import is_jitted
 
 from finger_pin.files import write_text
 
-#: The core, its sibling, and the rooms below them, which are all that they may import.
-CORE_ROOMS = ("core", "description", "exchange", "laws", "mechanism", "mujoco", "references")
-_OWN_MODULES = tuple(f"finger_pin.{room}" for room in CORE_ROOMS)
+#: Rooms and modules that hold compiled functions, or what these take for constants.
+COMPILED_MODULES = (
+    "finger_pin.core",
+    "finger_pin.exchange.mujoco_friction",
+    "finger_pin.laws",
+    "finger_pin.mechanism.gaps",
+    "finger_pin.mechanism.spans",
+    "finger_pin.mujoco",
+    "finger_pin.references",
+)
 # Their names tell what they have, as their versions are part of the digest.
 _VERSIONED_PACKAGES = {"builtins", "cmath", "llvmlite", "math", "numba", "numpy", "operator"}
 _PLAIN_TYPES = (int, float, complex, str, bytes, bool, type(None), slice)
@@ -57,8 +65,9 @@ def cache_root() -> Path:
 @cache
 def _package_digest() -> str:
     """Return a digest of the package's code and of the versions that compile it."""
-    root = Path(__file__).parents[2]
-    paths = sorted([*root.glob("*.py"), *(each for room in CORE_ROOMS for each in (root / room).rglob("*.py"))])
+    root = Path(__file__).parents[3]
+    places = [root / module.replace(".", "/") for module in COMPILED_MODULES]
+    paths = sorted(path for place in places for path in (place.rglob("*.py") if place.is_dir() else [place.with_suffix(".py")]))
     texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in paths}
     versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
     # Parsing takes a second: of files that are the same to the byte the digest is kept.
@@ -135,7 +144,7 @@ def _values(function: FunctionType, names: frozenset[str]) -> Iterator[tuple[str
 
 
 def _is_ours(value: object) -> bool:
-    return (getattr(value, "__module__", None) or "").startswith(_OWN_MODULES)
+    return (getattr(value, "__module__", None) or "").startswith(COMPILED_MODULES)
 
 
 def _constant_text(value: Any, names: frozenset[str], above: tuple[FunctionType, ...]) -> str:
