@@ -123,7 +123,14 @@ def digest_with(monkeypatch, tmp_path):
 
 @pytest.mark.slow
 def test_changed_code_that_is_compiled_is_compiled_anew_and_other_code_is_not(digest_with):
-    rooms = ("nowhere", "core/jit/calls.py", "laws/bristle.py", "mujoco/registration.py", "mechanism/gaps/prism.py", "views")
+    rooms = (
+        "nowhere",
+        "core/jit/calls.py",
+        "laws/bristle.py",
+        "mujoco/registration.py",
+        "mechanism/gaps/prism.py",
+        "views",
+    )
     found = {room: digest_with(room, lambda text: text + b"x = 1\n") for room in rooms}
     assert len(set(found.values())) == 5 and found["nowhere"] == found["views"]
     assert digest_with("laws/bristle.py", lambda text: text.replace(b"scale=1e-2", b"scale=2e-2")) not in found.values()

@@ -67,7 +67,8 @@ def _package_digest() -> str:
     """Return a digest of the package's code and of the versions that compile it."""
     root = Path(__file__).parents[3]
     places = [root / module.replace(".", "/") for module in COMPILED_MODULES]
-    paths = sorted(path for place in places for path in (place.rglob("*.py") if place.is_dir() else [place.with_suffix(".py")]))
+    rooms = [path for place in places for path in place.rglob("*.py")]
+    paths = sorted([*rooms, *(path for place in places if (path := place.with_suffix(".py")).is_file())])
     texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in paths}
     versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
     # Parsing takes a second: of files that are the same to the byte the digest is kept.
