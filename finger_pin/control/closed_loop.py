@@ -152,9 +152,10 @@ class ClosedLoop:
         loop = replace(self, finger=finger, dynamics=finger, prescribed_motion=prescribed)
         return replace(loop, start=loop.rest_state(*motion.at(0.0)))
 
-    def compiled(self) -> ClosedLoop:
-        """Return the same loop on the compiled core."""
-        return replace(self, dynamics=CompiledFinger(self.finger))
+    def compiled(self, reused: CompiledFinger | None = None) -> ClosedLoop:
+        """Return the same loop on the compiled core, with one that is not needed any more if that fits."""
+        fitting = reused is not None and reused.rebind(self.finger)
+        return replace(self, dynamics=reused if reused is not None and fitting else CompiledFinger(self.finger))
 
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""

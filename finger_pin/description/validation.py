@@ -53,6 +53,10 @@ class Description(BaseModel):
                 entries[name] = part.updated(**entry)
         return self.model_copy(update=entries)
 
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
+        """Return itself: nothing in it changes, and what is remembered of it is found again."""
+        return self
+
     def set_entries(self) -> dict[str, Any]:
         """Return the entries that were set, as in tables; nested descriptions stay objects."""
         return nested({key: getattr(self, key) for key in self.model_fields_set})

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from finger_pin.cancellation import Stop
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping.stepper import TABLEAUS
+from finger_pin.core.signals.compiled_finger import CompiledFinger
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
@@ -80,6 +81,8 @@ class Prepared:
         loop = ClosedLoop.from_scenario(family.scenario, finger=finger)
         check_variables("record", record, variables(loop))
         self._finger = loop.finger
+        # Evaluators and steppers of runs that have ended, for those to come; of threads each takes its own.
+        self._ended: list[tuple[CompiledFinger, Stepper]] = []
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
 
@@ -160,8 +163,14 @@ class Prepared:
         base, *varied_runs = in_threads(lambda pair: self._record(*pair), runs)
         return add_slopes(arrays, base, base_values, varied_runs, changes)
 
-    def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
-        return Setup.from_scenario(scenario, self._loop(scenario, initial))
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return constructor and arguments for `copy.deepcopy` and pickles."""
+        return Prepared, (self.family, self.record, self._custom_finger)
+
+    def _setup(
+        self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, reused: CompiledFinger | None = None
+    ) -> Setup:
+        return Setup.from_scenario(scenario, self._loop(scenario, initial), reused=reused)
 
     def _record(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
         return setup.record(trajectory, setup.scenario.sample_times(), self.record)
@@ -170,15 +179,20 @@ class Prepared:
         self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, stop: Stop | None
     ) -> tuple[Setup, Trajectory, RunArrays]:
         """Return the setup, trajectory and arrays of a run; raise with the partial result if it ends early."""
-        setup = self._setup(scenario, initial)
-        trajectory = setup.integrate(stop=stop)
+        evaluator, before = self._ended.pop() if self._ended else (None, None)
+        setup = self._setup(scenario, initial, evaluator)
+        stepper = setup.stepper(reused=before) if setup.method in TABLEAUS else None
+        trajectory = setup.integrate(stop=stop, stepper=stepper)
         if trajectory.failure or trajectory.interrupted:
             samples = SampledTrajectory(setup.loop, trajectory, scenario.sample_times(), self.record)
             end, partial = float(trajectory.breakpoints[-1]), record(scenario, samples, setup.method, self.record)
             if trajectory.failure:
                 raise IntegrationError(end, *setup.failure(trajectory), partial)
             raise Interrupted(end, partial)
-        return setup, trajectory, self._record(setup, trajectory)
+        arrays = self._record(setup, trajectory)
+        if stepper is not None and isinstance(setup.loop.dynamics, CompiledFinger):
+            self._ended.append((setup.loop.dynamics, stepper))
+        return setup, trajectory, arrays
 
     def simulate(
         self,

@@ -12,6 +12,7 @@ from finger_pin.control.closed_loop import ClosedLoop, compiled_control, sampled
 from finger_pin.control.interface import LoopController
 from finger_pin.control.position_drive import PositionDrives, spool_windings, voltage_signals
 from finger_pin.control.sampling import SampledController, sampling_settings
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.solve_ivp import integrate
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -60,7 +61,12 @@ class Setup:
 
     @classmethod
     def from_scenario(
-        cls, scenario: Scenario, loop: ClosedLoop | None = None, custom: str = "", control_period: float | None = None
+        cls,
+        scenario: Scenario,
+        loop: ClosedLoop | None = None,
+        custom: str = "",
+        control_period: float | None = None,
+        reused: CompiledFinger | None = None,
     ) -> Setup:
         """Build the setup of a scenario.
 
@@ -69,6 +75,7 @@ class Setup:
             loop: Its loop, where a part of it is custom.
             custom: Names of the parts given in place of the scenario's, from `custom_parts`.
             control_period: As for `simulate`.
+            reused: The evaluator of a run that has ended, which serves again if its finger differs in numbers only.
         """
         method = scenario.simulation.method
         loop = loop or ClosedLoop.from_scenario(scenario)
@@ -97,7 +104,7 @@ class Setup:
                 )
             method = _METHOD_WITHOUT_SAMPLING
         if scenario.simulation.method not in METHODS_IN_NUMPY:
-            loop = loop.compiled()
+            loop = loop.compiled(reused)
         if scenario.simulation.max_step is not None and method in TABLEAUS:
             allowed = "is for methods of scipy and continuous controllers in Python; the others see all touches"
             raise InputError("simulation.max_step", allowed, scenario.simulation.max_step)
@@ -126,6 +133,7 @@ class Setup:
         scenario: Scenario | None = None,
         chunk: int = CHUNK_STEPS,
         steps: Sequence[Steps] | None = None,
+        stepper: Stepper | None = None,
     ) -> Trajectory:
         """Integrate, at the tolerances of another scenario if given.
 
@@ -136,10 +144,11 @@ class Setup:
             chunk: Steps between two calls.
             steps: Of every island, to be taken whatever their errors: what comes out is then as smooth a function of
                 start and parameters as the equations are.
+            stepper: What `stepper` has returned, to be used; by default another one.
         """
         settings = (scenario or self.scenario).simulation
         if self.method in TABLEAUS:
-            return self._compiled(settings, watch, stop, chunk, steps)
+            return self._compiled(stepper or self.stepper(settings), settings, watch, stop, chunk, steps)
         loop = self.loop
         return integrate(
             loop.rhs,
@@ -155,6 +164,7 @@ class Setup:
 
     def _compiled(
         self,
+        stepper: Stepper,
         settings: SimulationSettings,
         watch: Watch | None,
         stop: Stop | None,
@@ -163,7 +173,6 @@ class Setup:
     ) -> Trajectory:
         """Integrate by a method of the compiled core."""
         loop = self.loop
-        stepper = self.stepper(settings)
         if loop.drives is not None and loop.drives.compiled is not None:
             stepper.drive(loop.drives.compiled)
         knots = loop.knots(settings.rtol)
@@ -195,8 +204,8 @@ class Setup:
         labels = coordinates(self.scenario, self.loop, samples.times)
         return RunArrays(arrays, labels, run_attributes(self.scenario, trajectory, self.method))
 
-    def stepper(self, settings: SimulationSettings | None = None) -> Stepper:
-        """Return the compiled stepper, at the start, by default at the scenario's tolerances."""
+    def stepper(self, settings: SimulationSettings | None = None, reused: Stepper | None = None) -> Stepper:
+        """Return the compiled stepper, at the start, by default at the scenario's tolerances; one of a run before."""
         tolerances, loop = settings or self.scenario.simulation, self.loop
         return Stepper.from_finger(
             loop.finger,
@@ -206,6 +215,7 @@ class Setup:
             method=self.method,
             rtol=tolerances.rtol,
             atol_scale=tolerances.atol_scale,
+            reused=reused,
         )
 
     @property

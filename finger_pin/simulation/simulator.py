@@ -114,13 +114,14 @@ class Simulator:
         posture = ", ".join(f"{angle:.4g}" for angle in self.state.position)
         return f"Simulator({self.finger.description.name} at t = {self.time:.6g} s, theta = [{posture}] rad)"
 
-    def _build(self, finger: Finger, scenario: Scenario) -> None:
-        """Build loop and stepper; `_start` gives them a state."""
+    def _build(self, finger: Finger, scenario: Scenario, reused: tuple[Any, Stepper | None] = (None, None)) -> None:
+        """Build loop and stepper, of an evaluator and a stepper if those fit; `_start` gives them a state."""
+        self.loop = ClosedLoop.from_scenario(scenario, finger=finger).compiled(reused[0])
         self.finger, self.scenario = finger, scenario
-        self.loop = ClosedLoop.from_scenario(scenario, finger=finger).compiled()
         rest, force = finger.rest_state(np.zeros(len(finger.routing.joints))), self.loop.fingertip_force
         settings = {name: getattr(scenario.simulation, name) for name in ("method", "rtol", "atol_scale")}
-        self._stepper = Stepper.from_finger(finger, sampled_control(self.loop), rest, force, **settings)
+        given = finger, sampled_control(self.loop), rest, force
+        self._stepper = Stepper.from_finger(*given, **settings, reused=reused[1])
         self._initial_snapshot = self._stepper.state_snapshot
 
     def _state_at_rest(self, position: Array) -> Array:
@@ -192,7 +193,7 @@ class Simulator:
         if finger.layout.names != self.finger.layout.names:
             raise InputError("values", "must keep what the state consists of: make another simulator")
         check_motors(finger, x := self.x, "values")
-        self._build(finger, scenario)
+        self._build(finger, scenario, (self.loop.dynamics, self._stepper))
         self._start(x, self._time)
 
     @property

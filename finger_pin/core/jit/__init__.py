@@ -29,7 +29,7 @@ from finger_pin.core.jit.functions import (
     njit_inline,
     njit_reassociate,
 )
-from finger_pin.core.jit.struct_packing import Block, call, copied, empty_table, pack, refuse_copy
+from finger_pin.core.jit.struct_packing import Block, call, copied, empty_table, overwrite, pack, refuse_copy
 from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, Pointer, StructType, Vector, unpack
 
 __all__ = [
@@ -59,6 +59,7 @@ __all__ = [
     "njit_inline",
     "njit_reassociate",
     "numbers",
+    "overwrite",
     "pack",
     "put",
     "refuse_copy",

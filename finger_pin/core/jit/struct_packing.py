@@ -7,6 +7,7 @@ later call.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
 from typing import Any, NoReturn, TypeVar, get_type_hints
 
 import numpy as np
@@ -67,6 +68,26 @@ def call(unit: CompiledFunction, table: _Table, kind: StructType[_Table]) -> int
 def copied(table: _Table) -> _Table:
     """Return a table with copied arrays."""
     return type(table)(*map(_copied, table))
+
+
+def overwrite(table: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
+    """Fill a table's arrays with those of another; return False, unchanged, if these have other sizes or numbers."""
+    pairs = list(zip(_entries(table), _entries(others), strict=True))
+    for entry, other in pairs:
+        if entry.shape != other.shape if isinstance(entry, np.ndarray) else entry != other:
+            return False
+    for entry, other in pairs:
+        if isinstance(entry, np.ndarray):
+            entry[...] = other
+    return True
+
+
+def _entries(table: tuple[Any, ...]) -> Iterator[Any]:
+    for entry in table:
+        if isinstance(entry, tuple):
+            yield from _entries(entry)
+        else:
+            yield entry
 
 
 def empty_table(table: type[_Table]) -> _Table:

@@ -15,7 +15,7 @@ from finger_pin.core.evaluation.linearisation import linearise
 from finger_pin.core.evaluation.moving_base import base_power, bias_rate, move_base
 from finger_pin.core.evaluation.path_derivatives import linearise_paths
 from finger_pin.core.evaluation.paths import look
-from finger_pin.core.jit import call, empty_table, pack
+from finger_pin.core.jit import call, copied, empty_table, overwrite, pack
 from finger_pin.core.signals.state_batches import STATES, States, evaluate_many
 from finger_pin.core.tables.buffers import build_work
 from finger_pin.core.tables.inputs import InputTable, held_control
@@ -103,7 +103,7 @@ class BoundModel:
         moved: bool = False,
         linearised: bool = True,
     ) -> None:
-        """Bind; arrays are taken as they are, not copied.
+        """Bind; arrays are taken as they are, not copied, and belong to it if it is to `rebind`.
 
         Args:
             structure: Of a mechanism.
@@ -123,16 +123,32 @@ class BoundModel:
         work = build_work(structure, laws, len(control.tension))
         linear = build_linear(structure, control) if linearised else _NO_LINEARISATION
         self.model = Model(structure, parameters, control, work, linear, np.zeros(size), np.zeros(size), *units)
-        # No path and no moving body changes these.
+        self._fill_constants()
+        self._block = pack(self.model, MODEL)
+        self.address = self._block.address
+
+    def rebind(self, parameters: Parameters) -> bool:
+        """Take other parameters of the same structure, by value; return False, unchanged, if they do not fit."""
+        if not overwrite(self.model.parameters, parameters):
+            return False
+        self._fill_constants()
+        return True
+
+    def _fill_constants(self) -> None:
+        """Fill in what no evaluation changes but those of paths and of moving bodies."""
+        structure, parameters, work, linear = (
+            self.model.structure,
+            self.model.parameters,
+            self.model.work,
+            self.model.linear,
+        )
         work.base_acceleration[3:] = -parameters.gravity
         work.arm[:], work.gradient[:] = parameters.arm, parameters.measure
         work.paths.frame[:], work.paths.origin[:] = parameters.paths.rotation, parameters.paths.origin
-        if linearised:
+        if linear is not _NO_LINEARISATION:
             lumped = np.arange(len(structure.parents), len(structure.prescribed))
             linear.mass[lumped, lumped] = parameters.lumps
             linear.arm[:], linear.measure[:], linear.bend[:] = parameters.arm, parameters.measure, parameters.bend
-        self._block = pack(self.model, MODEL)
-        self.address = self._block.address
 
 
 class Models:
@@ -160,11 +176,16 @@ class Models:
         Each has memory of its own: without loads, nothing writes where loads have left their torques.
         """
         if (loaded, thread) not in self._known:
-            parameters = self.parameters.separate()._replace(has_tip_force=loaded)
+            parameters = copied(self.parameters)._replace(has_tip_force=loaded)
             control = held_control(self._channels, len(self.structure.prescribed))
             bound = BoundModel(self.structure, parameters, self._laws, control, self._moved, linearised=False)
             self._known[loaded, thread] = bound
         return self._known[loaded, thread]
+
+    def rebind(self, parameters: Parameters) -> bool:
+        """Take other parameters of the same structure; return False if they do not fit, and these are of no use."""
+        self.parameters = parameters
+        return all(bound.rebind(parameters._replace(has_tip_force=key[0])) for key, bound in self._known.items())
 
 
 def fill(

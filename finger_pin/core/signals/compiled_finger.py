@@ -55,6 +55,12 @@ class CompiledMechanism:
         self.models = Models(self.structure, self.parameters, laws, mechanism.channels, mechanism.moved)
         self._motions: dict[int, _Asked] = {}
 
+    def rebind(self, mechanism: Mechanism) -> bool:
+        """Take another mechanism of the same structure; return False if it is none, and this is of no use."""
+        self.mechanism, structure = mechanism, self.structure
+        self.structure, self.parameters = compile_mechanism(mechanism)
+        return structure is self.structure and self.models.rebind(self.parameters)
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles."""
         return CompiledMechanism, (self.mechanism,)
@@ -202,6 +208,12 @@ class CompiledFinger:
         """Read a finger."""
         self.finger = finger
         self.mechanism = CompiledMechanism(finger.mechanism)
+
+    def rebind(self, finger: Finger) -> bool:
+        """Take another finger of the same structure; return False if it is none, and this is of no use."""
+        self.finger = finger
+        vars(self).pop("_without_surroundings", None)
+        return self.mechanism.rebind(finger.mechanism)
 
     def evaluate(
         self,

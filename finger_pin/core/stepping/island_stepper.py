@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.events.step_events import activate_contacts, step_events
-from finger_pin.core.jit import Block, CompiledFunction, copied, pack
+from finger_pin.core.jit import Block, CompiledFunction, copied, overwrite, pack
 from finger_pin.core.signals.bound_models import BoundModel
 from finger_pin.core.stepping.drives import ADVANCE_DRIVEN_ARGS, AdvanceDrivenArgs, Drives, advance_driven
 from finger_pin.core.stepping.knots import ADVANCE_KNOTTED_ARGS, AdvanceKnottedArgs, advance_knotted
@@ -61,6 +62,16 @@ class Record:
     def doubled(self) -> Record:
         """Return a copy with room for twice as many."""
         return Record(*(np.concatenate([part, np.empty_like(part)]) for part in vars(self).values()))
+
+
+class StartValues(NamedTuple):
+    """Parameters, inputs, state and tolerances of an island at the start, as `IslandIntegrator` has them."""
+
+    parameters: Parameters
+    control: InputTable
+    x: Array
+    attitude: Array
+    atol: Array
 
 
 class IslandIntegrator:
@@ -135,6 +146,15 @@ class IslandIntegrator:
         self._placed: tuple[Record | None, Drives | None, Array, Steps | None] = (None, None, self.knots, None)
         self._blocks: list[Block] = []
         self._advance = advance
+
+    def rebind(self, values: StartValues, time: float) -> bool:
+        """Start anew with other values of the same structure, at a time, s; return False if they do not fit."""
+        if not (overwrite(self.control, values.control) and self.model.rebind(values.parameters)):
+            return False
+        self.drives, self.knots, self.steps = None, np.zeros(0), None
+        self.atol[:], self._memory[:], self._bound.kinks[:] = values.atol, 0.0, 0.0
+        self.restart(values.x, values.attitude, time)
+        return True
 
     def room(self, count: int) -> Record:
         """Return a buffer for m steps."""
@@ -245,7 +265,7 @@ class IslandIntegrator:
             self.island,
             self.laws,
             self.structure,
-            self.parameters.separate(),
+            copied(self.parameters),
             copied(self.control),
             pack.x.copy(),
             pack.attitude.copy(),

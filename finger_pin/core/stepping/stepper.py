@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.jit import copied
 from finger_pin.core.stepping.drives import Drives
-from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, failure
+from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, StartValues, failure
 from finger_pin.core.steps import integration as core
 from finger_pin.core.steps.repetition import Steps
 from finger_pin.core.steps.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables.inputs import HELD, InputTable
 from finger_pin.core.tables.islands import Island, selections
-from finger_pin.core.tables.mechanism_parameters import compile_mechanism
+from finger_pin.core.tables.mechanism_parameters import Parameters, compile_mechanism
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.threads import in_threads
@@ -51,7 +51,7 @@ class Stepper:
         """Start from a state.
 
         Args:
-            mechanism: The mechanism.
+            mechanism: The mechanism; arrays of its parameters are copied.
             control: Its inputs.
             x: Packed state, shape (mechanism.size,).
             tableau: The method.
@@ -60,30 +60,61 @@ class Stepper:
             force: At the tips, shape (3,) or (t, 3), N, base frame.
             time: When, s.
         """
-        (structure, parameters), laws = compile_mechanism(mechanism), [table.law for table in mechanism.rows]
+        structure, parameters = compile_mechanism(mechanism)
+        laws = [table.law for table in mechanism.rows]
         self._charts, self._width = Charts.from_mechanism(mechanism), mechanism.coordinates
-        selected = selections(structure, control)
-        self._free = [np.isin(structure.charts, selection.island.coordinates) for selection in selected]
+        self._structure, self._selected = structure, selections(structure, control)
+        self._free = [np.isin(structure.charts, selection.island.coordinates) for selection in self._selected]
         self._made_of = mechanism, control, x, tableau, rtol, atol, force, time
         self.mechanism, self.parts = mechanism, list[IslandIntegrator]()
-        forces = np.zeros((len(mechanism.body.tips), 3))
-        forces[:] = 0.0 if force is None else force
-        start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
-        tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
-        for selection, free in zip(selected, self._free, strict=True):
+        for selection, values in zip(self._selected, self._values_at_start(parameters), strict=True):
             memory = np.zeros(len(core.StepMemory._fields))
             named = core.StepMemory.from_vector(memory)
             named.time[0], named.step_size[0] = time, FIRST_STEP
-            inputs, pushed = copied(selection.control(control)), forces[selection.island.tips]
-            at = self._places(selection.island)
-            # An island that nothing pushes computes as it does alone.
-            loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
-            numbers = selection.parameters(parameters)._replace(tip_force=pushed, has_tip_force=loaded)
-            start_arguments = inputs, start[at], attitude[free], tableau, float(rtol), tolerances[at], memory
+            numbers, inputs, start, attitude, tolerances = copied(values)
+            start_arguments = inputs, start, attitude, tableau, float(rtol), tolerances, memory
             followed = [laws[group] for group in selection.groups]
             self.parts.append(
                 IslandIntegrator(selection.island, followed, selection.structure, numbers, *start_arguments)
             )
+
+    def rebind(
+        self,
+        mechanism: Mechanism,
+        control: InputTable,
+        x: Array,
+        tableau: Tableau,
+        rtol: float,
+        atol: Array,
+        force: Array | None = None,
+        time: float = 0.0,
+    ) -> bool:
+        """Start anew, bit for bit as a new stepper of these; return False, and be of no use, if more differs.
+
+        Its arguments are those of the constructor.
+        """
+        structure, parameters = compile_mechanism(mechanism)
+        same = structure is self._structure and selections(structure, control) is self._selected
+        if not same or tableau is not self._made_of[3] or rtol != self._made_of[4]:
+            return False
+        self.mechanism, self._made_of = mechanism, (mechanism, control, x, tableau, rtol, atol, force, time)
+        values = self._values_at_start(parameters)
+        return all(part.rebind(each, time) for part, each in zip(self.parts, values, strict=True))
+
+    def _values_at_start(self, parameters: Parameters) -> Iterator[StartValues]:
+        """Yield the values of each island, not copied."""
+        mechanism, control, x, _, _, atol, force, _ = self._made_of
+        forces = np.zeros((len(mechanism.body.tips), 3))
+        forces[:] = 0.0 if force is None else force
+        start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
+        tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
+        for selection, free in zip(self._selected, self._free, strict=True):
+            inputs, pushed = selection.control(control), forces[selection.island.tips]
+            at = self._places(selection.island)
+            # An island that nothing pushes computes as it does alone.
+            loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
+            numbers = selection.parameters(parameters)._replace(tip_force=pushed, has_tip_force=loaded)
+            yield StartValues(numbers, inputs, start[at], attitude[free], tolerances[at])
 
     @classmethod
     def from_finger(
@@ -96,6 +127,7 @@ class Stepper:
         method: str,
         rtol: float,
         atol_scale: float,
+        reused: Stepper | None = None,
     ) -> Stepper:
         """Return the stepper of a finger under inputs, from a packed state on.
 
@@ -107,9 +139,10 @@ class Stepper:
             method: One of `TABLEAUS`.
             rtol: Relative tolerance.
             atol_scale: Absolute tolerance over the scale of each kind of state.
+            reused: A stepper that is not needed any more: it is returned, if its finger differs in numbers only.
         """
-        tolerances = atol_scale * finger.layout.scales()
-        return cls(finger.mechanism, control, x, TABLEAUS[method](), rtol, tolerances, force)
+        given = finger.mechanism, control, x, TABLEAUS[method](), rtol, atol_scale * finger.layout.scales(), force
+        return reused if reused is not None and reused.rebind(*given) else cls(*given)
 
     def _places(self, island: Island) -> NDArray[np.int64]:
         """Return the indices of an island's numbers in the whole state."""
