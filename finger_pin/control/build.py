@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -130,12 +129,9 @@ def _feedforward(scenario: Scenario, finger: Finger) -> TendonFeedforward | None
     if settings is None:
         return None
     tendons = finger.tendons
-    believed = replace(
-        tendons,
-        surface=_believed(settings.coulomb, tendons.surface),
-        stiction_ratio=_believed(settings.stiction_ratio, tendons.stiction_ratio),
-    )
-    return TendonFeedforward(believed, settings.share, settings.reversal_speed)
+    surface = _believed(settings.coulomb, tendons.surface)
+    ratio = _believed(settings.stiction_ratio, tendons.stiction_ratio)
+    return TendonFeedforward(tendons, surface, ratio, settings.share, settings.reversal_speed)
 
 
 def _joint_compensation(scenario: Scenario, finger: Finger) -> JointCompensation | None:
@@ -145,7 +141,6 @@ def _joint_compensation(scenario: Scenario, finger: Finger) -> JointCompensation
     friction = finger.joint_friction
     kinetic = _believed(settings.coulomb, friction.kinetic)
     static = np.maximum(_believed(settings.stiction, friction.static), kinetic)
-    believed = replace(friction, kinetic=kinetic, static=static, viscous=_believed(settings.viscous, friction.viscous))
     largest, critical = settings.share * float(np.max(static)), critical_friction(finger).coefficient
     if largest >= critical:
         raise InputError(
@@ -153,7 +148,8 @@ def _joint_compensation(scenario: Scenario, finger: Finger) -> JointCompensation
             f"compensates joint friction up to {largest:.3g} m; from {critical:.3g} m on, the tensions that overcome "
             "it raise it by as much (self-locking): lower share, coulomb or stiction",
         )
-    return JointCompensation(believed, settings.share, settings.reversal_speed)
+    believed = kinetic, static, _believed(settings.viscous, friction.viscous)
+    return JointCompensation(friction, *believed, settings.share, settings.reversal_speed)
 
 
 def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:

@@ -10,7 +10,7 @@ import numpy as np
 from finger_pin.description.routing import Routing
 from finger_pin.laws.bristle import directed_drag, friction_coefficient
 from finger_pin.laws.capstan import capstan_coefficient
-from finger_pin.mechanism.joints import JointFriction
+from finger_pin.mechanism.joints import JointFriction, static_drag
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 
@@ -36,24 +36,25 @@ class TendonFeedforward:
     others have to make up for.
 
     Attributes:
-        tendons: The tendons as they are believed to be.
+        tendons: The tendons.
+        surface: mu_e as it is believed to be, shape (t,).
+        stiction_ratio: rho as it is believed to be, shape (t,).
         share: Part of the friction that is compensated.
         reversal_speed: v_r, m/s.
     """
 
     tendons: Tendons
+    surface: Array
+    stiction_ratio: Array
     share: float
     reversal_speed: float
 
     def coefficient(self, position: Array, desired_velocity: Array) -> Array:
         """Return x of every tendon, shape (..., t), for motion of shape (..., n)."""
         tendons = self.tendons
-        kinetic = capstan_coefficient(tendons.surface, tendons.routing.curvature(position))
-        static = tendons.stiction_ratio * kinetic
-        velocity = self._velocity(desired_velocity)
-        signed = signed_coefficient(
-            velocity, kinetic, static, tendons.stribeck_velocity, tendons.stribeck_exponent, self.reversal_speed
-        )
+        kinetic = capstan_coefficient(self.surface, tendons.routing.curvature(position))
+        static, velocity = self.stiction_ratio * kinetic, self._velocity(desired_velocity)
+        signed = signed_coefficient(velocity, kinetic, static, *tendons.stribeck, self.reversal_speed)
         clipped: Array = np.clip(signed, -_MAX_COEFFICIENT, _MAX_COEFFICIENT)
         return clipped
 
@@ -95,12 +96,18 @@ class JointCompensation:
     closes that loop.
 
     Attributes:
-        friction: The joints' friction as it is believed to be.
+        friction: The joints' friction.
+        kinetic: M^d as it is believed to be, shape (n,), m.
+        static: M^c as it is believed to be, shape (n,), m.
+        viscous: b as it is believed to be, shape (n,), N m s/rad.
         share: Part of the friction that is compensated.
         reversal_speed: v_r, rad/s.
     """
 
     friction: JointFriction
+    kinetic: Array
+    static: Array
+    viscous: Array
     share: float
     reversal_speed: float
 
@@ -113,22 +120,19 @@ class JointCompensation:
             strand_matrix: W, shape (..., s, t); the tensions of the strands are W f_hat.
             desired_velocity: theta^d', shape (..., n), rad/s.
         """
-        law = self.friction
-        coefficient = self._signed(desired_velocity, law.kinetic, law.static)
-        matrix: Array = self.share * coefficient[..., None] * (law.loads @ strand_matrix)
+        coefficient = self._signed(desired_velocity, self.kinetic, self.static)
+        matrix: Array = self.share * coefficient[..., None] * (self.friction.loads @ strand_matrix)
         return matrix
 
     def unloaded_torque(self, desired_velocity: Array) -> Array:
         """Return the torque without a load, the drag and b v, shape (..., n), N m."""
-        drag = self._signed(desired_velocity, self.friction.drag, self.friction.static_drag)
+        sliding = self.friction.drag
+        drag = self._signed(desired_velocity, sliding, static_drag(sliding, self.kinetic, self.static))
         drag = directed_drag(drag, self.friction.drag_asymmetry, direction(desired_velocity, self.reversal_speed))
-        return self.share * (drag + self.friction.viscous * desired_velocity)
+        return self.share * (drag + self.viscous * desired_velocity)
 
     def _signed(self, velocity: Array, kinetic: Array, static: Array) -> Array:
-        law = self.friction
-        signed: Array = signed_coefficient(
-            velocity, kinetic, static, law.stribeck_velocity, law.stribeck_exponent, self.reversal_speed
-        )
+        signed: Array = signed_coefficient(velocity, kinetic, static, *self.friction.stribeck, self.reversal_speed)
         return signed
 
 

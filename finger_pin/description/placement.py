@@ -55,6 +55,8 @@ def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, flo
     return x, y, z, w
 
 
+# Joints or tendons of hands whose copies are remembered.
+_MOST_PARTS = 256
 # Powers of the scale that a link's numbers go with.
 _POWERS = {"length": 1, "offset": 1, "width": 1, "centre_of_mass": 1, "mass": 3}
 _POWERS |= {"transverse_inertia": 5, "axial_inertia": 5}
@@ -64,6 +66,8 @@ def _scaled_link(link: Link, scale: float) -> Link:
     return link.model_copy(update={key: getattr(link, key) * scale**power for key, power in _POWERS.items()})
 
 
+# The same parts whenever their numbers are the same: routing, bodies and paths are found again by their parts.
+@memoised(lambda tendon, scale: (tendon, scale), most=_MOST_PARTS)
 def _scaled_tendon(tendon: Tendon, scale: float) -> Tendon:
     crossings = {
         joint: crossing.updated(radius=crossing.radius * scale) for joint, crossing in tendon.crossings.items()
@@ -71,6 +75,7 @@ def _scaled_tendon(tendon: Tendon, scale: float) -> Tendon:
     return tendon.updated(crossings=crossings)
 
 
+@memoised(lambda joint, scale: (joint, scale), most=_MOST_PARTS)
 def _scaled_joint(joint: Joint, scale: float) -> Joint:
     return joint.updated(link=joint.link and _scaled_link(joint.link, scale))
 
@@ -125,6 +130,7 @@ def joined_entries(hand: Any, parts: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+@memoised(lambda finger, tendon: (finger, tendon), most=_MOST_PARTS)
 def _tendon_of_hand(finger: str, tendon: Tendon) -> Tendon:
     """Return a tendon whose crossings are of the joints of a hand."""
     return tendon.updated(crossings={f"{finger}.{name}": each for name, each in tendon.crossings.items()})

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 
 from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings, bristles
 from finger_pin.exchange.mujoco_friction import (
     COUNT,
     GROUP,
@@ -18,8 +20,8 @@ from finger_pin.exchange.mujoco_friction import (
     PluginFriction,
     check_friction,
 )
-from finger_pin.mechanism.joints import JointFriction
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.typing import Array
 
 
 def add_friction_elements(root: ET.Element, description: FingerDescription, tendons: Tendons, massless: bool) -> None:
@@ -28,7 +30,7 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
     A passive tendon without its mass is a spring, and rubs as a driven tendon that its spring pulls.
     """
     check_friction(description, tendons.at_bends)
-    frictions = [*_tendon_frictions(description, tendons, massless), *_joint_frictions(description, tendons)]
+    frictions = [*_tendon_frictions(description, tendons, massless), *_joint_frictions(description)]
     elements = {(each.tag, each.get("name")): each for kind in ("joint", "fixed") for each in root.iter(kind)}
     for friction in frictions:
         owner = elements["joint" if friction.of_joint else "fixed", friction.name]
@@ -57,9 +59,9 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
 
 
 def _tendon_frictions(description: FingerDescription, tendons: Tendons, massless: bool) -> list[PluginFriction]:
-    frictions = []
+    settings, numbers, frictions = description.tendon_friction, description.numbers["tendon_friction"], []
     for index, (name, tendon) in enumerate(description.tendons.items()):
-        law = _coefficients(tendons, _TENDON_NAMES, index, float(tendons.routing.curvature_offset[index]))
+        law = _coefficients(settings, numbers, "stiction_ratio", index, float(tendons.routing.curvature_offset[index]))
         crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
         if tendon.kind == "actuated":
             frictions.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
@@ -75,27 +77,22 @@ def _tendon_frictions(description: FingerDescription, tendons: Tendons, massless
     return frictions
 
 
-# Coefficients that have other names in tendons and in joints, and those that have the same.
-_TENDON_NAMES = {"coulomb": "surface", "stiction": "stiction_ratio"}
-_JOINT_NAMES = {"coulomb": "kinetic", "stiction": "static"}
-_SAME_NAMES = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "drag", "hardening")
-
-
 def _coefficients(
-    friction: Tendons | JointFriction, names: dict[str, str], index: int, curvature_offset: float
+    settings: TendonFrictionSettings | JointFrictionSettings,
+    numbers: Mapping[str, Array],
+    stiction: str,
+    index: int,
+    curvature_offset: float = 0.0,
 ) -> Coefficients:
-    """Return the coefficients of one tendon or joint, of which some have other names."""
-    return Coefficients(
-        **{key: float(getattr(friction, name)[index]) for key, name in names.items()},
-        **{key: float(getattr(friction, key)[index]) for key in _SAME_NAMES},
-        micro_damping=float(friction.lag[index] * friction.stiffness[index]),
-        curvature_offset=curvature_offset,
-    )
+    """Return the coefficients of one tendon or joint, of which one has another name."""
+    values = {**numbers, **bristles(settings, numbers), "stiction": numbers[stiction]}
+    names = [name for name in Coefficients._fields if name != "curvature_offset"]
+    return Coefficients(**{name: float(values[name][index]) for name in names}, curvature_offset=curvature_offset)
 
 
-def _joint_frictions(description: FingerDescription, tendons: Tendons) -> list[PluginFriction]:
-    friction = JointFriction.from_description(description, tendons.routing.loads)
-    frictions = []
-    for index, name in enumerate(description.joints):
-        frictions.append(PluginFriction(PIN, name, name, True, 1.0, _coefficients(friction, _JOINT_NAMES, index, 0.0)))
-    return frictions
+def _joint_frictions(description: FingerDescription) -> list[PluginFriction]:
+    settings, numbers = description.joint_friction, description.numbers["joint_friction"]
+    return [
+        PluginFriction(PIN, name, name, True, 1.0, _coefficients(settings, numbers, settings.break_away_entry, index))
+        for index, name in enumerate(description.joints)
+    ]

@@ -56,9 +56,9 @@ class Parts(NamedTuple):
             routing,
             Tendons.from_description(description),
             Actuators.from_description(description, routing),
-            JointFriction.from_description(description, routing.loads),
-            StrokeLimiter.from_description(description),
-            JointSprings.from_description(description),
+            JointFriction(description, routing),
+            StrokeLimiter(description),
+            JointSprings(description),
         )
 
     @property
@@ -101,23 +101,24 @@ def assemble(
     """
     _warn_of_turns(description)
     routing, tendons, actuators, joint_friction, stroke_limiter, springs = parts
-    joints, width = routing.joints, parts.width
+    width = parts.width
     # Dry friction of a tree's tendons has states of its own, which stand with those of the user's rows.
     of_tree = {table.group: table for table in tree_rows(description, paths, width)}
     dry_friction = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
     custom_drives = [table for table in args.rows if table.pulls]
-    drives = (*actuators.tendon_rows(width), *tendons.sources(description, width), *custom_drives)
+    drives = (*actuators.tendon_rows(width), *tendons.sources(width), *custom_drives)
     matrices = tendons.drive_matrices(drives)
     tendon_rows = [along_paths(description, paths, table) for table in tendons.rows(drives, len(actuators.inertias))]
     canals = Canals(description, paths, tendons, [*of_tree.values(), *tendon_rows], matrices, width)
-    further = [*springs.hysteresis_rows(joints, width), *dry_friction, *args.rows]
+    spring_table, *spring_hysteresis = springs.rows(width)
+    further = [*spring_hysteresis, *dry_friction, *args.rows]
     tables = [
         *of_tree.values(),
         *tendon_rows,
         *canals.tables,
-        joint_friction.rows(joints, matrices, routing.actuated, width, canals.loads),
-        stroke_limiter.rows(joints, width),
-        springs.rows(joints, width),
+        joint_friction.rows(matrices, width, canals.loads),
+        stroke_limiter.rows(width),
+        spring_table,
         *actuators.rotor_rows(width),
         *(table for table in further if not table.pulls),
     ]

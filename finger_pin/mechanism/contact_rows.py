@@ -12,7 +12,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.laws.contact_law import CONTACT, TORSIONAL_CONTACT
 from finger_pin.mechanism.contact_features import ContactPart, solid_contacts
 from finger_pin.mechanism.gaps import ELLIPSOIDS, PRISM
-from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
+from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, piece_lengths
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.solids import Solid
@@ -84,7 +84,7 @@ def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> P
 
 def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     """Refuse a configuration of shape (nq,) in which bodies are deep in each other."""
-    gaps = path_kinematics(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: contacts.law.arms]
+    gaps = piece_lengths(body, q, [legs[0].piece for legs in contacts.paths[:: contacts.law.arms]])
     # What is as deep but for rounding, and for the measure of another program, is not deeper.
     if gaps.size and gaps.min() < -1.001 * DEEPEST_START:
         deep, most = -1e3 * float(gaps.min()), 1e3 * DEEPEST_START

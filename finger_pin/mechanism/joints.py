@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.description.caching import cached_property
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.parameters import Spring
+from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
 from finger_pin.laws.bristle import directed_drag
 from finger_pin.laws.law import Law
@@ -27,6 +29,7 @@ OF_TENDONS, OF_JOINTS = 1e-4, 1e-7
 _SPRINGS = Energy("joint_springs", "joints' springs")
 
 _LIMITERS = Energy("limiter", "stroke limiters")
+_NO_SPRING = Spring(stiffness=0.0)
 # Farther than any joint gets, rad or m.
 _BEYOND_ANY_JOINT = 1e9
 
@@ -35,154 +38,145 @@ _POWERS = {each.name.removeprefix("joint_"): each for each in JOINT_LOSSES}
 
 @dataclass(frozen=True, eq=False)
 class JointFriction:
-    """Friction of all joints.
+    """Friction of all joints, by the numbers of its description.
 
     Attributes:
-        loads: Shape (n, s), one where a strand loads a joint.
-        bearing: Whether each joint has a pin that rubs, shape (n,).
-        kinetic: M^d, shape (n,), m.
-        static: M^c, shape (n,), m.
-        stiffness: sigma_0, shape (n,), N m/rad.
-        viscous: b, shape (n,), N m s/rad.
-        stribeck_velocity: omega, shape (n,), rad/s.
-        floor: g_min, shape (n,), N m.
-        stribeck_exponent: 1 or 2, shape (n,).
-        lag: sigma_1 / sigma_0, shape (n,), s.
-        hardening: Growth of sigma_0 with |F^s|, shape (n,), 1/rad; 0 where a stiffness is given.
-        drag: Level without load while sliding, shape (n,), N m; the mean of both directions.
-        drag_asymmetry: a, shape (n,): drag (1 + a) hinders motion to greater angles, drag (1 - a) to smaller ones.
-        reversal_speed: v_r of Coulomb's law, shape (n,), rad/s.
-        law: The law.
+        description: The finger.
+        routing: Its routing.
     """
 
-    loads: Array
-    bearing: NDArray[np.bool_]
-    kinetic: Array
-    static: Array
-    stiffness: Array
-    viscous: Array
-    stribeck_velocity: Array
-    floor: Array
-    stribeck_exponent: Array
-    lag: Array
-    hardening: Array
-    drag: Array
-    drag_asymmetry: Array
-    reversal_speed: Array
-    law: Law
-
-    @classmethod
-    def from_description(cls, description: FingerDescription, loads: Array) -> JointFriction:
-        """Read one number per joint; ``loads`` comes from the routing."""
-        law, numbers = description.joint_friction, description.numbers["joint_friction"]
-        bearing = np.array(description.bearings)
-        shared = bristles(law, numbers)
-        shared["viscous"] = bearing * shared["viscous"]
-        chosen = joint_law(law.law)
-        for key in ("drag", "drag_asymmetry"):
-            if np.any(numbers[key]) and key not in chosen.parameters:
-                raise InputError(
-                    f"finger.joint_friction.{key}", f"has no effect with law = {law.law!r}, which lacks it"
-                )
-        return cls(
-            loads=bearing[:, None] * loads,
-            bearing=bearing,
-            kinetic=numbers["coulomb"],
-            static=numbers[law.break_away_entry],
-            **shared,
-            drag=bearing * numbers["drag"],
-            drag_asymmetry=numbers["drag_asymmetry"],
-            reversal_speed=numbers["reversal_speed"],
-            law=chosen,
-        )
+    description: FingerDescription
+    routing: Routing
 
     @property
-    def static_drag(self) -> Array:
-        """Level without load at which each joint lets go, shape (n,), N m: M^c / M^d of the drag, or all of it."""
-        loaded = self.kinetic > 0.0
-        return self.drag * np.where(loaded, self.static / np.where(loaded, self.kinetic, 1.0), 1.0)
+    def _numbers(self) -> Mapping[str, Array]:
+        return self.description.numbers["joint_friction"]
+
+    @property
+    def law(self) -> Law:
+        """The law."""
+        return joint_law(self.description.joint_friction.law)
+
+    @property
+    def bearing(self) -> NDArray[np.bool_]:
+        """Whether each joint has a pin that rubs, shape (n,)."""
+        return np.array(self.description.bearings)
+
+    @property
+    def loads(self) -> Array:
+        """Shape (n, s), one where a strand loads a joint."""
+        return self.bearing[:, None] * self.routing.loads
+
+    @property
+    def kinetic(self) -> Array:
+        """M^d, shape (n,), m."""
+        return self._numbers["coulomb"]
+
+    @property
+    def static(self) -> Array:
+        """M^c, shape (n,), m."""
+        return self._numbers[self.description.joint_friction.break_away_entry]
+
+    @property
+    def viscous(self) -> Array:
+        """Coefficient b, shape (n,), N m s/rad."""
+        return self.bearing * self._numbers["viscous"]
+
+    @property
+    def drag(self) -> Array:
+        """Level without load while sliding, shape (n,), N m; the mean of both directions."""
+        return self.bearing * self._numbers["drag"]
+
+    @property
+    def drag_asymmetry(self) -> Array:
+        """a, shape (n,): drag (1 + a) hinders motion to greater angles, drag (1 - a) to smaller ones."""
+        return self._numbers["drag_asymmetry"]
+
+    @property
+    def stribeck(self) -> tuple[Array, Array]:
+        """Stribeck's velocity, rad/s, and the exponent of his curve, 1 or 2, shape (n,) each."""
+        return self._numbers["stribeck_velocity"], self._numbers["stribeck_exponent"]
 
     def break_away_drag(self, direction: Array) -> Array:
         """Return the level without load at which joints let go in directions of 1 or -1, shape (..., n), N m."""
-        level: Array = directed_drag(self.static_drag, self.drag_asymmetry, direction)
+        level: Array = directed_drag(static_drag(self.drag, self.kinetic, self.static), self.drag_asymmetry, direction)
         return level
 
-    def rows(
-        self,
-        names: tuple[str, ...],
-        drives: Mapping[str, Array],
-        actuated: int,
-        width: int,
-        canals: Mapping[str, Array] | None = None,
-    ) -> Rows:
+    def rows(self, drives: Mapping[str, Array], width: int, canals: Mapping[str, Array]) -> Rows:
         """Return the table of the joints' friction.
 
         Args:
-            names: Of the joints.
             drives: Weights with which further tables pull the strands, `Tendons.drive_matrices`; all of it adds up.
-            actuated: Number of driven tendons.
             width: Number of coordinates.
             canals: Weights with which canals of a tree, and what pulls through them, load the pins, shape (n, rows).
         """
-        size = len(names)
+        settings, law, bearing, pressing = self.description.joint_friction, self.law, self.bearing, self.loads
+        for key in ("drag", "drag_asymmetry"):
+            if np.any(self._numbers[key]) and key not in law.parameters:
+                allowed = f"has no effect with law = {settings.law!r}, which lacks it"
+                raise InputError(f"finger.joint_friction.{key}", allowed)
+        values = {**self._numbers, **bristles(settings, self._numbers)}
+        values |= {name: getattr(self, name) for name in ("kinetic", "static", "viscous", "drag")}
+        values["static_drag"] = static_drag(self.drag, self.kinetic, self.static)
         # Strands beyond the actuated ones are halves of passive tendons.
-        loads = {"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]}
-        loads |= {group: self.loads @ weights for group, weights in drives.items()} | dict(canals or {})
+        actuated = self.routing.actuated
+        loads = {"driven_tendons": pressing[:, :actuated], "passive_halves": pressing[:, actuated:]}
+        loads |= {group: pressing @ weights for group, weights in drives.items()} | dict(canals)
         return Rows(
             group="joint_friction",
-            law=self.law,
-            names=names,
-            parameters=np.array([getattr(self, name) for name in self.law.parameters]),
-            arm=np.eye(size, width) * self.bearing[:, None],
+            law=law,
+            names=self.routing.joints,
+            parameters=np.array([values[name] for name in law.parameters]),
+            arm=np.eye(len(bearing), width) * bearing[:, None],
             loads=loads,
-            pins=np.where(self.bearing, np.arange(size), -1),
+            pins=np.where(bearing, np.arange(len(bearing)), -1),
             stored=Energy("joint_bristles", "joint bristles"),
-            powers=tuple(
-                _POWERS.get(name) or energy(f"joint_{name}") for name in (*self.law.supplies, *self.law.losses)
-            ),
+            powers=tuple(_POWERS.get(name) or energy(f"joint_{name}") for name in (*law.supplies, *law.losses)),
         )
+
+
+def static_drag(drag: Array, kinetic: Array, static: Array) -> Array:
+    """Return the level without load at which each joint lets go, shape (n,), N m: M^c / M^d of the drag, or all."""
+    loaded = kinetic > 0.0
+    return drag * np.where(loaded, static / np.where(loaded, kinetic, 1.0), 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class StrokeLimiter:
-    """Stroke limiters of all joints.
+    """Stroke limiters of all joints, by the numbers of a description."""
 
-    Attributes:
-        lower: Shape (n,), rad.
-        upper: Shape (n,), rad.
-        stiffness: k, shape (n,), N m/rad.
-        damping: c, shape (n,), s/rad.
-        viscous: b, shape (n,), N m s/rad.
-        limited: Whether each joint has limits, shape (n,).
-    """
+    description: FingerDescription
 
-    lower: Array
-    upper: Array
-    stiffness: Array
-    damping: Array
-    viscous: Array
-    limited: NDArray[np.bool_]
+    @cached_property
+    def _ranges(self) -> Array:
+        return np.array([joint.range for joint in self.description.joints.values()]).reshape(-1, 2)
 
-    @classmethod
-    def from_description(cls, description: FingerDescription) -> StrokeLimiter:
-        """Read the ranges and the contact's stiffness and damping."""
-        ranges = np.array([joint.range for joint in description.joints.values()])
-        numbers = description.numbers["stroke_limiter"]
-        limited = np.array([joint.limited for joint in description.joints.values()])
-        return cls(ranges[:, 0], ranges[:, 1], limited=limited, **numbers)
+    @property
+    def lower(self) -> Array:
+        """Lower ends of the ranges, shape (n,), rad."""
+        return self._ranges[:, 0]
 
-    def rows(self, names: tuple[str, ...], width: int) -> Rows:
+    @property
+    def upper(self) -> Array:
+        """Upper ends of the ranges, shape (n,), rad."""
+        return self._ranges[:, 1]
+
+    @property
+    def limited(self) -> NDArray[np.bool_]:
+        """Whether each joint has limits, shape (n,)."""
+        return np.array([joint.limited for joint in self.description.joints.values()])
+
+    def rows(self, width: int) -> Rows:
         """Return the table of the limiters."""
-        lower, upper = (
-            np.where(self.limited, self.lower, -_BEYOND_ANY_JOINT),
-            np.where(self.limited, self.upper, _BEYOND_ANY_JOINT),
-        )
+        numbers, limited = self.description.numbers["stroke_limiter"], self.limited
+        lower = np.where(limited, self.lower, -_BEYOND_ANY_JOINT)
+        upper = np.where(limited, self.upper, _BEYOND_ANY_JOINT)
         return Rows(
             group="limiter",
             law=STROKE_LIMITER,
-            names=names,
-            parameters=np.array([lower, upper, self.stiffness, self.damping, self.viscous]),
-            arm=np.eye(len(names), width),
+            names=tuple(self.description.joints),
+            parameters=np.array([lower, upper, *(numbers[name] for name in STROKE_LIMITER.parameters[2:])]),
+            arm=np.eye(len(limited), width),
             stored=_LIMITERS,
             powers=(_LIMITERS,),
         )
@@ -190,57 +184,49 @@ class StrokeLimiter:
 
 @dataclass(frozen=True, eq=False)
 class JointSprings:
-    """The springs of all joints; all zero at a joint that has none.
+    """The springs of all joints, by the numbers of a description; all zero at a joint that has none."""
 
-    Attributes:
-        stiffness: k, shape (n,), N m/rad.
-        rest: theta_0, shape (n,), rad.
-        damping: c, shape (n,), N m s/rad.
-        hysteresis: h, shape (n,).
-    """
+    description: FingerDescription
 
-    stiffness: Array
-    rest: Array
-    damping: Array
-    hysteresis: Array
+    def _numbers(self, name: str) -> Array:
+        joints = self.description.joints.values()
+        return np.array([getattr(joint.spring or _NO_SPRING, name) for joint in joints], dtype=float)
 
-    @classmethod
-    def from_description(cls, description: FingerDescription) -> JointSprings:
-        """Read the springs of the joints."""
-        springs = [joint.spring or Spring(stiffness=0.0) for joint in description.joints.values()]
-        return cls(*(np.array([getattr(each, name) for each in springs]) for name in cls.__annotations__))
+    @property
+    def rest(self) -> Array:
+        """theta_0, shape (n,), rad."""
+        return self._numbers("rest")
+
+    @property
+    def hysteresis(self) -> Array:
+        """h, shape (n,)."""
+        return self._numbers("hysteresis")
 
     @property
     def present(self) -> bool:
         """Return whether any joint has a spring that does something."""
-        return bool(np.any(self.stiffness) or np.any(self.damping))
+        return bool(np.any(self._numbers("stiffness")) or np.any(self._numbers("damping")))
 
     def torque(self, position: Array, velocity: Array) -> Array:
         """Return tau^k, shape (..., n), N m."""
-        torque: Array = spring_torque(position, velocity, self.stiffness, self.rest, self.damping)
+        stiffness, rest, damping = (self._numbers(name) for name in JOINT_SPRING.parameters)
+        torque: Array = spring_torque(position, velocity, stiffness, rest, damping)
         return torque
 
-    @property
-    def _sprung(self) -> NDArray[np.intp]:
-        return np.flatnonzero((self.stiffness != 0.0) | (self.damping != 0.0))
-
-    def rows(self, names: tuple[str, ...], width: int) -> Rows:
-        """Return the table of the springs, of those joints that have one."""
-        sprung = self._sprung
-        return Rows(
+    def rows(self, width: int) -> list[Rows]:
+        """Return the table of the springs of joints that have one, and that of their hysteresis, if any has it."""
+        numbers, names = np.array([self._numbers(name) for name in JOINT_SPRING.parameters]), self.description.joints
+        sprung = np.flatnonzero((numbers[0] != 0.0) | (numbers[2] != 0.0))
+        springs = Rows(
             group="joint_springs",
             law=JOINT_SPRING,
-            names=tuple(names[joint] for joint in sprung),
-            parameters=np.array([self.stiffness, self.rest, self.damping])[:, sprung],
+            names=tuple(np.array([*names])[sprung].tolist()),
+            parameters=numbers[:, sprung],
             arm=np.eye(len(names), width)[sprung],
             stored=_SPRINGS,
             powers=(_SPRINGS,),
         )
-
-    def hysteresis_rows(self, names: tuple[str, ...], width: int) -> list[Rows]:
-        """Return the table of the springs' hysteresis, of those that have some; no table without any."""
-        springs = self.rows(names, width)
-        return hysteresis_rows("spring_hysteresis", springs, self.hysteresis[self._sprung], OF_JOINTS, _SPRINGS)
+        return [springs, *hysteresis_rows("spring_hysteresis", springs, self.hysteresis[sprung], OF_JOINTS, _SPRINGS)]
 
 
 def hysteresis_rows(group: str, springs: Rows, shares: Array, floor: float, lost: Energy) -> list[Rows]:
@@ -253,7 +239,7 @@ def hysteresis_rows(group: str, springs: Rows, shares: Array, floor: float, lost
         floor: Least level of their bristles.
         lost: Entry of the account that its losses go to.
     """
-    stiffness = springs.parameters[springs.law.parameters.index("stiffness")]
+    stiffness = springs["stiffness"]
     lossy = np.flatnonzero(shares * stiffness)
     if not lossy.size:
         return []

@@ -8,6 +8,7 @@ velocity of every coordinate, and for a length it is the length's gradient.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
@@ -180,15 +181,25 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
     return kinematics
 
 
+def piece_lengths(body: RigidBody, q: Array, pieces: Sequence[PathElement]) -> Array:
+    """Return the lengths of pieces, or gaps, at q, shape (nq,): shape (len(pieces),), m."""
+    placements, _ = body.placements(q)
+    # Products with a frame take longer than all else: pieces of one body share theirs.
+    frames = {id(piece.frame): placements[piece.joint] * piece.frame for piece in pieces}
+    ends = {id(end): placements[end.joint].act(end.point) for piece in pieces for end in piece.ends}
+    values = [_value(piece, frames[id(piece.frame)], [ends[id(end)] for end in piece.ends]) for piece in pieces]
+    return np.array([value[0] for value in values])
+
+
 def _value(piece: PathElement, frame: pin.SE3, points: Sequence[Array]) -> Array:
     """Return the value of the shape; out of reach, a gap that is open."""
-    y = np.concatenate([frame.actInv(point) for point in points])
     out = np.zeros(16)
-    beyond = np.linalg.norm(0.5 * (y[:3] + y[3:6])) - piece.reach
-    if beyond > 0.0:
-        out[0] = beyond
-    else:
-        piece.shape.value(y, piece.parameters, out)
+    if piece.reach < np.inf:
+        beyond = math.dist(0.5 * (points[0] + points[1]), frame.translation) - piece.reach
+        if beyond > 0.0:
+            out[0] = beyond
+            return out
+    piece.shape.value(np.concatenate([frame.actInv(point) for point in points]), piece.parameters, out)
     return out
 
 

@@ -201,6 +201,11 @@ class Rows:
 
         return replace(self, arm=wide(self.arm), measure=wide(self.measure), bends=wide(self.bends))
 
+    def __getitem__(self, name: str) -> Array:
+        """Return a parameter of the law by its name, shape (k,); of contacts that of each."""
+        numbers: Array = self.parameters[self.law.parameters.index(name)]
+        return numbers
+
     def signal(self, name: str) -> int:
         """Return the index of a signal of the law by its name."""
         return self.law.signals.index(name)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.description.caching import cached_property
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.routing import Routing
@@ -27,79 +28,89 @@ SLACK = Energy("slack", "tensions cut at zero")
 BRISTLES = Energy("tendon_bristles", "tendon bristles")
 _WINCH_ENERGY = Energy("winches", "winches, through their cords")
 _HALVES = ("proximal", "distal")
-_ENTRY_OF_PARAMETER, _HYSTERESIS_ENERGY = (
-    {"ratio": "stiction_ratio"},
-    Energy("passive_hysteresis", "passive tendons stretching"),
-)
+_HYSTERESIS_ENERGY = Energy("passive_hysteresis", "passive tendons stretching")
 
 
 @dataclass(frozen=True, eq=False)
 class Tendons:
-    """The tendon layer of a finger, independent of the rigid body that it drives.
+    """The tendon layer of a finger, by the numbers of its description, independent of the rigid body that it drives.
 
     Attributes:
+        description: The finger.
         routing: The routing matrices.
-        surface: mu_e, shape (t,).
-        stiction_ratio: rho, shape (t,).
-        stiffness: sigma_0, shape (t,), N/m.
-        viscous: b, shape (t,), N s/m.
-        stribeck_velocity: omega, shape (t,), m/s.
-        floor: g_min, shape (t,), N.
-        stribeck_exponent: 1 or 2, shape (t,).
-        lag: sigma_1 / sigma_0, shape (t,), s.
-        hardening: Growth of sigma_0 with |F^s|, shape (t,), 1/m; 0 where a stiffness is given.
-        drag: Shape (t,), N.
-        half_stiffness: K_h = 2 K_t, shape (p,), N/m.
-        hysteresis: h, shape (p,).
-        mass: m_5, shape (p,), kg.
-        canals: Numbers of friction of the finger's tendons and of the canals of its tree, shape (f, t + c).
-        wraps: The places where each of them rubs.
+        wraps: The places where each of its tendons, and of those of its tree, rubs.
         several: By index of tendons that rub at several places, for each its joints' mask in (15), its offset, rad, and
             the mask of the joints from there on.
     """
 
+    description: FingerDescription
     routing: Routing
-    surface: Array
-    stiction_ratio: Array
-    stiffness: Array
-    viscous: Array
-    stribeck_velocity: Array
-    floor: Array
-    stribeck_exponent: Array
-    lag: Array
-    hardening: Array
-    drag: Array
-    half_stiffness: Array
-    hysteresis: Array
-    mass: Array
-    canals: Array
     wraps: tuple[tuple[Wrap, ...], ...]
     several: Mapping[int, Sequence[tuple[Array, float, NDArray[np.bool_]]]]
 
     @classmethod
     def from_description(cls, description: FingerDescription) -> Tendons:
-        """Read friction and passive tendons, one number per tendon."""
+        """Find the places where tendons rub."""
         routing = Routing.from_description(description)
-        law, passive = description.numbers["tendon_friction"], description.numbers["passive_tendon"]
-        size = len(routing.tendons)
-        friction = {"surface": law["coulomb"], "stiction_ratio": law["stiction_ratio"], "drag": law["drag"]}
-        losses = [description.tree.tendons[name].friction for name in description.canals]
-        friction |= bristles(description.tendon_friction, law, np.array([0.0] * size + losses))
         wraps = [find_wraps(description, name) for name in (*routing.tendons, *description.canals)]
-        return cls(
-            routing=routing,
-            **{name: each[:size] for name, each in friction.items()},
-            canals=np.array([friction[_ENTRY_OF_PARAMETER.get(name, name)] for name in PASSIVE_FRICTION.parameters]),
-            wraps=tuple(wraps),
-            several={
-                k: _places(routing, k, wraps[k])
-                for k, through_space in enumerate(routing.through_space)
-                if len(wraps[k]) > 1 and not through_space
-            },
-            half_stiffness=2.0 * passive["stiffness"],
-            hysteresis=passive["hysteresis"],
-            mass=passive["mass"],
-        )
+        several = {
+            k: _places(routing, k, wraps[k])
+            for k, through_space in enumerate(routing.through_space)
+            if len(wraps[k]) > 1 and not through_space
+        }
+        return cls(description, routing, tuple(wraps), several)
+
+    def _number(self, entry: str) -> Array:
+        return self.description.numbers["tendon_friction"][entry][: len(self.routing.tendons)]
+
+    @property
+    def surface(self) -> Array:
+        """mu_e, shape (t,)."""
+        return self._number("coulomb")
+
+    @property
+    def stiction_ratio(self) -> Array:
+        """rho, shape (t,)."""
+        return self._number("stiction_ratio")
+
+    @property
+    def viscous(self) -> Array:
+        """Coefficient b, shape (t,), N s/m."""
+        return self._number("viscous")
+
+    @property
+    def drag(self) -> Array:
+        """Level without load, shape (t,), N."""
+        return self._number("drag")
+
+    @property
+    def stribeck(self) -> tuple[Array, Array]:
+        """Stribeck's velocity, m/s, and the exponent of his curve, 1 or 2, shape (t,) each."""
+        return self._number("stribeck_velocity"), self._number("stribeck_exponent")
+
+    @property
+    def half_stiffness(self) -> Array:
+        """K_h = 2 K_t of the passive tendons, shape (p,), N/m."""
+        return 2.0 * self.description.numbers["passive_tendon"]["stiffness"]
+
+    @property
+    def hysteresis(self) -> Array:
+        """Hysteresis h of the passive tendons, shape (p,)."""
+        return self.description.numbers["passive_tendon"]["hysteresis"]
+
+    @property
+    def mass(self) -> Array:
+        """m_5 of the passive tendons, shape (p,), kg."""
+        return self.description.numbers["passive_tendon"]["mass"]
+
+    @cached_property
+    def friction(self) -> Array:
+        """Parameters of `PASSIVE_FRICTION` of the tendons and of the canals of the tree, shape (f, t + c)."""
+        settings, numbers = self.description.tendon_friction, self.description.numbers["tendon_friction"]
+        losses = [self.description.tree.tendons[name].friction for name in self.description.canals]
+        values = {**numbers, "surface": numbers["coulomb"], "ratio": numbers["stiction_ratio"]}
+        values |= bristles(settings, numbers, np.array([0.0] * len(self.routing.tendons) + losses))
+        return np.array([values[name] for name in PASSIVE_FRICTION.parameters])
 
     @property
     def at_bends(self) -> bool:
@@ -153,11 +164,11 @@ class Tendons:
         shares = zip(self.routing.passive_names, self.hysteresis, strict=True)
         return tuple(f"{name}.{half}" for name, share in shares if share for half in _HALVES)
 
-    def sources(self, description: FingerDescription, width: int) -> list[Rows]:
+    def sources(self, width: int) -> list[Rows]:
         """Return the tables of ideal sources whose tension has an end, and of ideal winches, none without any."""
         plain, winches = {}, {}
-        for k, name in enumerate(self.routing.tendons):
-            tendon, most = description.tendons[name], description.tendons[name].maximum_tension
+        for k, tendon in enumerate(self.description.tendons.values()):
+            most = tendon.maximum_tension
             if tendon.winch is not None:
                 # T = max(0, K (w - l) - D l'), as a position actuator of MuJoCo that only pulls.
                 stiff, end = tendon.winch.stiffness, np.inf if most is None else most
@@ -220,7 +231,8 @@ class Tendons:
             if len(places) > 1:
                 # `Canals` has the others.
                 bends[k, :joints], offset[k], _ = _places(routing, k, places)[0]
-        friction, names = self._friction, routing.passive_names
+        names, size = routing.passive_names, len(routing.tendons)
+        friction = self.at(range(size), [places[0] for places in self.wraps[:size]])
         wired = drive_matrices(drives, routing.tendons[:actuated])
         replaced = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
         halves = self._halves(motors)
@@ -257,15 +269,9 @@ class Tendons:
             ),
         ]
 
-    @property
-    def _friction(self) -> Array:
-        """The numbers of friction by those of its law, at the first place of every tendon, shape (f, t)."""
-        size = len(self.routing.tendons)
-        return self.at(range(size), [places[0] for places in self.wraps[:size]])
-
     def at(self, tendons: Sequence[int], wraps: Sequence[Wrap]) -> Array:
-        """Return the numbers of friction, as in ``canals``, of some tendons at some of their places, shape (f, k)."""
-        friction: Array = self.canals[:, tendons]
+        """Return the numbers of `friction` of some tendons at some of their places, shape (f, k)."""
+        friction = self.friction[:, tendons]
         shared = [PASSIVE_FRICTION.parameters.index(name) for name in ("stiffness", "viscous", "drag")]
         friction[shared] *= [wrap.share for wrap in wraps]
         return friction

@@ -24,7 +24,7 @@ from finger_pin.analysis.locking import sliding_velocity
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.laws import bristle as friction
-from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
+from finger_pin.laws.capstan import PASSIVE_FRICTION, capstan_coefficient, sliding_tension
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
@@ -176,15 +176,14 @@ def transmission_in_motion(finger: FingerLike, result: xr.Dataset) -> Transmissi
         proximal = result["passive_tension_proximal"].transpose("time", ...).values
         command[:, actuated:] = proximal.reshape(len(command), -1)
     kinetic = capstan_coefficient(tendons.surface, curvature)
-    coefficient = friction.friction_coefficient(
-        speed, kinetic, tendons.stiction_ratio * kinetic, tendons.stribeck_velocity, tendons.stribeck_exponent
-    )
+    coefficient = friction.friction_coefficient(speed, kinetic, tendons.stiction_ratio * kinetic, *tendons.stribeck)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(command > 0.0, delivered / command, np.nan)
         settled = sliding_tension(command, coefficient, speed, tendons.viscous, tendons.drag) / command
     slid = _since_reversal(result["time"].values, speed)
-    level = np.maximum(normal * coefficient + tendons.drag, tendons.floor)
-    bristle = friction.bristle_deflection(level, tendons.stiffness, tendons.hardening)
+    numbers = dict(zip(PASSIVE_FRICTION.parameters, tendons.friction[:, : len(tendons.routing.tendons)], strict=True))
+    level = np.maximum(normal * coefficient + tendons.drag, numbers["floor"])
+    bristle = friction.bristle_deflection(level, numbers["stiffness"], numbers["hardening"])
     sliding = (slid > _SETTLED * bristle) & np.isfinite(ratio)
     return TransmissionInMotion(curvature, ratio, settled, sliding, np.sign(speed))
 

@@ -196,11 +196,11 @@ def test_believed_coefficients_are_compensated_instead_of_the_finger_s():
             {"controller.joint_friction_compensation.coulomb": [1e-4, 2e-4, 3e-4, 4e-4]},
         )
     )
-    np.testing.assert_array_equal(believed.tendons.tendons.surface, 0.2)
-    np.testing.assert_array_equal(actual.tendons.tendons.surface, 0.11)
-    np.testing.assert_array_equal(believed.joints.friction.kinetic, [1e-4, 2e-4, 3e-4, 4e-4])
+    np.testing.assert_array_equal(believed.tendons.surface, 0.2)
+    np.testing.assert_array_equal(actual.tendons.surface, 0.11)
+    np.testing.assert_array_equal(believed.joints.kinetic, [1e-4, 2e-4, 3e-4, 4e-4])
     # Nothing slides more easily than it starts: a belief in M^d raises that in M^c where it has to.
-    np.testing.assert_array_equal(believed.joints.friction.static, [3.5e-4, 3.5e-4, 3.5e-4, 4e-4])
+    np.testing.assert_array_equal(believed.joints.static, [3.5e-4, 3.5e-4, 3.5e-4, 4e-4])
 
 
 def test_a_drag_of_the_joints_is_compensated_in_the_direction_of_the_desired_motion():

@@ -9,6 +9,7 @@ from numpy.linalg import norm
 
 from finger_pin.control.interface import ControlSignals
 from finger_pin.core.tables.inputs import HELD
+from finger_pin.laws.capstan import PASSIVE_FRICTION
 
 pytestmark = pytest.mark.slow
 
@@ -61,6 +62,7 @@ def pieces(case, times, x):
     loop, finger = case.loop, case.loop.finger
     signals = loop.evaluate(times, x)
     found, state = signals.finger, signals.finger.state
+    tendon_floor = finger.tendons.friction[PASSIVE_FRICTION.parameters.index("floor"), : len(finger.routing.tendons)]
     rows = [
         np.sign(state.position),
         np.sign(state.velocity),
@@ -69,8 +71,8 @@ def pieces(case, times, x):
         np.sign(found.limiter_depth),
         found.limiter_torque != 0.0,
         found.tendons.strands > 0.0,
-        found.tendons.level > finger.tendons.floor,
-        found.joints.level > finger.joint_friction.floor,
+        found.tendons.level > tendon_floor,
+        found.joints.level > finger.description.numbers["joint_friction"]["floor"],
     ]
     if found.motors is not None:
         rows += [

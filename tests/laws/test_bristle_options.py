@@ -21,6 +21,11 @@ def optional():
     return fp.Finger(fp.load_finger("ub_stand_in", OPTIONS))
 
 
+def stiffness(finger, *groups):
+    tables = {table.group: table for table in finger.mechanism.rows}
+    return np.concatenate([tables[group]["stiffness"] for group in groups])
+
+
 def random_states(finger, count, seed=0):
     """States that slide, stick, go beyond the limits and go slack, with tensions from zero upwards."""
     draw = np.random.default_rng(seed)
@@ -40,11 +45,13 @@ def test_micro_damping_is_booked_so_that_every_power_is_accounted_for(optional):
     signals = optional.evaluate(x, command)
     booked, state = powers(signals), signals.state
     tendons = np.sum(signals.tendons.friction * signals.tendons.velocity, axis=-1)
-    stored = np.sum(state.tendon_stiction * signals.tendons.stiction_rate / optional.tendons.stiffness, axis=-1)
+    cords = stiffness(optional, "driven_tendons", "passive_tendons")
+    stored = np.sum(state.tendon_stiction * signals.tendons.stiction_rate / cords, axis=-1)
     losses = booked["tendon_coulomb"] + booked["tendon_viscous"] + booked["tendon_micro_damping"]
     np.testing.assert_allclose(tendons, stored + losses, rtol=1e-10, atol=1e-12 * np.max(np.abs(stored)))
     joints = np.sum(signals.joints.friction * state.velocity, axis=-1)
-    stored = np.sum(state.joint_stiction * signals.joints.stiction_rate / optional.joint_friction.stiffness, axis=-1)
+    pins = stiffness(optional, "joint_friction")
+    stored = np.sum(state.joint_stiction * signals.joints.stiction_rate / pins, axis=-1)
     losses = booked["joint_coulomb"] + booked["joint_viscous"] + booked["joint_micro_damping"]
     np.testing.assert_allclose(joints, stored + losses, rtol=1e-10, atol=1e-12 * np.max(np.abs(stored)))
     assert np.any(booked["tendon_micro_damping"] != 0.0) and np.any(booked["joint_micro_damping"] != 0.0)

@@ -55,8 +55,7 @@ def tendon_forces(layer, position, velocity, passive_position, passive_velocity,
 
 def pin_forces(joints, velocity, stiction, strands, actuated=4):
     """Return the friction of joints under tensions of the strands, without forces at the tip."""
-    names = tuple(f"joint{j}" for j in range(velocity.shape[-1]))
     earlier = {"driven_tendons": strands[..., :actuated], "passive_halves": strands[..., actuated:]}
-    table = joints.rows(names, {}, actuated, len(names))
+    table = joints.rows({}, velocity.shape[-1], {})
     still, states = np.zeros_like(velocity), {table.group: stiction}
     return exert([table], still, velocity, states, np.zeros(0), earlier)[table.group]

@@ -31,7 +31,7 @@ def loads(strands):
 
 @pytest.fixture(scope="module")
 def joints(ub, routing):
-    return JointFriction.from_description(ub, routing.loads)
+    return JointFriction(ub, routing)
 
 
 def test_links_point_where_table_i_turns_them(finger):
@@ -86,7 +86,7 @@ def test_coefficients_can_differ_from_joint_to_joint(routing):
         "ub_stand_in",
         {"finger.joint_friction.coulomb": list(coulomb), "finger.joint_friction.stiction": list(stiction)},
     )
-    joints = JointFriction.from_description(description, routing.loads)
+    joints = JointFriction(description, routing)
     strands = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
     forces = pin_forces(joints, np.zeros(4), np.zeros(4), strands)
     np.testing.assert_allclose(forces.level, np.array(stiction) * [15.0, 15.0, 28.0, 40.0], rtol=1e-12)

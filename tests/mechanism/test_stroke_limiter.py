@@ -93,7 +93,7 @@ def test_a_bounce_loses_the_energy_that_hunt_and_crossley_lose():
 
 
 def test_limiters_read_the_ranges_of_table_and_their_own_constants(ub):
-    limiter = StrokeLimiter.from_description(ub)
+    limiter = StrokeLimiter(ub)
     ten, ninety = math.radians(10.0), math.radians(90.0)
     np.testing.assert_allclose(limiter.lower, [-ten, 0.0, 0.0, 0.0], rtol=1e-12)
     np.testing.assert_allclose(limiter.upper, [ten, ninety, ninety, ninety], rtol=1e-12)
@@ -101,6 +101,6 @@ def test_limiters_read_the_ranges_of_table_and_their_own_constants(ub):
     velocity = np.array([-0.1, 5.0, 0.2, 0.4])
     expected = [by_hand(*row) for row in zip(position, velocity, limiter.lower, limiter.upper, strict=True)]
     assert expected[1] == 0.0 and all(expected[i] != 0.0 for i in (0, 2, 3))
-    table = limiter.rows(tuple(ub.joints), 4)
+    table = limiter.rows(4)
     force = exert([table], position, velocity, {}, np.zeros(0))["limiter"].force
     np.testing.assert_allclose(-force @ table.arm, expected, rtol=1e-10)
